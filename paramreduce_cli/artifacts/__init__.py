@@ -1,0 +1,1 @@
+"""Files between stages: the only place that touches HDF5."""

@@ -1,0 +1,154 @@
+"""Files that users bring: Fourier coefficients, and recorded states and torques."""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.artifacts.hdf5 import Reader, reading
+from paramreduce_cli.errors import ArtifactError, DataError
+from paramreduce_cli.records import Coefficients, FloatArray, Recording
+
+_HDF5 = (".h5", ".hdf5")
+_FEWEST_SAMPLES = 10
+
+
+def load_coefficients(path: Path) -> Coefficients:
+    """Read Fourier coefficients.
+
+    HDF5 in the layout of trajectories.h5, or JSON in that of summary.json.
+
+    Raises:
+        DataError: The file holds no coefficients, or they are not all finite.
+        ArtifactError: The file cannot be read.
+    """
+    if path.suffix in _HDF5:
+        with reading(path) as reader:
+            period = reader.attribute("period")
+            sets = {name: reader.array(f"{name}/coefficients", 3) for name in _SETS}
+    else:
+        period, sets = _coefficients_from_json(path)
+    if not isinstance(period, int | float) or not 0 < period < math.inf:
+        raise DataError(f"{path}: the period must be a positive number of seconds.")
+    for name, values in sets.items():
+        if values.ndim != 3 or 0 in values.shape or not np.isfinite(values).all():
+            raise DataError(
+                f"{path}: the {name} coefficients must be finite numbers of shape (n_traj, n_dof, "
+                f"1 + 2 harmonics), not {values.shape}."
+            )
+        if values.shape[2] % 2 == 0:
+            raise DataError(
+                f"{path}: the {name} coefficients have {values.shape[2]} numbers per joint; [q0, "
+                "a1, b1, a2, b2, ...] is an odd count."
+            )
+    return Coefficients(str(path), float(period), sets["estimation"], sets["validation"])
+
+
+_SETS = ("estimation", "validation")
+
+
+def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+        trajectories = data["trajectories"]
+        sets = {
+            name: np.array([entry["coefficients"] for entry in trajectories[name]], dtype=float)
+            for name in _SETS
+        }
+        return trajectories["period"], sets
+    except FileNotFoundError as error:
+        raise ArtifactError(f"{path}: there is no such file.") from error
+    except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            f"{path}: holds no Fourier coefficients; bring a trajectories.h5 or a summary.json."
+        ) from error
+
+
+def load_recording(path: Path, n_dof: int) -> Recording:
+    """Read states, and torques if there are any.
+
+    CSV (also gzipped) with a header: ``t`` or ``time``, ``z1 ... zn``, ``dz1 ...``,
+    ``ddz1 ...``, and perhaps ``tau1 ...``. HDF5 with datasets ``z dz ddz`` and perhaps
+    ``time tau``, each (n_samples, n_dof).
+
+    Raises:
+        DataError: Columns are missing, there are too few rows, or numbers are not finite.
+        ArtifactError: The file cannot be read.
+    """
+    if path.suffix in _HDF5:
+        with reading(path) as reader:
+            arrays = _arrays_from_hdf5(reader)
+    else:
+        arrays = _arrays_from_csv(path, n_dof)
+    for key in ("z", "dz", "ddz"):
+        if arrays.get(key) is None:
+            raise DataError(f"{path}: {key} is missing; states are z, dz and ddz of every joint.")
+    rows = arrays["z"].shape[0]
+    for key, value in arrays.items():
+        if key != "time" and value.shape != (rows, n_dof):
+            raise DataError(
+                f"{path}: {key} has shape {value.shape}, but the robot has {n_dof} joints and there "
+                f"are {rows} rows."
+            )
+        if not np.isfinite(value).all():
+            bad = int(np.argwhere(~np.isfinite(value))[0, 0])
+            raise DataError(
+                f"{path}: {key} is not a finite number in data row {bad + 1}. Remove such rows."
+            )
+    if rows < _FEWEST_SAMPLES:
+        raise DataError(f"{path}: {rows} samples are too few; bring at least {_FEWEST_SAMPLES}.")
+    time = arrays.get("time", np.arange(rows, dtype=float))
+    return Recording(
+        str(path), time.ravel(), arrays["z"], arrays["dz"], arrays["ddz"], arrays.get("tau")
+    )
+
+
+def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
+    names = ("z", "dz", "ddz", "tau", "time")
+    return {name: reader.array(name).astype(float) for name in names if name in reader}
+
+
+def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
+    try:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(path, "rt", encoding="utf-8", newline="") as file:
+            rows = csv.reader(file)
+            header = [name.strip() for name in next(rows, [])]
+            table = [[_number(path, k, cell) for cell in row] for k, row in enumerate(rows, 2) if row]
+    except FileNotFoundError as error:
+        raise ArtifactError(f"{path}: there is no such file.") from error
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
+    for k, row in enumerate(table, 2):
+        if len(row) != len(header):
+            raise DataError(f"{path}, line {k}: {len(row)} values under {len(header)} headings.")
+    data = np.array(table, dtype=float).reshape(len(table), len(header))
+    columns = {name: data[:, k] for k, name in enumerate(header)}
+    arrays: dict[str, FloatArray] = {}
+    for key in ("z", "dz", "ddz", "tau"):
+        wanted = [f"{key}{j + 1}" for j in range(n_dof)]
+        if all(name in columns for name in wanted):
+            arrays[key] = np.column_stack([columns[name] for name in wanted])
+        elif key != "tau" or any(name in columns for name in wanted):
+            missing = [name for name in wanted if name not in columns]
+            raise DataError(
+                f"{path}, line 1: the header lacks {', '.join(missing)}. Columns are t, z1 ... "
+                f"z{n_dof}, dz1 ..., ddz1 ..., and perhaps tau1 ...; it has {', '.join(header)}."
+            )
+    for name in ("t", "time"):
+        if name in columns:
+            arrays["time"] = columns[name]
+    return arrays
+
+
+def _number(path: Path, line: int, cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError as error:
+        raise DataError(f"{path}, line {line}: {cell!r} is not a number.") from error

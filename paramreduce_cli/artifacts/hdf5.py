@@ -1,0 +1,279 @@
+"""HDF5 files written whole or not at all, with where they came from; read with clear refusals.
+
+A file is written under a temporary name in its own folder, synced, then renamed over the old
+one, so that a crash or a full disk leaves what was there before.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from paramreduce_cli.errors import ArtifactError
+
+SCHEMA = 1
+"""Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
+
+
+@dataclass(frozen=True)
+class Stamp:
+    """The attributes that every artifact carries."""
+
+    schema: int
+    robot: str
+    stage: str
+    versions: dict[str, str]
+    """paramreduce, numpy, scipy and casadi."""
+    sections: dict[str, str]
+    """Digest of every config section the stage read."""
+    inputs: dict[str, str]
+    """Digest of every file the stage read, by its name."""
+    seed: int
+    seconds: float
+    digest: str = ""
+    """Of all datasets; set when the file is complete."""
+
+
+class Writer:
+    """Writes datasets and digests them as they pass."""
+
+    def __init__(self, group: h5py.Group) -> None:
+        self._group = group
+        self._hash = hashlib.sha256()
+
+    @property
+    def digest(self) -> str:
+        """Of everything written so far."""
+        return self._hash.hexdigest()
+
+    def dataset(self, name: str, value: Any) -> None:
+        """Write an array, a number, a text or a list of texts."""
+        array = np.asarray(value)
+        if array.dtype.kind in "US":
+            flat = [str(item) for item in array.ravel()]
+            self._note(name, "\0".join(flat).encode())
+            data = np.array(flat, dtype=object).reshape(array.shape)
+            self._group.create_dataset(name, data=data, dtype=h5py.string_dtype())
+            return
+        self._note(name, np.ascontiguousarray(array).tobytes())
+        self._group.create_dataset(name, data=array)
+
+    def attribute(self, name: str, value: Any) -> None:
+        """Write a small attribute of the file."""
+        self._note(name, repr(value).encode())
+        self._group.attrs[name] = value
+
+    def rows(self, name: str, columns: int | None) -> Callable[[np.ndarray], None]:
+        """A dataset that grows by blocks of rows.
+
+        Args:
+            name: Of the dataset.
+            columns: Width of a row, None for a vector.
+
+        Returns:
+            A function that appends a block.
+        """
+        tail = () if columns is None else (columns,)
+        chunk = max(1, 65536 // max(1, columns or 1))
+        data = self._group.create_dataset(
+            name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8"
+        )
+
+        def append(block: np.ndarray) -> None:
+            start = data.shape[0]
+            data.resize(start + block.shape[0], axis=0)
+            data[start:] = block
+            self._note(name, np.ascontiguousarray(block).tobytes())
+
+        return append
+
+    def _note(self, name: str, content: bytes) -> None:
+        self._hash.update(name.encode())
+        self._hash.update(content)
+
+
+def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
+    """Write an artifact as a whole.
+
+    Args:
+        path: Where it goes; an older file there stays until the new one is complete.
+        stamp: Its provenance.
+        fill: Writes the contents.
+
+    Returns:
+        The stamp with the digest of the contents.
+
+    Raises:
+        ArtifactError: It cannot be written.
+    """
+    with atomically(path) as temporary, h5py.File(temporary, "w") as file:
+        writer = Writer(file)
+        fill(writer)
+        done = Stamp(**{**stamp.__dict__, "digest": writer.digest})
+        for name, value in _attributes(done).items():
+            file.attrs[name] = value
+    return done
+
+
+@contextlib.contextmanager
+def atomically(path: Path) -> Iterator[Path]:
+    """A temporary path beside ``path`` that takes its place when the block ends well.
+
+    Raises:
+        ArtifactError: The disk is full, the folder is not writable, or the like.
+    """
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
+        os.close(handle)
+        temporary = Path(name)
+        temporary.chmod(0o644)
+        yield temporary
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
+        temporary.replace(path)
+    except (OSError, RuntimeError) as error:
+        raise ArtifactError(f"{path}: cannot be written: {_reason(error)}") from error
+    finally:
+        if temporary is not None:
+            temporary.unlink(missing_ok=True)
+
+
+def _reason(error: Exception) -> str:
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or "No space left" in text:
+        return "the disk is full. What was there before is unchanged; make room and run it again."
+    if number in (errno.EACCES, errno.EROFS, errno.EPERM):
+        return "the folder is not writable. Choose another with --results."
+    return f"{text.splitlines()[0] if text else type(error).__name__}."
+
+
+class Reader:
+    """Reads an artifact; whatever is missing or of the wrong form is one clear error."""
+
+    def __init__(self, path: Path, file: h5py.File) -> None:
+        self.path = path
+        self.file = file
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.file
+
+    def array(self, name: str, dimensions: int | None = None) -> np.ndarray:
+        """A numeric dataset as a whole."""
+        data = self._dataset(name)
+        value = np.asarray(data[()])
+        if value.dtype.kind not in "fiub":
+            raise ArtifactError(f"{self.path}: /{name} must hold numbers.")
+        if dimensions is not None and value.ndim != dimensions:
+            raise ArtifactError(
+                f"{self.path}: /{name} has {value.ndim} dimensions where {dimensions} are needed."
+            )
+        return value
+
+    def texts(self, name: str) -> tuple[str, ...]:
+        """A dataset of texts."""
+        values = np.atleast_1d(self._dataset(name)[()])
+        return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
+
+    def text(self, name: str) -> str:
+        """One text."""
+        return self.texts(name)[0]
+
+    def groups(self, name: str = "/") -> list[str]:
+        """Names of the groups below a group."""
+        where = self.file[name]
+        return [key for key in where if isinstance(where[key], h5py.Group)]
+
+    def attribute(self, name: str, default: Any = None) -> Any:
+        """An attribute of the file."""
+        value = self.file.attrs.get(name, default)
+        return value.item() if isinstance(value, np.generic) else value
+
+    def rows(self, name: str) -> h5py.Dataset:
+        """A dataset to be read in slices."""
+        return self._dataset(name)
+
+    def _dataset(self, name: str) -> h5py.Dataset:
+        found = self.file.get(name)
+        if not isinstance(found, h5py.Dataset):
+            raise ArtifactError(
+                f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
+            )
+        return found
+
+
+@contextlib.contextmanager
+def reading(path: Path, hint: str = "") -> Iterator[Reader]:
+    """Open an HDF5 file to read.
+
+    Args:
+        path: The file.
+        hint: Remedy that is added when it is not there.
+
+    Raises:
+        ArtifactError: It is missing, truncated or no HDF5 file.
+    """
+    if not path.exists():
+        raise ArtifactError(f"{path}: there is no such file.{' ' + hint if hint else ''}")
+    try:
+        file = h5py.File(path, "r")
+    except OSError as error:
+        raise ArtifactError(
+            f"{path}: is not a readable HDF5 file (truncated, or of another kind).{' ' + hint if hint else ''}"
+        ) from error
+    with file:
+        try:
+            yield Reader(path, file)
+        except (OSError, KeyError, RuntimeError) as error:
+            raise ArtifactError(f"{path}: is damaged: {error}.") from error
+
+
+def _attributes(stamp: Stamp) -> dict[str, Any]:
+    return {
+        "schema": stamp.schema,
+        "robot": stamp.robot,
+        "stage": stamp.stage,
+        "paramreduce_version": stamp.versions["paramreduce"],
+        "numpy_version": stamp.versions["numpy"],
+        "scipy_version": stamp.versions["scipy"],
+        "casadi_version": stamp.versions["casadi"],
+        "config_sections": json.dumps(stamp.sections, sort_keys=True),
+        "inputs": json.dumps(stamp.inputs, sort_keys=True),
+        "seed": stamp.seed,
+        "wall_seconds": stamp.seconds,
+        "digest": stamp.digest,
+    }
+
+
+def read_stamp(path: Path) -> Stamp | None:
+    """The provenance of a file, None if it is not an artifact of this project."""
+    with reading(path) as reader:
+        if reader.attribute("schema") is None or reader.attribute("stage") is None:
+            return None
+        return Stamp(
+            schema=int(reader.attribute("schema")),
+            robot=str(reader.attribute("robot")),
+            stage=str(reader.attribute("stage")),
+            versions={
+                name: str(reader.attribute(f"{name}_version", "?"))
+                for name in ("paramreduce", "numpy", "scipy", "casadi")
+            },
+            sections=json.loads(reader.attribute("config_sections", "{}")),
+            inputs=json.loads(reader.attribute("inputs", "{}")),
+            seed=int(reader.attribute("seed", 0)),
+            seconds=float(reader.attribute("wall_seconds", 0.0)),
+            digest=str(reader.attribute("digest", "")),
+        )

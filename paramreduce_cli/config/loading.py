@@ -1,0 +1,203 @@
+"""From a YAML file to a Config, with every error of the file reported at once."""
+
+from __future__ import annotations
+
+import copy
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from types import UnionType
+from typing import Any, Union, get_args, get_origin
+
+import yaml
+from pydantic import BaseModel, ValidationError
+
+from paramreduce_cli.config import reading
+from paramreduce_cli.config.checks import check
+from paramreduce_cli.config.names import unknown
+from paramreduce_cli.config.reading import Document
+from paramreduce_cli.config.schema import Config
+from paramreduce_cli.errors import ConfigError
+
+Problem = tuple[reading.Path, str]
+
+
+def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
+    """Read a robot's YAML.
+
+    Args:
+        path: The file.
+        overrides: ``key.key=value`` texts that replace what the file says.
+
+    Raises:
+        ConfigError: With all that is wrong, one problem a line: file, line, key, what is wrong
+            and what would be right.
+    """
+    document = _read(path)
+    if not isinstance(document.data, dict):
+        raise ConfigError(f"{path}: a config is a mapping that starts with robot: NAME.")
+    for text in overrides:
+        try:
+            reading.apply_override(document, text)
+        except ValueError as error:
+            raise ConfigError(str(error)) from error
+    config, problems = _validate(document.data)
+    lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
+    lines += [_line(document, problem) for problem in problems]
+    if lines or config is None:
+        raise ConfigError("\n".join(dict.fromkeys(lines)))
+    return _with_paths(config, path.parent)
+
+
+def config_schema() -> dict[str, Any]:
+    """The JSON Schema of a config, for editors."""
+    return Config.model_json_schema()
+
+
+def section_digest(config: Config, section: str) -> str:
+    """Canonical text of one section, to tell whether it changed."""
+    value = config.model_dump(mode="json")[section]
+    return json.dumps(value, sort_keys=True)
+
+
+def _read(path: Path) -> Document:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError as error:
+        raise ConfigError(f"{path}: there is no such file.{_similar(path)}") from error
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read as text ({error}).") from error
+    try:
+        return reading.read_yaml(text, str(path))
+    except yaml.MarkedYAMLError as error:
+        mark = error.problem_mark or error.context_mark
+        line = f", line {mark.line + 1}" if mark else ""
+        raise ConfigError(f"{path}{line}: this is not YAML: {error.problem}.") from error
+    except yaml.YAMLError as error:
+        raise ConfigError(f"{path}: this is not YAML: {error}.") from error
+
+
+def _similar(path: Path) -> str:
+    folder = path.parent if path.parent.is_dir() else Path(".")
+    names = sorted(p.name for p in folder.glob("*.yaml"))
+    return f" {folder} holds {', '.join(names)}." if names else ""
+
+
+def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
+    """Structural errors first; then, with those cut out, whatever the rest still reveals."""
+    try:
+        config = Config.model_validate(data)
+        return config, check(config)
+    except ValidationError as error:
+        problems = [_describe(entry, data) for entry in error.errors()]
+    remainder = copy.deepcopy(data)
+    for path, _ in sorted(problems, key=lambda p: len(p[0]), reverse=True):
+        _cut(remainder, path)
+    try:
+        rest = check(Config.model_validate(remainder))
+    except ValidationError:
+        rest = []
+    wrong = [path for path, _ in problems]
+    return None, problems + [p for p in rest if not any(_touches(p[0], w) for w in wrong)]
+
+
+def _touches(a: reading.Path, b: reading.Path) -> bool:
+    short = min(len(a), len(b))
+    return a[:short] == b[:short]
+
+
+def _cut(data: Any, path: reading.Path) -> None:
+    for step in path[:-1]:
+        try:
+            data = data[step]
+        except (KeyError, IndexError, TypeError):
+            return
+    if path and isinstance(data, dict):
+        data.pop(path[-1], None)
+
+
+def _describe(entry: Any, data: Any) -> Problem:
+    path = _real_path(entry["loc"], data)
+    owner, key = _model_at(path[:-1]), path[-1] if path else ""
+    if entry["type"] == "extra_forbidden" and owner is not None:
+        return path, unknown("key", str(key), owner.model_fields)
+    meaning = ""
+    if owner is not None and isinstance(key, str) and key in owner.model_fields:
+        meaning = owner.model_fields[key].description or ""
+    if entry["type"] == "missing":
+        return path, f"is missing. It says: {meaning}"
+    message = entry["msg"].removeprefix("Value error, ")
+    given = entry["input"]
+    if not isinstance(given, dict | list) and entry["type"] != "value_error":
+        message = f"{message[0].lower()}{message[1:]}, not {given!r}"
+    return path, f"{message}." + (f" It says: {meaning}" if meaning else "")
+
+
+def _real_path(location: Iterable[str | int], data: Any) -> reading.Path:
+    """Pydantic's location without the steps that name a member of a union."""
+    path: list[str | int] = []
+    steps = list(location)
+    for k, step in enumerate(steps):
+        last = k == len(steps) - 1
+        if isinstance(data, dict) and (step in data or (last and isinstance(step, str))):
+            if step not in data and _model_at(tuple(path)) is None:
+                continue
+            path.append(step)
+            data = data.get(str(step))
+        elif isinstance(data, list) and isinstance(step, int) and step < len(data):
+            path.append(step)
+            data = data[step]
+    return tuple(path)
+
+
+def _model_at(path: reading.Path) -> type[BaseModel] | None:
+    """The section of the schema that a path leads to."""
+    annotation: Any = Config
+    for step in path:
+        if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+            field = annotation.model_fields.get(str(step))
+            if field is None:
+                return None
+            annotation = _unwrap(field.annotation)
+        elif get_origin(annotation) in (list, dict):
+            annotation = _unwrap(get_args(annotation)[-1])
+        else:
+            return None
+    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
+        return annotation
+    return None
+
+
+def _unwrap(annotation: Any) -> Any:
+    """The part of an optional or annotated type that can hold keys."""
+    if hasattr(annotation, "__metadata__"):
+        return _unwrap(annotation.__origin__)
+    if get_origin(annotation) in (Union, UnionType):
+        members = [_unwrap(a) for a in get_args(annotation) if a is not type(None)]
+        return members[0] if members else annotation
+    return annotation
+
+
+def _line(document: Document, problem: Problem) -> str:
+    path, message = problem
+    key = ".".join(str(step) for step in path)
+    end = "" if message.rstrip().endswith((".", "?")) else "."
+    separator = " " if message.startswith(("is ", "has ")) else ": "
+    start = f"{key}{separator}" if key else ""
+    return f"{document.place(path)}: {start}{message}{end}"
+
+
+def _with_paths(config: Config, folder: Path) -> Config:
+    """Resolve files named in the config against the folder it stands in."""
+
+    def resolved(section: Any, *names: str) -> Any:
+        found = {name: getattr(section, name) for name in names}
+        update = {name: folder / path for name, path in found.items() if path is not None}
+        return section.model_copy(update=update)
+
+    return config.model_copy(
+        update={
+            "trajectories": resolved(config.trajectories, "file"),
+            "sampling": resolved(config.sampling, "estimation_file", "validation_file"),
+        }
+    )

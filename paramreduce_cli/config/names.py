@@ -1,0 +1,49 @@
+"""Names that must be known, and the nearest known one to a name that is not."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+from typing import Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, core_schema
+
+from paramreduce_cli.registry import Registry
+
+
+def nearest(name: str, known: Iterable[str]) -> str | None:
+    """The known name most like ``name``, None if none is near."""
+    folded = {candidate.lower().replace("_", "-"): candidate for candidate in known}
+    close = difflib.get_close_matches(name.lower().replace("_", "-"), folded, n=1, cutoff=0.55)
+    return folded[close[0]] if close else None
+
+
+def unknown(what: str, name: str, known: Iterable[str]) -> str:
+    """A sentence that refuses a name and offers what there is."""
+    names = list(known)
+    guess = nearest(name, names)
+    hint = f"did you mean {guess}?" if guess else f"there is {', '.join(names) or 'none'}."
+    return f"{what} {name!r} is not known; {hint}"
+
+
+class registered:  # noqa: N801 - reads as a type in annotations
+    """Annotation for text that must be a name in a registry."""
+
+    def __init__(self, registry: Registry) -> None:
+        self._registry = registry
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_after_validator_function(self._check, handler(source))
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"type": "string", "enum": list(self._registry)}
+
+    def _check(self, name: str) -> str:
+        if name not in self._registry:
+            raise ValueError(unknown(self._registry.kind, name, self._registry))
+        return name

@@ -1,0 +1,335 @@
+"""What a robot's YAML may say, with units and defaults; nothing here reads files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import numpy as np
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+
+from paramreduce_cli.config.names import registered
+from paramreduce_cli.config.numbers import Number
+from paramreduce_cli import registry
+from paramreduce_cli.records import PARAMETER_KINDS
+
+Heuristic = Annotated[str, registered(registry.heuristic)]
+Criterion = Annotated[str, registered(registry.criterion)]
+Scaling = Annotated[str, registered(registry.scaling)]
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+Positive = Annotated[Number, Field(gt=0)]
+Name = Annotated[
+    str,
+    BeforeValidator(lambda value: str(value) if isinstance(value, int) else value),
+    Field(pattern=NAME),
+]
+
+
+def _as_list(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
+def _as_pairs(value: Any) -> Any:
+    if isinstance(value, list) and value and not isinstance(value[0], list):
+        return [value]
+    return value
+
+
+PerJoint = Annotated[list[Number], BeforeValidator(_as_list)]
+"""One number for all joints or one for each."""
+PositivePerJoint = Annotated[list[Positive], BeforeValidator(_as_list)]
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+PairPerJoint = Annotated[list[Pair], BeforeValidator(_as_pairs)]
+"""One [lower, upper] for all joints or one for each."""
+
+
+class Section(BaseModel):
+    """A mapping in which unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
+
+
+class DHJoint(Section):
+    """One row of a Denavit-Hartenberg table."""
+
+    name: Name | None = None
+    """Name of the body; its number in the table if left out. Parameters are called after it: m_3."""
+    parent: Name | None = None
+    """Body it is mounted on, `base` for the base; if left out the row above, or the base for the first."""
+    type: Literal["revolute", "prismatic"] = "revolute"
+    """Kind of joint: `revolute` turns about z, `prismatic` slides along z."""
+    a: Number = 0.0
+    """Length along x, m."""
+    alpha: Number = 0.0
+    """Angle about x, rad."""
+    d: Number = 0.0
+    """Length along z, m; the offset of the coordinate for a prismatic joint."""
+    theta: Number = 0.0
+    """Angle about z, rad; the offset of the coordinate for a revolute joint."""
+    gamma: Number = 0.0
+    """Angle about the parent's z that places a branch [Khalil2002], rad."""
+    b: Number = 0.0
+    """Length along the parent's z that places a branch [Khalil2002], m."""
+
+
+class DHDescription(Section):
+    """A tree of bodies in Denavit-Hartenberg parameters."""
+
+    convention: Literal["modified", "standard"] = "modified"
+    """`modified` as in Khalil and Craig: frame i on the axis of joint i; `standard`: on the axis of joint i + 1."""
+    joints: Annotated[list[DHJoint], Field(min_length=1)]
+    """One row per body, parents above their children."""
+
+
+class Description(Section):
+    """The mechanism: a tree of bodies on a fixed base."""
+
+    dh: DHDescription
+    """Denavit-Hartenberg table."""
+    gravity: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, -9.81]
+    """Acceleration of gravity in the base frame, m/s^2."""
+
+
+class BodyParameters(Section):
+    """Standard parameters of one body about its frame's origin; what is left out is zero."""
+
+    m: Number = 0.0
+    """Mass, kg."""
+    mx: Number = 0.0
+    """First moment m x, kg m."""
+    my: Number = 0.0
+    """First moment m y, kg m."""
+    mz: Number = 0.0
+    """First moment m z, kg m."""
+    Ixx: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    Ixy: Number = 0.0
+    """Tensor element (not the product of inertia with the other sign), kg m^2."""
+    Ixz: Number = 0.0
+    """Tensor element, kg m^2."""
+    Iyy: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    Iyz: Number = 0.0
+    """Tensor element, kg m^2."""
+    Izz: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    com: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None
+    """Centre of mass in the body's frame, m; instead of mx, my, mz."""
+    inertia_com: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
+    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
+
+    @model_validator(mode="after")
+    def _one_way_only(self) -> BodyParameters:
+        given = self.model_fields_set
+        if self.com is not None and given & {"mx", "my", "mz"}:
+            raise ValueError("give com or mx, my, mz, not both")
+        if self.inertia_com is not None and self.com is None:
+            raise ValueError("inertia_com needs com")
+        if self.inertia_com is not None and given & set(PARAMETER_KINDS[4:]):
+            raise ValueError("give inertia_com or Ixx ... Izz, not both")
+        return self
+
+    def standard(self) -> list[float]:
+        """The ten standard parameters in the order of PARAMETER_KINDS."""
+        values = [float(getattr(self, kind)) for kind in PARAMETER_KINDS]
+        if self.com is not None:
+            c = np.array(self.com)
+            values[1:4] = (self.m * c).tolist()
+            if self.inertia_com is not None:
+                shift = self.m * (c @ c * np.eye(3) - np.outer(c, c))
+                upper = shift[np.triu_indices(3)]
+                values[4:] = (np.array(self.inertia_com) + upper).tolist()
+        return values
+
+
+class ModelSection(Section):
+    """How base parameters are found and chosen."""
+
+    base_columns: list[str] | None = None
+    """Names of the independent parameters; if left out they are taken in the order Izz Ixx Ixy Ixz Iyz mx my Iyy mz m."""
+    rank_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
+    """Singular values below this share of the largest one count as zero."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Of the random states on which the rank is decided."""
+
+
+class Trajectories(Section):
+    """How exciting trajectories are made."""
+
+    count: Annotated[int, Field(ge=1)] = 10
+    """Trajectories of the estimation set."""
+    validation_count: Annotated[int, Field(ge=1)] = 1
+    """Trajectories of the validation set."""
+    harmonics: Annotated[int, Field(ge=1)] = 4
+    """Harmonics of the Fourier series."""
+    period: Positive = 2 * np.pi
+    """s"""
+    points: Annotated[int, Field(ge=4)] = 100
+    """Grid points over a period on which criterion and limits are evaluated."""
+    position_limits: PairPerJoint
+    """[lower, upper] for all joints, or a list of one pair per joint; rad (m if prismatic)."""
+    velocity_limits: PositivePerJoint
+    """Largest speed, one for all joints or a list; rad/s (m/s if prismatic)."""
+    acceleration_limits: PositivePerJoint | None = None
+    """Largest acceleration, one for all joints or a list; rad/s^2 (m/s^2 if prismatic)."""
+    use_full_range: bool = True
+    """Whether every joint must reach one of its limits."""
+    criterion: Criterion = "condition-number"
+    """What is minimised."""
+    scaling: Scaling = "column-normalised"
+    """Scaling of the base columns of W in which the criterion is measured."""
+    starts: Annotated[int, Field(ge=1)] = 10
+    """Random starts per trajectory."""
+    polished: Annotated[int, Field(ge=1)] = 2
+    """How many of the most promising starts are optimised to the end."""
+    max_iterations: Annotated[int, Field(ge=1)] = 250
+    """Of IPOPT, for each level of sharpness."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    """Of the random starts."""
+    file: Path | None = None
+    """Fourier coefficients to use instead of optimising: a trajectories.h5, or a summary.json; relative to this file."""
+
+
+class Sampling(Section):
+    """The estimation and validation sets."""
+
+    points: Annotated[int, Field(ge=2)] | None = None
+    """Samples per estimation trajectory; as many as trajectories.points if left out."""
+    validation_points: Annotated[int, Field(ge=2)] | None = None
+    """Samples per validation trajectory; as many as trajectories.points if left out."""
+    estimation_file: Path | None = None
+    """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
+    validation_file: Path | None = None
+    """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
+    nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
+    """Characteristic accelerations, one for all joints or a list, rad/s^2 (m/s^2 if prismatic); or their standard deviation over the estimation set."""
+
+
+class Stop(Section):
+    """Where a heuristic stops; if both are left out it orders all parameters."""
+
+    torque_error: Positive | None = None
+    """Smallest subset whose torque error is at most this."""
+    parameters: Annotated[int, Field(ge=1)] | None = None
+    """Number of parameters."""
+
+
+class ReductionSection(Section):
+    """How parameters are selected."""
+
+    heuristics: Annotated[list[Heuristic], Field(min_length=1)] = [
+        "qr",
+        "forward-selection",
+        "backward-elimination",
+    ]
+    """Which heuristics run."""
+    weighting: Literal["nominal-torque", "none"] = "nominal-torque"
+    """Weight of each joint in fitting and scoring alike."""
+    stop: Stop = Stop()
+    """When to stop."""
+
+
+class SelectedSection(Section):
+    """The reduced model that validate judges and report shows."""
+
+    heuristic: Heuristic = "forward-selection"
+    """Whose subset."""
+    n: Annotated[int, Field(ge=1)] | None = None
+    """Number of parameters; or give torque_error."""
+    torque_error: Positive | None = None
+    """Take the smallest subset whose torque error on the estimation set is at most this."""
+
+    @model_validator(mode="after")
+    def _one(self) -> SelectedSection:
+        if self.n is not None and self.torque_error is not None:
+            raise ValueError("give n or torque_error, not both")
+        return self
+
+
+class Acceptance(Section):
+    """Largest values at which the selected model is accepted; what is left out is not judged."""
+
+    torque_error_estimation: Positive | None = None
+    """Of the torques on the estimation set, a share (0.01 is 1 %)."""
+    torque_error_validation: Positive | None = None
+    """Of the torques on the validation set, a share."""
+    acceleration_error_estimation: Positive | None = None
+    """Of the accelerations on the estimation set, a share."""
+    acceleration_error_validation: Positive | None = None
+    """Of the accelerations on the validation set, a share."""
+    operations_inverse: Positive | None = None
+    """Operations of the inverse dynamics."""
+    operations_direct: Positive | None = None
+    """Operations of mass matrix and bias."""
+
+
+class ValidationSection(Section):
+    """When the selected model is accepted, and when a mass matrix is called unsafe."""
+
+    accept: Acceptance = Acceptance()
+    """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
+    condition_factor: Annotated[Number, Field(gt=1)] = 10.0
+    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than the full model's."""
+
+
+class ReportSection(Section):
+    """What the report looks like."""
+
+    title: str | None = None
+    """Heading; the robot's name if left out."""
+    formats: Annotated[list[Literal["pdf", "svg", "png"]], Field(min_length=1)] = [
+        "pdf",
+        "svg",
+        "png",
+    ]
+    """File formats of the figures."""
+    poses: list[PerJoint] | None = None
+    """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
+
+
+class Config(Section):
+    """A robot and everything that is done with it."""
+
+    robot: Annotated[str, Field(pattern=NAME)]
+    """Name of the robot; results go to results/ROBOT."""
+    description: Description
+    """The mechanism."""
+    parameter_sets: Annotated[dict[str, dict[str, BodyParameters]], Field(min_length=1)]
+    """Named sets of standard parameters: for each set, for each body."""
+    parameters: str | None = None
+    """Name of the set that is used; the first one if left out."""
+    nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
+    """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
+    model: ModelSection = ModelSection()
+    """Base parameters."""
+    trajectories: Trajectories
+    """Exciting trajectories."""
+    sampling: Sampling = Sampling()
+    """Estimation and validation sets."""
+    reduction: ReductionSection = ReductionSection()
+    """Selection of parameters."""
+    selected: SelectedSection = SelectedSection()
+    """The model to judge."""
+    validation: ValidationSection = ValidationSection()
+    """Judgement."""
+    report: ReportSection = ReportSection()
+    """Report."""
+
+    @property
+    def n_dof(self) -> int:
+        """Number of joints."""
+        return len(self.description.dh.joints)
+
+    def body_names(self) -> list[str]:
+        """Names of the bodies in the order of the table."""
+        joints = self.description.dh.joints
+        return [joint.name or str(k + 1) for k, joint in enumerate(joints)]
+
+    def standard_parameters(self) -> np.ndarray:
+        """Values of the chosen set, (n_parameters,), kg, kg m, kg m^2."""
+        chosen = self.parameter_sets[self.parameters or next(iter(self.parameter_sets))]
+        empty = BodyParameters()
+        return np.array(
+            [value for name in self.body_names() for value in chosen.get(name, empty).standard()]
+        )

@@ -1,0 +1,1 @@
+"""Exciting trajectories: Fourier series, criteria, limits and the optimiser."""

@@ -1,0 +1,52 @@
+"""What makes a trajectory exciting, as a function of the eigenvalues of W'W.
+
+A criterion returns a smooth value to minimise with its derivative by the eigenvalues; the
+sharper, the closer to the exact criterion.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.special import logsumexp, softmax
+
+from paramreduce_cli.records import FloatArray
+from paramreduce_cli.registry import criterion
+
+_SMALLEST = 1e-300
+
+
+@criterion("condition-number")
+def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
+    """log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
+
+    Args:
+        eigenvalues: Of W'W, (r,).
+        sharpness: The exponent p; infinite for the condition number itself.
+
+    Returns:
+        Value and derivative by the eigenvalues, (r,).
+    """
+    safe = np.maximum(eigenvalues, _SMALLEST)
+    logs = np.log(safe)
+    if np.isinf(sharpness):
+        weight = np.zeros_like(logs)
+        weight[np.argmax(logs)] += 1.0
+        weight[np.argmin(logs)] -= 1.0
+        return 0.5 * float(logs.max() - logs.min()), 0.5 * weight / safe
+    up, down = sharpness * logs, -sharpness * logs
+    value = 0.5 * float(logsumexp(up) + logsumexp(down)) / sharpness
+    return value, 0.5 * (softmax(up) - softmax(down)) / safe
+
+
+@criterion("d-optimality")
+def d_optimality(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
+    """Minus half the logarithm of det W'W per parameter; smooth as it is."""
+    safe = np.maximum(eigenvalues, _SMALLEST)
+    r = eigenvalues.size
+    return -0.5 * float(np.sum(np.log(safe))) / r, -0.5 / (safe * r)
+
+
+def condition_from_matrix(W: FloatArray) -> float:
+    """Condition number by singular values, infinite where the columns are dependent."""
+    singular = np.linalg.svd(W, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf

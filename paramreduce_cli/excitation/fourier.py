@@ -1,0 +1,79 @@
+"""Finite Fourier series as joint trajectories [Swevers1996].
+
+z(t) = q0 + sum_l a_l / (w l) sin(w l t) - b_l / (w l) cos(w l t), with w = 2 pi / period;
+the coefficients of one joint are [q0, a1, b1, a2, b2, ...].
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray
+
+
+@dataclass(frozen=True)
+class FourierBasis:
+    """Matrices that turn the coefficients of a joint into its motion on a set of times.
+
+    Each is (n_points, 1 + 2 harmonics).
+    """
+
+    time: FloatArray
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+
+    def states(self, coefficients: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Motion of all joints.
+
+        Args:
+            coefficients: (n_dof, 1 + 2 harmonics)
+
+        Returns:
+            z, dz and ddz, each (n_points, n_dof).
+        """
+        return (
+            self.position @ coefficients.T,
+            self.velocity @ coefficients.T,
+            self.acceleration @ coefficients.T,
+        )
+
+
+def sample_times(period: float, points: int) -> FloatArray:
+    """Equidistant times over one period, the end point left out, (points,), s."""
+    return period * np.arange(points) / points
+
+
+def fourier_basis(period: float, harmonics: int, time: FloatArray) -> FourierBasis:
+    """Evaluate the series' functions at some times.
+
+    Args:
+        period: s.
+        harmonics: Number of harmonics.
+        time: (n_points,), s.
+    """
+    frequency = 2 * np.pi / period * np.arange(1, harmonics + 1)
+    phase = np.outer(time, frequency)
+    sine, cosine = np.sin(phase), np.cos(phase)
+    position = np.ones((time.size, 1 + 2 * harmonics))
+    velocity, acceleration = np.zeros_like(position), np.zeros_like(position)
+    position[:, 1::2], position[:, 2::2] = sine / frequency, -cosine / frequency
+    velocity[:, 1::2], velocity[:, 2::2] = cosine, sine
+    acceleration[:, 1::2], acceleration[:, 2::2] = -frequency * sine, frequency * cosine
+    return FourierBasis(time, position, velocity, acceleration)
+
+
+def grid_margin(harmonics: int, points: int) -> float:
+    """By what factor limits must be tightened on a grid to hold everywhere.
+
+    A trigonometric polynomial of degree N exceeds its largest magnitude on M equidistant
+    points of its period by at most 1 / cos(pi N / M) [Ehlich1964].
+
+    Raises:
+        ValueError: The grid has no more than twice as many points as harmonics.
+    """
+    if points <= 2 * harmonics:
+        raise ValueError(f"{points} points cannot bound {harmonics} harmonics between them")
+    return float(np.cos(np.pi * harmonics / points))

@@ -1,0 +1,164 @@
+"""Many trajectories in parallel processes, each with one BLAS thread and a seed of its own.
+
+The result of a trajectory depends on its key alone, so it is the same whatever the number
+of processes. Worker processes ignore Ctrl-C; their parent stops them.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import multiprocessing
+import queue
+import signal
+import threading
+import warnings
+import zlib
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass
+from multiprocessing.queues import Queue
+
+import threadpoolctl
+
+from paramreduce_cli import registry
+from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.excitation.objective import Excitation
+from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import (
+    BaseParameters,
+    FloatArray,
+    Mechanism,
+    Progress,
+    Run,
+    Trajectory,
+)
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is asked of all trajectories."""
+
+    mechanism: Mechanism
+    base: BaseParameters
+    nominal_torque: FloatArray
+    criterion: str
+    settings: Settings
+    seed: int
+
+
+def excitation_of(
+    mechanism: Mechanism,
+    base: BaseParameters,
+    nominal_torque: FloatArray,
+    criterion: str,
+    scaling: str,
+) -> Excitation:
+    """The measurement of a mechanism's base columns; compiles its regressor."""
+    observation = Dynamics(mechanism).observation(base.columns)
+    return Excitation(
+        forward=observation.forward,
+        adjoint=observation.adjoint,
+        beta=base.beta,
+        nominal_torque=nominal_torque,
+        criterion=registry.criterion[criterion],
+        scaling=registry.scaling[scaling],
+    )
+
+
+def optimise_all(task: Task, keys: list[str], run: Run) -> dict[str, Trajectory]:
+    """Optimise the trajectories that are not among the finished parts yet.
+
+    Args:
+        task: What is asked.
+        keys: Names of the trajectories; each seeds its own random numbers.
+        run: Workers, finished parts and progress.
+
+    Raises:
+        KeyboardInterrupt: After all workers have been stopped; finished parts are kept.
+    """
+    found = {key: run.parts[key] for key in keys if key in run.parts}
+    for key in found:
+        run.progress(Progress(key, 1.0, 1.0, "kept from before"))
+    missing = [key for key in keys if key not in found]
+    if not missing:
+        return found
+    _excitation(task)  # compile once, before the workers all ask for it
+    with _pool(task, min(run.jobs, len(missing)), run) as pool:
+        futures = {pool.submit(_optimise, key): key for key in missing}
+        try:
+            for future in as_completed(futures):
+                key = futures[future]
+                found[key] = run.parts[key] = future.result()
+                run.progress(Progress(key, 1.0, 1.0, f"kappa {found[key].kappa:.4g}"))
+        except BrokenProcessPool as error:
+            raise DataError(
+                "a worker process died, perhaps for want of memory. Finished trajectories are "
+                "kept; run the same command again, with fewer --jobs."
+            ) from error
+    return found
+
+
+@contextlib.contextmanager
+def _pool(task: Task, jobs: int, run: Run) -> Iterator[ProcessPoolExecutor]:
+    context = multiprocessing.get_context("spawn")
+    news: Queue[Progress | None] = context.Queue()
+    listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
+    listener.start()
+    pool = ProcessPoolExecutor(jobs, context, _start_worker, (task, news))
+    try:
+        yield pool
+        pool.shutdown()
+    except BaseException:
+        pool.shutdown(wait=False, cancel_futures=True)
+        for process in multiprocessing.active_children():
+            process.terminate()
+        raise
+    finally:
+        news.put(None)
+        listener.join(timeout=5)
+
+
+def _listen(news: Queue[Progress | None], run: Run) -> None:
+    while True:
+        try:
+            item = news.get()
+        except (EOFError, OSError, queue.Empty):
+            return
+        if item is None:
+            return
+        run.progress(item)
+
+
+class _Worker:
+    """What a worker process knows; set once when it starts."""
+
+    task: Task
+    excitation: Excitation
+    news: Queue[Progress | None]
+
+
+def _start_worker(task: Task, news: Queue[Progress | None]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threadpoolctl.threadpool_limits(1)
+    warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
+    _Worker.task, _Worker.news = task, news
+    _Worker.excitation = _excitation(task)
+
+
+def _excitation(task: Task) -> Excitation:
+    return excitation_of(
+        task.mechanism, task.base, task.nominal_torque, task.criterion, task.settings.scaling
+    )
+
+
+def _optimise(key: str) -> Trajectory:
+    task = _Worker.task
+    seed = [task.seed, zlib.crc32(key.encode())]
+
+    def tell(share: float) -> None:
+        if share < 1.0:
+            _Worker.news.put(Progress(key, share, 1.0))
+
+    return optimise_trajectory(_Worker.excitation, task.settings, seed, tell)

@@ -1,0 +1,1 @@
+"""The expression graph: counting operations, compiling to machine code."""

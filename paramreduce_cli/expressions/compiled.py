@@ -1,0 +1,175 @@
+"""Turn CasADi functions into compiled loops over many samples.
+
+The C text that CasADi generates is wrapped in a loop over samples, compiled once by the
+system's C compiler and kept in the user's cache under a digest of the text, so that a
+second run starts at once. Without a compiler CasADi's own virtual machine does the same
+work, slower; :class:`BatchFunction` warns of that once per process.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import shutil
+import subprocess
+import tempfile
+import warnings
+from functools import cache
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.records import FloatArray
+
+_FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
+
+_LOOP = """
+int paramreduce_batch(long long n, const double* const* in, const long long* in_size,
+                      double* const* out, const long long* out_size, double* work) {{
+  const double* arg[{n_arg}];
+  double* res[{n_res}];
+  for (long long k = 0; k < n; ++k) {{
+    for (int i = 0; i < {n_in}; ++i) arg[i] = in[i] + k * in_size[i];
+    for (int i = 0; i < {n_out}; ++i) res[i] = out[i] + k * out_size[i];
+    if (kernel(arg, res, 0, work, 0)) return 1;
+  }}
+  return 0;
+}}
+"""
+
+
+class BatchFunction:
+    """A function of vectors, evaluated for many samples at once.
+
+    Args:
+        inputs: Column vectors of symbols.
+        outputs: Dense expressions; a matrix comes out flattened column by column, so hand
+            in its transpose to get rows.
+    """
+
+    def __init__(self, inputs: list[ca.SX], outputs: list[ca.SX]) -> None:
+        dense = ca.cse([ca.densify(ca.vec(output)) for output in outputs])
+        self._function = ca.Function("kernel", inputs, dense)
+        self._in_sizes = [x.numel() for x in inputs]
+        self._out_sizes = [x.numel() for x in outputs]
+        self._library = _load(self._function)
+
+    def __call__(self, *arrays: FloatArray) -> list[FloatArray]:
+        """Evaluate.
+
+        Args:
+            arrays: One per input, each (n_samples, size of the input).
+
+        Returns:
+            One per output, each (n_samples, size of the output).
+        """
+        n = arrays[0].shape[0]
+        ins = [
+            np.ascontiguousarray(a, dtype=np.float64).reshape(n, size)
+            for a, size in zip(arrays, self._in_sizes, strict=True)
+        ]
+        if self._library is None:
+            return self._interpret(n, ins)
+        outs = [np.empty((n, size)) for size in self._out_sizes]
+        work = np.empty(max(1, self._function.sz_w()))
+        self._library.paramreduce_batch(
+            ctypes.c_longlong(n),
+            _pointers(ins),
+            (ctypes.c_longlong * len(ins))(*self._in_sizes),
+            _pointers(outs),
+            (ctypes.c_longlong * len(outs))(*self._out_sizes),
+            work.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+        )
+        return outs
+
+    def _interpret(self, n: int, ins: list[FloatArray]) -> list[FloatArray]:
+        if n == 0:
+            return [np.empty((0, size)) for size in self._out_sizes]
+        results = self._function.map(n)(*[a.T for a in ins])
+        if len(self._out_sizes) == 1:
+            results = [results]
+        return [np.ascontiguousarray(result.full().T) for result in results]
+
+
+def _pointers(arrays: list[FloatArray]) -> ctypes.Array:
+    return (ctypes.c_void_p * len(arrays))(*[a.ctypes.data for a in arrays])
+
+
+@cache
+def compiler() -> str | None:
+    """Path of the C compiler: ``$CC`` if set, else gcc or cc; None if there is none."""
+    names = [os.environ["CC"]] if os.environ.get("CC") else ["gcc", "cc"]
+    found = next((path for name in names if (path := shutil.which(name))), None)
+    if found is None:
+        warnings.warn(
+            "no C compiler found (gcc, cc or $CC): the model runs in CasADi's virtual machine, "
+            "with the same results but several times slower",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def cache_folder() -> Path:
+    """Where compiled models are kept: ``$PARAMREDUCE_CACHE`` or the user's cache."""
+    named = os.environ.get("PARAMREDUCE_CACHE")
+    if named:
+        return Path(named)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
+
+
+def _load(function: ca.Function) -> ctypes.CDLL | None:
+    cc = compiler()
+    if cc is None:
+        return None
+    text = _c_text(function)
+    digest = hashlib.sha256("\n".join([text, cc, *_FLAGS, ca.__version__]).encode()).hexdigest()
+    try:
+        folder = cache_folder()
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError:
+        folder = Path(tempfile.mkdtemp(prefix="paramreduce-"))
+    library = folder / f"{digest[:32]}.so"
+    try:
+        if not library.exists():
+            _compile(cc, text, library)
+        return ctypes.CDLL(str(library))
+    except (OSError, subprocess.CalledProcessError) as error:
+        detail = getattr(error, "stderr", None) or str(error)
+        warnings.warn(
+            f"the C compiler {cc} failed ({str(detail).strip().splitlines()[-1]}): the model runs "
+            "in CasADi's virtual machine, with the same results but several times slower",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+        return None
+
+
+def _c_text(function: ca.Function) -> str:
+    generator = ca.CodeGenerator("kernel.c", {"with_header": False})
+    generator.add(function)
+    loop = _LOOP.format(
+        n_arg=max(1, function.sz_arg()),
+        n_res=max(1, function.sz_res()),
+        n_in=function.n_in(),
+        n_out=function.n_out(),
+    )
+    return generator.dump() + loop
+
+
+def _compile(cc: str, text: str, library: Path) -> None:
+    """Compile beside the target and rename, so that parallel runs never load half a file."""
+    with tempfile.TemporaryDirectory(dir=library.parent) as folder:
+        source = Path(folder, "kernel.c")
+        source.write_text(text)
+        built = Path(folder, "kernel.so")
+        subprocess.run(
+            [cc, *_FLAGS, str(source), "-o", str(built), "-lm"],
+            check=True,
+            capture_output=True,
+            text=True,
+        )
+        built.replace(library)

@@ -1,0 +1,1 @@
+"""The dynamics of a mechanism: kinematics, IDM, DDM, regressor, base parameters."""

@@ -1,0 +1,111 @@
+"""Base parameters: which columns of W are independent, and what the others are made of.
+
+Found from random states, as in [Gautier1991], with ranks decided relative to the largest
+singular value of W with its columns scaled to unit length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg
+
+from paramreduce_cli.errors import RankError
+from paramreduce_cli.records import BaseParameters, BoolArray, FloatArray, IntArray
+
+PREFERENCE = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "mx", "my", "Iyy", "mz", "m")
+"""Kinds of parameters in the order in which they are preferred as base parameters.
+
+For revolute arms it yields Khalil's set [Khalil1987]: Izz of the first body and seven
+parameters of every other one, with Iyy, mz and m regrouped.
+"""
+
+_AFFECTING_TOLERANCE = 1e-11
+"""Against the largest column: round-off leaves 1e-15 in columns that cancel exactly."""
+
+_NUMERICALLY_ZERO = 1e-10
+
+
+def preference_order(names: tuple[str, ...]) -> IntArray:
+    """Parameter indices from the most to the least preferred.
+
+    By kind as in :data:`PREFERENCE`; within a kind by position. Names of another form come
+    after all others. This order breaks every tie in the project.
+    """
+    rank = {kind: k for k, kind in enumerate(PREFERENCE)}
+    kinds = [rank.get(name.split("_", 1)[0], len(PREFERENCE)) for name in names]
+    return np.lexsort((np.arange(len(names)), kinds)).astype(np.int64)
+
+
+def affecting_columns(W: FloatArray) -> BoolArray:
+    """Columns that are not zero to rounding, (n,)."""
+    norms = np.linalg.norm(W, axis=0)
+    largest = norms.max(initial=0.0)
+    result: BoolArray = norms > _AFFECTING_TOLERANCE * largest
+    return result
+
+
+def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> BaseParameters:
+    """Choose independent columns greedily and express the others in them.
+
+    Args:
+        W: Observation matrix of random states, (n_rows, n).
+        preference: All column indices, the most wanted first.
+        tolerance: Singular values below this share of the largest one count as zero.
+
+    Returns:
+        Columns in the order of preference in which they were taken, and beta.
+
+    Raises:
+        RankError: The greedy choice and the singular values disagree, so that no rank can
+            be told.
+    """
+    affecting = np.flatnonzero(affecting_columns(W))
+    norms = np.linalg.norm(W[:, affecting], axis=0)
+    scaled = W[:, affecting] / norms
+    singular = np.linalg.svd(scaled, compute_uv=False)
+    rank = int(np.sum(singular > tolerance * singular[0])) if singular.size else 0
+    gap = float(singular[rank - 1] / singular[rank]) if 0 < rank < singular.size else np.inf
+
+    positions = {int(column): k for k, column in enumerate(affecting)}
+    wanted = [positions[int(c)] for c in preference if int(c) in positions]
+    taken = independent_columns(scaled, wanted, rank)
+    if len(taken) < rank:
+        raise RankError(
+            f"the rank is not clear: {rank} by singular values, {len(taken)} by columns; the gap "
+            f"at {rank} is {gap:.3g}. Raise or lower model.rank_tolerance (now {tolerance:g})."
+        )
+    columns = affecting[taken]
+    others = np.setdiff1d(np.arange(W.shape[1]), columns)
+    beta = np.zeros((rank, others.size))
+    live = np.isin(others, affecting)
+    scale_base = np.linalg.norm(W[:, columns], axis=0)
+    target = others[live]
+    target_norms = np.linalg.norm(W[:, target], axis=0)
+    solution, *_ = scipy.linalg.lstsq(W[:, columns] / scale_base, W[:, target] / target_norms)
+    solution = solution * target_norms / scale_base[:, None]
+    relevance = np.abs(solution) * scale_base[:, None] / target_norms
+    solution[relevance < _NUMERICALLY_ZERO] = 0.0
+    beta[:, live] = solution
+    return BaseParameters(columns, beta, singular, gap)
+
+
+def independent_columns(scaled: FloatArray, wanted: list[int], rank: int) -> list[int]:
+    """Take columns of unit length in the order wanted while they are independent of those taken.
+
+    A column is dependent when what is left of it is below the geometric middle between
+    round-off and the smallest residual an independent one shows.
+    """
+    residual = np.linalg.qr(scaled, mode="r")
+    basis = np.empty((residual.shape[0], 0))
+    taken: list[int] = []
+    for k in wanted:
+        if len(taken) == rank:
+            break
+        column = residual[:, k]
+        for _ in range(2):
+            column = column - basis @ (basis.T @ column)
+        length = np.linalg.norm(column)
+        if length > np.sqrt(np.finfo(float).eps):
+            taken.append(k)
+            basis = np.column_stack([basis, column / length])
+    return taken

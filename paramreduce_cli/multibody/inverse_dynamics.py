@@ -1,0 +1,191 @@
+"""Inverse dynamics by the recursive Newton-Euler method, symbolically.
+
+The recursion of [Luh1980] in body frames, with first moments and inertias about the frame
+origins, so that the torques are linear in the standard parameters [Khosla1985]. The matrix
+U = skew(w') + skew(w)^2 is formed once a body and serves both force and moment
+[Khalil1987].
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from paramreduce_cli.multibody.kinematics import (
+    ZERO,
+    JointMotion,
+    Matrix,
+    Vector,
+    add,
+    apply,
+    cross,
+    dot,
+    motions,
+    scale,
+)
+from paramreduce_cli.records import BASE, PARAMETER_KINDS, Mechanism
+
+
+@dataclass(frozen=True)
+class BodyInertia:
+    """The standard parameters of one body as symbols or expressions."""
+
+    m: ca.SX
+    moment: Vector
+    """First moment m r, kg m."""
+    tensor: Matrix
+    """Inertia about the frame origin, kg m^2."""
+
+
+def body_inertia(phi: Sequence[ca.SX] | ca.SX, index: int) -> BodyInertia:
+    """The parameters of body ``index`` in the stacked vector ``phi``."""
+    start = len(PARAMETER_KINDS) * index
+    m, mx, my, mz, xx, xy, xz, yy, yz, zz = (phi[start + k] for k in range(len(PARAMETER_KINDS)))
+    return BodyInertia(m, (mx, my, mz), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+
+
+@dataclass(frozen=True)
+class BodyMotion:
+    """Velocity and acceleration of one body frame, in its own components."""
+
+    joint: JointMotion
+    omega: Vector
+    omega_dot: Vector
+    acceleration: Vector
+    """Of the origin, less gravity."""
+    U: Matrix
+    """skew(omega_dot) + skew(omega)^2"""
+
+
+def inverse_dynamics(
+    mechanism: Mechanism, z: ca.SX, dz: ca.SX, ddz: ca.SX, phi: ca.SX, *, gravity: bool = True
+) -> list[ca.SX]:
+    """Joint torques and forces for a motion.
+
+    Args:
+        mechanism: The tree.
+        z: Coordinates, (n_dof,), rad or m.
+        dz: Velocities.
+        ddz: Accelerations.
+        phi: Standard parameters, (n_parameters,).
+        gravity: Whether gravity acts.
+
+    Returns:
+        One expression per joint, N m or N.
+    """
+    moving = body_motions(mechanism, motions(mechanism, z), dz, ddz, gravity=gravity)
+    forces: list[Vector] = []
+    moments: list[Vector] = []
+    for i, motion in enumerate(moving):
+        force, moment = inertial_wrench(body_inertia(phi, i), motion)
+        forces.append(force)
+        moments.append(moment)
+    return transmit(mechanism, [m.joint for m in moving], forces, moments)
+
+
+def body_motions(
+    mechanism: Mechanism, joints: list[JointMotion], dz: ca.SX, ddz: ca.SX, *, gravity: bool
+) -> list[BodyMotion]:
+    """Propagate velocities and accelerations from the base outwards."""
+    down = (-mechanism.gravity).tolist() if gravity else [0.0, 0.0, 0.0]
+    ground = (ca.SX(down[0]), ca.SX(down[1]), ca.SX(down[2]))
+    result: list[BodyMotion] = []
+    for i, joint in enumerate(joints):
+        body = joint.body
+        if body.parent == BASE:
+            omega, omega_dot, acceleration = ZERO, ZERO, ground
+        else:
+            before = result[body.parent]
+            omega, omega_dot = before.omega, before.omega_dot
+            acceleration = add(before.acceleration, apply(before.U, joint.origin))
+        omega, omega_dot, acceleration = map(
+            joint.to_body, (omega, omega_dot, acceleration)
+        )
+        axis = [ca.SX(component) for component in joint.axis().tolist()]
+        if body.joint == "revolute":
+            turning = scale(dz[i], axis)
+            rise = add(scale(ddz[i], axis), cross(omega, turning))
+            acceleration = add(acceleration, _swing(joint, omega, omega_dot, turning, rise))
+            omega, omega_dot = add(omega, turning), add(omega_dot, rise)
+        else:
+            acceleration = add(acceleration, scale(ddz[i], axis))
+            acceleration = add(acceleration, scale(2 * dz[i], cross(omega, axis)))
+        result.append(
+            BodyMotion(joint, omega, omega_dot, acceleration, _u_matrix(omega, omega_dot))
+        )
+    return result
+
+
+def _swing(
+    joint: JointMotion, omega: Vector, omega_dot: Vector, turning: Vector, rise: Vector
+) -> Vector:
+    """What the joint's own turning adds to the acceleration of a frame off its axis."""
+    arm = joint.arm()
+    if all(component.is_zero() for component in arm):
+        return ZERO
+    before = apply(_u_matrix(omega, omega_dot), arm)
+    after = apply(_u_matrix(add(omega, turning), add(omega_dot, rise)), arm)
+    return (after[0] - before[0], after[1] - before[1], after[2] - before[2])
+
+
+def _u_matrix(omega: Vector, omega_dot: Vector) -> Matrix:
+    xx, yy, zz = (component * component for component in omega)
+    xy, xz, yz = omega[0] * omega[1], omega[0] * omega[2], omega[1] * omega[2]
+    return (
+        (-yy - zz, xy - omega_dot[2], xz + omega_dot[1]),
+        (xy + omega_dot[2], -xx - zz, yz - omega_dot[0]),
+        (xz - omega_dot[1], yz + omega_dot[0], -xx - yy),
+    )
+
+
+def inertial_wrench(inertia: BodyInertia, motion: BodyMotion) -> tuple[Vector, Vector]:
+    """Force and moment about the frame origin that keep the body on its motion.
+
+    The moment is I w' + w x (I w) + d x a with the products of w taken from U.
+    """
+    U, rate, omega = motion.U, motion.omega_dot, motion.omega
+    (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor
+    force = add(scale(inertia.m, motion.acceleration), apply(U, inertia.moment))
+    spin = (
+        xx * rate[0] + (zz - yy) * (omega[1] * omega[2]) - xy * U[2][0] + xz * U[1][0]
+        + yz * (U[1][1] - U[2][2]),
+        yy * rate[1] + (xx - zz) * (omega[0] * omega[2]) + xy * U[2][1] - yz * U[0][1]
+        + xz * (U[2][2] - U[0][0]),
+        zz * rate[2] + (yy - xx) * (omega[0] * omega[1]) - xz * U[1][2] + yz * U[0][2]
+        + xy * (U[0][0] - U[1][1]),
+    )  # fmt: skip
+    return force, add(spin, cross(inertia.moment, motion.acceleration))
+
+
+def transmit(
+    mechanism: Mechanism, joints: list[JointMotion], forces: list[Vector], moments: list[Vector]
+) -> list[ca.SX]:
+    """Add up wrenches from the tips inwards and project them on the joint axes.
+
+    Args:
+        mechanism: The tree.
+        joints: One per body.
+        forces: On each body, in its own components; overwritten.
+        moments: About each body's origin, in its own components; overwritten.
+
+    Returns:
+        One torque or force per joint.
+    """
+    tau = [ca.SX(0)] * mechanism.n_dof
+    for i in reversed(range(mechanism.n_dof)):
+        joint = joints[i]
+        axis = joint.axis().tolist()
+        if joint.body.joint == "revolute":
+            about_axis = add(moments[i], cross(joint.arm(), forces[i]))
+            tau[i] = dot(axis, about_axis)
+        else:
+            tau[i] = dot(axis, forces[i])
+        parent = joint.body.parent
+        if parent != BASE:
+            force = joint.to_parent(forces[i])
+            moment = add(joint.to_parent(moments[i]), cross(joint.origin, force))
+            forces[parent] = add(forces[parent], force)
+            moments[parent] = add(moments[parent], moment)
+    return tau

@@ -1,0 +1,153 @@
+"""Observation matrices of long motions, block by block, compressed as they pass.
+
+The triangular factor R of [W | tau] has the same least-squares fits as the matrix itself;
+one is kept for every trajectory and joint, so that any weighting of joints and any choice
+of trajectories follows from the factors alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Block, FloatArray
+
+BLOCK_SAMPLES = 500
+"""Samples evaluated at a time: small enough for the cache, large enough for the loops."""
+
+
+@dataclass(frozen=True)
+class StateBlock:
+    """Consecutive states of one trajectory, and torques where they were measured."""
+
+    trajectory: int
+    time: FloatArray
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray | None = None
+
+
+class ObservedSet:
+    """A sample set computed from states as it is read.
+
+    Args:
+        states: Called to start reading anew.
+        n_samples: How many samples it yields in all.
+        dynamics: Of the mechanism.
+        phi: Standard parameters, for torques that were not measured.
+    """
+
+    def __init__(
+        self,
+        states: Callable[[], Iterable[StateBlock]],
+        n_samples: int,
+        dynamics: Dynamics,
+        phi: FloatArray,
+    ) -> None:
+        self._states = states
+        self.n_samples = n_samples
+        self._dynamics = dynamics
+        self._phi = phi
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+        for s in self._states():
+            K = self._dynamics.regressor(s.z, s.dz, s.ddz)
+            tau = K @ self._phi if s.tau is None else s.tau
+            W = K.reshape(-1, K.shape[2])
+            yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, W)
+
+    def factors(self) -> FloatArray:
+        """Triangular factors per trajectory and joint."""
+        return joint_factors(self.blocks())
+
+
+class FactorAccumulator:
+    """Collects the triangular factors of blocks as they pass by."""
+
+    def __init__(self) -> None:
+        self._factors: list[list[FloatArray]] = []
+
+    def add(self, block: Block) -> None:
+        """Take the rows of one block in."""
+        n_dof = block.tau.shape[1]
+        n = block.W.shape[1]
+        while len(self._factors) <= block.trajectory:
+            self._factors.append([np.zeros((0, n + 1)) for _ in range(n_dof)])
+        W = block.W.reshape(-1, n_dof, n)
+        for j in range(n_dof):
+            rows = np.column_stack([W[:, j], block.tau[:, j]])
+            factors = self._factors[block.trajectory]
+            factors[j] = append_rows(factors[j], rows)
+
+    def result(self) -> FloatArray:
+        """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows."""
+        return np.array(
+            [[_square(factor) for factor in factors] for factors in self._factors]
+        )
+
+
+def joint_factors(blocks: Iterable[Block]) -> FloatArray:
+    """Triangular factors of [W | tau] per trajectory and joint.
+
+    Returns:
+        (n_trajectories, n_dof, n_parameters + 1, n_parameters + 1)
+    """
+    accumulator = FactorAccumulator()
+    for block in blocks:
+        accumulator.add(block)
+    return accumulator.result()
+
+
+def append_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
+    """Triangular factor of [factor; rows]."""
+    stacked = np.vstack([factor, rows])
+    return np.linalg.qr(stacked, mode="r") if stacked.shape[0] > stacked.shape[1] else stacked
+
+
+def _square(factor: FloatArray) -> FloatArray:
+    size = factor.shape[1]
+    triangular = np.linalg.qr(factor, mode="r")
+    result = np.zeros((size, size))
+    result[: triangular.shape[0]] = triangular
+    return result
+
+
+def combined_factor(factors: FloatArray, nominal_torque: FloatArray | None) -> FloatArray:
+    """Triangular factor of all rows together, each joint's divided by its nominal torque.
+
+    Args:
+        factors: Per trajectory and joint, (n_trajectories, n_dof, k, k).
+        nominal_torque: (n_dof,), or None for no weighting.
+
+    Returns:
+        (k, k)
+    """
+    weighted = factors if nominal_torque is None else factors / nominal_torque[:, None, None]
+    k = factors.shape[-1]
+    result = np.zeros((0, k))
+    for trajectory in weighted:
+        result = append_rows(result, trajectory.reshape(-1, k))
+    return _square(result)
+
+
+def standard_deviation(arrays: Iterable[FloatArray]) -> FloatArray:
+    """Of the columns over all arrays together, merged pair by pair [Chan1983]."""
+    count, mean, spread = 0, np.zeros(0), np.zeros(0)
+    for array in arrays:
+        n = array.shape[0]
+        own_mean = array.mean(axis=0)
+        own_spread = np.sum((array - own_mean) ** 2, axis=0)
+        if count == 0:
+            count, mean, spread = n, own_mean, own_spread
+            continue
+        step = own_mean - mean
+        total = count + n
+        mean = mean + step * (n / total)
+        spread = spread + own_spread + step**2 * (count * n / total)
+        count = total
+    return np.sqrt(spread / max(count, 1))

@@ -1,0 +1,341 @@
+"""Frozen records that pass between stages, and the arrays they are made of.
+
+A record holds data and what follows from it directly; no numerics, no files.
+Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, MutableMapping
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+BoolArray = NDArray[np.bool_]
+
+PARAMETER_KINDS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+"""The standard parameters of one body, in the order every array uses."""
+
+BASE = -1
+"""Index of the fixed base in :attr:`Body.parent`."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body and the joint that connects it to its parent.
+
+    The body frame is ``before * motion * after`` seen from the parent's frame; the
+    motion is a rotation about z (revolute) or a translation along z (prismatic).
+    """
+
+    name: str
+    parent: int
+    """Index of the parent body, :data:`BASE` for the base."""
+    joint: Literal["revolute", "prismatic"]
+    before: FloatArray
+    """Homogeneous transform from the parent's frame to the joint, (4, 4), m."""
+    after: FloatArray
+    """Homogeneous transform from the moved joint to the body's frame, (4, 4), m."""
+    offset: float = 0.0
+    """Added to the coordinate, rad or m."""
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A tree of bodies on a fixed base; parents come before their children."""
+
+    robot: str
+    bodies: tuple[Body, ...]
+    gravity: FloatArray
+    """Acceleration of gravity in the base frame, (3,), m/s^2."""
+    lengths: Mapping[str, float]
+    """Named lengths of the geometry, m; relations between parameters are printed in them."""
+    table: tuple[tuple[str, ...], ...]
+    """The geometry as the user wrote it, a header row first; for people."""
+
+    @property
+    def n_dof(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.bodies)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the standard parameters, body by body."""
+        return tuple(f"{kind}_{body.name}" for body in self.bodies for kind in PARAMETER_KINDS)
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names of the independent coordinates."""
+        return tuple(f"z_{body.name}" for body in self.bodies)
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """A choice of independent columns of W and the relations of the others to them."""
+
+    columns: IntArray
+    """Indices of the independent columns, (r,)."""
+    beta: FloatArray
+    """W[:, others] = W[:, columns] @ beta with the others in ascending order, (r, n - r)."""
+    singular_values: FloatArray
+    """Of W with its columns scaled to unit length, descending."""
+    rank_gap: float
+    """Last singular value kept over the first one dropped; infinite where none was dropped."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A mechanism with its standard parameters and their base."""
+
+    mechanism: Mechanism
+    values: FloatArray
+    """Standard parameters, (n,), kg, kg m, kg m^2."""
+    affecting: BoolArray
+    """Which parameters change the torques at all, (n,)."""
+    base: BaseParameters
+    nominal_torque: FloatArray
+    """Characteristic size of each joint's torque or force, (n_dof,), N m or N."""
+    nominal_torque_given: bool
+    """Whether the config gave it; if not, the estimation set's replaces it from `sample` on."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One optimised finite Fourier series with what was asked of it and how it went."""
+
+    coefficients: FloatArray
+    """[q0, a1, b1, a2, b2, ...] per joint, (n_dof, 1 + 2 harmonics)."""
+    kappa: float
+    """Condition number in the scaling the config asked for."""
+    kappa_start: float
+    """The same at the random start it came from."""
+    kappa_variants: Mapping[str, float]
+    peak_position: FloatArray
+    """Largest distance from the middle of the position range, (n_dof,), rad or m."""
+    peak_velocity: FloatArray
+    """(n_dof,), rad/s or m/s."""
+    reach: FloatArray
+    """Largest share of a position, velocity or acceleration limit that is used, (n_dof,)."""
+    cpu_seconds: float
+    iterations: int
+    status: str
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """The trajectories of the estimation and of the validation set."""
+
+    period: float
+    criterion: str
+    scaling: str
+    estimation: tuple[Trajectory, ...]
+    validation: tuple[Trajectory, ...]
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Fourier coefficients brought by the user, each (n_traj, n_dof, 1 + 2 harmonics)."""
+
+    source: str
+    period: float
+    estimation: FloatArray
+    validation: FloatArray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """States, and perhaps measured torques, brought by the user; each (n_samples, n_dof)."""
+
+    source: str
+    time: FloatArray
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray | None
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """What the user brought for either set."""
+
+    estimation: Recording | None
+    validation: Recording | None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive samples of one trajectory."""
+
+    trajectory: int
+    time: FloatArray
+    """(n_samples,), s."""
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray
+    """Torques of the full model, or measured ones; like the states (n_samples, n_dof)."""
+    W: FloatArray
+    """(n_samples * n_dof, n_parameters), sample-major."""
+
+
+class SampleSet(Protocol):
+    """A set of samples that is read block by block, so that memory stays flat."""
+
+    @property
+    def n_samples(self) -> int:
+        """Samples over all trajectories."""
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+
+    def factors(self) -> FloatArray:
+        """Triangular factors of [W | tau] per trajectory and joint.
+
+        Shape (n_trajectories, n_dof, n_parameters + 1, n_parameters + 1).
+        """
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The estimation and validation sets with the scales their errors are measured in."""
+
+    names: tuple[str, ...]
+    values: FloatArray | None
+    """Standard parameters, (n,), where they are known."""
+    nominal_torque: FloatArray | None
+    """(n_dof,); without it the standard deviation over the estimation set is meant."""
+    nominal_acceleration: FloatArray | None
+    """(n_dof,); without it the standard deviation over the estimation set is meant."""
+    estimation: SampleSet
+    validation: SampleSet | None
+
+
+@dataclass(frozen=True)
+class Ordering:
+    """What one heuristic found: a subset of parameters for every n."""
+
+    heuristic: str
+    order: IntArray
+    """Column indices, the first n of which are the subset of size n, (m,)."""
+    torque_error: FloatArray
+    """Weighted Euclidean error on the estimation set at n = 1...m, (m,)."""
+    torque_error_1: FloatArray
+    """The same in the 1-norm, (m,)."""
+    torque_error_inf: FloatArray
+    """The same in the infinity norm, (m,)."""
+    parameters: tuple[FloatArray, ...]
+    """Approximate base parameters of each subset, in its order; entry n - 1 is (n,)."""
+    beta: tuple[FloatArray, ...]
+    """W_E ~ W_R beta, the other columns in ascending order; entry n - 1 is (n, n_all - n)."""
+    minimum_norm: BoolArray
+    """Where the subset is beyond the rank and the fit is the minimum-norm one, (m,)."""
+    seconds: float
+
+    def subset(self, n: int) -> IntArray:
+        """The columns of the subset of size n, (n,)."""
+        return self.order[:n]
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """The orderings of all heuristics on one estimation set."""
+
+    names: tuple[str, ...]
+    nominal_torque: FloatArray
+    rank: int
+    factor: FloatArray
+    """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
+    orderings: Mapping[str, Ordering]
+
+
+@dataclass(frozen=True)
+class HeuristicValidation:
+    """Errors and costs of one heuristic's subsets; every array has one row per n."""
+
+    n: IntArray
+    torque_error_estimation: FloatArray
+    torque_error_validation: FloatArray
+    torque_error_joint_estimation: FloatArray
+    """(m, n_dof)"""
+    torque_error_joint_validation: FloatArray
+    acceleration_error_estimation: FloatArray
+    acceleration_error_validation: FloatArray
+    acceleration_error_joint_estimation: FloatArray
+    acceleration_error_joint_validation: FloatArray
+    mass_matrix_condition: FloatArray
+    """Largest over the samples."""
+    mass_matrix_smallest_eigenvalue: FloatArray
+    """Smallest over the samples."""
+    operations_inverse: IntArray
+    operations_direct: IntArray
+    operations_inverse_paper_rule: IntArray
+    operations_direct_paper_rule: IntArray
+
+
+@dataclass(frozen=True)
+class Selected:
+    """The model that the config asks for."""
+
+    heuristic: str
+    n: int
+    parameters: tuple[str, ...]
+    values: FloatArray
+    expressions: tuple[str, ...]
+    """Each approximate base parameter as a linear expression of standard ones."""
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What the reduced models are worth, and whether the selected one is accepted."""
+
+    heuristics: Mapping[str, HeuristicValidation]
+    full: Mapping[str, int | float]
+    """Operation counts and mass-matrix figures of the full model, by name."""
+    nominal_acceleration: FloatArray
+    selected: Selected
+    accepted: bool
+    verdict: str
+    """One sentence that says why."""
+    remarks: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Report:
+    """The files of the report by their path below ``report/``."""
+
+    summary: Mapping[str, Any]
+    files: Mapping[str, bytes]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step of a long piece of work, for whoever shows it."""
+
+    task: str
+    done: float
+    total: float
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where an artifact came from."""
+
+    robot: str
+    config_sha256: str
+    versions: Mapping[str, str]
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the caller lends a stage: workers, a place for finished parts, an audience."""
+
+    jobs: int = 1
+    parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
+    """Finished parts of an artifact that is not whole yet, kept across interruptions."""
+    progress: Callable[[Progress], None] = lambda _: None

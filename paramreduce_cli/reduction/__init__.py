@@ -1,0 +1,1 @@
+"""Which parameters to keep: errors, and one file per heuristic."""

@@ -1,0 +1,285 @@
+"""The figures of the report; each is a function from ReportData to a matplotlib figure."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+
+import matplotlib as mpl
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from paramreduce_cli.records import FloatArray
+from paramreduce_cli.registry import figure
+from paramreduce_cli.report.data import ReportData, Skeleton
+
+_STYLE = {
+    "font.size": 9.5,
+    "font.family": "DejaVu Sans",
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e6ea",
+    "grid.linewidth": 0.7,
+    "axes.edgecolor": "#8a929c",
+    "axes.labelcolor": "#30363d",
+    "xtick.color": "#57606a",
+    "ytick.color": "#57606a",
+    "lines.linewidth": 1.5,
+    "legend.frameon": False,
+    "figure.constrained_layout.use": True,
+    "svg.hashsalt": "paramreduce",
+    "svg.fonttype": "path",
+    "pdf.fonttype": 42,
+}
+_JOINT_COLOURS = ("#0b6e99", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f", "#7a6a53", "#4d7c8a")
+_HEURISTIC_COLOURS = ("#7d8590", "#0b62c4", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f")
+_MARKERS = ("s", "o", "^", "D", "v", "P")
+_WIDE = (7.2, 3.6)
+_FLOOR = 1e-16
+_HIGHEST_ERROR = 1e3
+
+FORMATS: dict[str, dict] = {
+    "pdf": {"metadata": {"CreationDate": None}},
+    "svg": {"metadata": {"Date": None}},
+    "png": {"dpi": 160, "metadata": {"Software": None}},
+}
+
+
+def render(draw: Callable[[ReportData], Figure], data: ReportData, formats: list[str]) -> dict[str, bytes]:
+    """Draw a figure and encode it in each format."""
+    with mpl.rc_context(_STYLE):
+        drawn = draw(data)
+        result = {}
+        for name in formats:
+            buffer = io.BytesIO()
+            drawn.savefig(buffer, format=name, **FORMATS[name])
+            result[name] = buffer.getvalue()
+    return result
+
+
+def _heuristic_style(data: ReportData, name: str) -> tuple[str, str]:
+    k = list(data.validation.heuristics).index(name)
+    return _HEURISTIC_COLOURS[k % len(_HEURISTIC_COLOURS)], _MARKERS[k % len(_MARKERS)]
+
+
+def _joint_label(data: ReportData, j: int) -> str:
+    return data.model.mechanism.coordinate_names[j]
+
+
+@figure("poses")
+def poses(data: ReportData) -> Figure:
+    """The mechanism in a few poses of the validation set."""
+    count = len(data.skeletons)
+    drawn = Figure(figsize=(2.7 * count, 3.0))
+    reach = max(float(np.abs(s.poses[:, :3, 3]).max()) for s in data.skeletons) or 1.0
+    for k, skeleton in enumerate(data.skeletons):
+        axes = drawn.add_subplot(1, count, k + 1, projection="3d")
+        _draw_skeleton(axes, skeleton, reach)
+    return drawn
+
+
+def _draw_skeleton(axes: Axes, skeleton: Skeleton, reach: float) -> None:
+    base = np.zeros(3)
+    for i, parent in enumerate(skeleton.parents):
+        start = base if parent < 0 else skeleton.poses[parent][:3, 3]
+        middle, end = skeleton.joints[i][:3, 3], skeleton.poses[i][:3, 3]
+        path = np.array([start, middle, end]).T
+        axes.plot(*path, color="#44607a", linewidth=4, solid_capstyle="round", alpha=0.9)
+        axis = skeleton.joints[i][:3, 2] * 0.13 * reach
+        ends = np.array([middle - axis, middle + axis]).T
+        colour = "#d9730d" if skeleton.kinds[i] == "revolute" else "#2f8f5b"
+        axes.plot(*ends, color=colour, linewidth=2.2, solid_capstyle="butt")
+    tip = skeleton.poses[-1]
+    for column, colour in zip(range(3), ("#c2384f", "#2f8f5b", "#0b62c4"), strict=True):
+        arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.22 * reach * tip[:3, column]]).T
+        axes.plot(*arrow, color=colour, linewidth=1.4)
+    axes.scatter(0, 0, 0, marker="s", s=40, color="#30363d")
+    for setter in (axes.set_xlim, axes.set_ylim, axes.set_zlim):
+        setter(-reach, reach)
+    axes.set_box_aspect((1, 1, 1), zoom=1.25)
+    axes.view_init(elev=22, azim=-60)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_ticklabels([])
+        axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
+    text = ", ".join(f"{value:.2f}" for value in skeleton.z)
+    axes.set_title(f"z = ({text})", fontsize=7, y=-0.02, color="#57606a")
+
+
+@figure("trajectory")
+def trajectory(data: ReportData) -> Figure:
+    """A characteristic trajectory of the validation set: positions, velocities, accelerations."""
+    drawn = Figure(figsize=(7.2, 5.4))
+    motion = data.motion
+    rows = (
+        (motion.z, "z  (rad, m)"),
+        (motion.dz, "ż  (rad/s, m/s)"),
+        (motion.ddz, "z̈  (rad/s², m/s²)"),
+    )
+    all_axes = drawn.subplots(3, 1, sharex=True)
+    for axes, (values, label) in zip(all_axes, rows, strict=True):
+        _joint_lines(axes, data, values)
+        axes.set_ylabel(label)
+    all_axes[0].legend(ncols=values.shape[1], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    all_axes[-1].set_xlabel("t (s)")
+    return drawn
+
+
+def _joint_lines(axes: Axes, data: ReportData, values: FloatArray, **style: object) -> None:
+    for j in range(values.shape[1]):
+        colour = _JOINT_COLOURS[j % len(_JOINT_COLOURS)]
+        axes.plot(data.motion.time, values[:, j], color=colour, label=_joint_label(data, j), **style)
+
+
+@figure("torque-error")
+def torque_error(data: ReportData) -> Figure:
+    """Torque error against the number of parameters, on both sets."""
+    return _error_figure(
+        data, "torque_error_estimation", "torque_error_validation", r"$\varepsilon_\tau$"
+    )
+
+
+@figure("acceleration-error")
+def acceleration_error(data: ReportData) -> Figure:
+    """Acceleration error against the number of parameters, on both sets."""
+    return _error_figure(
+        data,
+        "acceleration_error_estimation",
+        "acceleration_error_validation",
+        r"$\varepsilon_{\ddot z}$",
+    )
+
+
+def _error_figure(data: ReportData, estimation: str, validation: str, label: str) -> Figure:
+    drawn = Figure(figsize=_WIDE)
+    axes = drawn.subplots()
+    for name, result in data.validation.heuristics.items():
+        colour, marker = _heuristic_style(data, name)
+        for key, line, suffix in ((estimation, "-", ", E"), (validation, "--", ", V")):
+            values = _visible(getattr(result, key))
+            axes.semilogy(
+                result.n, values, line, color=colour, label=name + suffix,
+                marker=marker if line == "-" else None, markersize=3,
+            )  # fmt: skip
+    axes.set_ylim(top=min(axes.get_ylim()[1], _HIGHEST_ERROR))
+    axes.axvline(data.reduction.rank, color="#57606a", linewidth=0.8, linestyle=":")
+    axes.annotate(
+        f" r = {data.reduction.rank}", (data.reduction.rank, 1.0),
+        xycoords=("data", "axes fraction"), va="top", fontsize=8, color="#57606a",
+    )  # fmt: skip
+    _mark_selected(axes, data)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel(label)
+    axes.legend(fontsize=8, ncols=1)
+    return drawn
+
+
+def _visible(values: FloatArray) -> FloatArray:
+    """Errors as they can be drawn: infinite ones leave a gap, zero stands at the floor."""
+    result: FloatArray = np.where(np.isfinite(values), np.maximum(values, _FLOOR), np.nan)
+    return result
+
+
+def _mark_selected(axes: Axes, data: ReportData) -> None:
+    axes.axvline(data.validation.selected.n, color="#0b62c4", linewidth=0.8, alpha=0.5)
+
+
+_FUNCTIONS = (("inverse", "d", "-"), ("direct", "[M | δ]", "--"))
+
+
+@figure("operations")
+def operations(data: ReportData) -> Figure:
+    """Operations of inverse and direct dynamics against the number of parameters."""
+    drawn = Figure(figsize=_WIDE)
+    axes = drawn.subplots()
+    for name, result in data.validation.heuristics.items():
+        colour, marker = _heuristic_style(data, name)
+        for key, label, line in _FUNCTIONS:
+            values = getattr(result, f"operations_{key}")
+            axes.plot(
+                result.n, values, line, color=colour, marker=marker, markersize=2.5,
+                label=f"{name}, {label}",
+            )  # fmt: skip
+    for key, _, line in _FUNCTIONS:
+        axes.axhline(
+            data.validation.full[f"operations_{key}"],
+            color="#57606a", linewidth=0.8, linestyle=":" if line == "-" else "-.",
+        )  # fmt: skip
+    _mark_selected(axes, data)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel("operations")
+    axes.legend(fontsize=8)
+    return drawn
+
+
+@figure("error-vs-operations")
+def error_vs_operations(data: ReportData) -> Figure:
+    """Torque error on the estimation set against the operations it costs."""
+    drawn = Figure(figsize=_WIDE)
+    axes = drawn.subplots(1, 2, sharey=True)
+    for one, (key, label, _) in zip(axes, _FUNCTIONS, strict=True):
+        for name, result in data.validation.heuristics.items():
+            colour, marker = _heuristic_style(data, name)
+            values = _visible(result.torque_error_estimation)
+            one.semilogy(
+                getattr(result, f"operations_{key}"), values,
+                color=colour, marker=marker, markersize=3, linewidth=0.8, label=name,
+            )  # fmt: skip
+        one.set_xlabel(f"operations of {label}")
+    axes[0].set_ylabel(r"$\varepsilon_\tau$, estimation")
+    axes[0].legend(fontsize=8)
+    return drawn
+
+
+@figure("torques")
+def torques(data: ReportData) -> Figure:
+    """Normalised torques of the full and of the selected model along the validation trajectory."""
+    n_dof = data.motion.full.shape[1]
+    columns = 2 if n_dof > 1 else 1
+    rows = -(-n_dof // columns)
+    drawn = Figure(figsize=(7.2, 1.55 * rows + 0.5))
+    grid = np.atleast_1d(drawn.subplots(rows, columns, sharex=True)).ravel()
+    for j in range(n_dof):
+        colour = _JOINT_COLOURS[j % len(_JOINT_COLOURS)]
+        grid[j].plot(data.motion.time, data.motion.full[:, j], color=colour, label="full")
+        grid[j].plot(
+            data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=(0, (3, 2)),
+            linewidth=1.1, label=f"n = {data.validation.selected.n}",
+        )  # fmt: skip
+        grid[j].set_ylabel(f"τ / nom, {_joint_label(data, j)}", fontsize=8)
+        grid[j].legend(fontsize=7, loc="upper right", ncols=2)
+    for spare in grid[n_dof:]:
+        spare.set_visible(False)
+    for axes in grid[max(0, n_dof - columns) : n_dof]:
+        axes.set_xlabel("t (s)")
+    return drawn
+
+
+@figure("mass-matrix-condition")
+def mass_matrix_condition(data: ReportData) -> Figure:
+    """Largest condition number of the mass matrix over the samples; hollow where it is indefinite."""
+    drawn = Figure(figsize=_WIDE)
+    axes = drawn.subplots()
+    for name, result in data.validation.heuristics.items():
+        colour, marker = _heuristic_style(data, name)
+        condition = _visible(result.mass_matrix_condition)
+        positive = result.mass_matrix_smallest_eigenvalue > 0
+        axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=name)
+        for chosen, fill in ((positive, colour), (~positive, "white")):
+            axes.semilogy(
+                result.n[chosen], condition[chosen], linestyle="none", marker=marker,
+                markersize=4, markerfacecolor=fill, color=colour,
+            )  # fmt: skip
+    full = data.validation.full["mass_matrix_condition"]
+    axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
+    axes.annotate("full model", (1.0, full), xycoords=("axes fraction", "data"), ha="right",
+                  va="bottom", fontsize=8, color="#57606a")  # fmt: skip
+    axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
+    _mark_selected(axes, data)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel("largest κ(M) over the samples")
+    axes.legend(fontsize=8)
+    return drawn

@@ -1,0 +1,239 @@
+"""The tables of the report; each is a function from ReportData to a Table."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import PARAMETER_KINDS, Trajectory
+from paramreduce_cli.registry import table
+from paramreduce_cli.report.data import ReportData
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells of text under a header."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+
+    def to_csv(self) -> str:
+        """Comma-separated values with a header line."""
+        buffer = io.StringIO()
+        writer = csv.writer(buffer, lineterminator="\n")
+        writer.writerow(self.header)
+        writer.writerows(self.rows)
+        return buffer.getvalue()
+
+    def to_latex(self) -> str:
+        """A tabular with its caption, ready to be included."""
+        lines = [
+            r"\begin{table}[ht]",
+            r"\centering",
+            rf"\caption{{{_latex(self.title)}}}",
+            rf"\begin{{tabular}}{{{'l' * len(self.header)}}}",
+            r"\hline",
+            " & ".join(map(_latex, self.header)) + r" \\",
+            r"\hline",
+            *(" & ".join(map(_latex, row)) + r" \\" for row in self.rows),
+            r"\hline",
+            r"\end{tabular}",
+            r"\end{table}",
+        ]
+        return "\n".join(lines) + "\n"
+
+
+_SYMBOLS = {
+    "κ": r"$\kappa$",
+    "ε_τ": r"$\varepsilon_\tau$",
+    "ε_z̈": r"$\varepsilon_{\ddot z}$",
+    "δ": r"$\delta$",
+    "φ'": r"$\varphi'$",
+    "²": r"$^2$",
+}
+_SPECIAL = str.maketrans({"%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$"})
+
+
+def _latex(text: str) -> str:
+    escaped = text.translate(_SPECIAL)
+    marks = {chr(0xE000 + k): latex for k, latex in enumerate(_SYMBOLS.values())}
+    for mark, symbol in zip(marks, _SYMBOLS, strict=True):
+        escaped = escaped.replace(symbol, mark)
+    escaped = re.sub(r"\b(m[xyz]?|I[xyz]{2}|z|a|d|b)_(\w+)", r"$\1_{\2}$", escaped)
+    escaped = re.sub(r"(?<![\w}$])_|(?<=[A-Za-z0-9])_(?!\{)", r"\\_", escaped)
+    escaped = escaped.replace("^", r"\^{}")
+    for mark, latex in marks.items():
+        escaped = escaped.replace(mark, latex)
+    return escaped
+
+
+def percent(value: float) -> str:
+    """A share as text."""
+    if not np.isfinite(value):
+        return "∞"
+    return f"{100 * value:.2f} %" if value < 1 else f"{100 * value:.3g} %"
+
+
+@table("kinematics")
+def kinematics(data: ReportData) -> Table:
+    """The geometry as the config gives it."""
+    header, *rows = data.model.mechanism.table
+    return Table("Kinematic parameters (m, rad)", header, tuple(rows))
+
+
+@table("dynamic-parameters")
+def dynamic_parameters(data: ReportData) -> Table:
+    """The standard parameters of every body."""
+    values = data.model.values.reshape(-1, len(PARAMETER_KINDS))
+    rows = [
+        (body.name, *(f"{value:g}" for value in row))
+        for body, row in zip(data.model.mechanism.bodies, values, strict=True)
+    ]
+    title = "Standard parameters (kg, kg m, kg m²)"
+    return Table(title, ("body", *PARAMETER_KINDS), tuple(rows))
+
+
+@table("base-parameters")
+def base_parameters(data: ReportData) -> Table:
+    """The base parameters with the relations that regroup the others."""
+    base = data.model.base
+    others = np.setdiff1d(np.arange(data.model.values.size), base.columns)
+    values = data.model.values[base.columns] + base.beta @ data.model.values[others]
+    rows = [
+        (str(k + 1), expression, f"{value:.6g}")
+        for k, (expression, value) in enumerate(zip(data.relations, values, strict=True))
+    ]
+    return Table("Base parameters", ("no.", "expression", "value"), tuple(rows))
+
+
+@table("trajectory-setup")
+def trajectory_setup(data: ReportData) -> Table:
+    """What was asked of the trajectories."""
+    return Table("Trajectory setup", ("setting", "value"), data.setup.rows)
+
+
+@table("trajectories")
+def trajectories(data: ReportData) -> Table:
+    """What every trajectory reached."""
+    found = data.trajectories
+    if found is None:
+        return Table("Trajectories: recorded states were used", ("set",), ())
+    variants = tuple(found.estimation[0].kappa_variants)
+    header = (
+        "trajectory", *(f"κ {name}" for name in variants), "κ at start",
+        "peak |z - middle|", "peak speed", "share of limits", "CPU s", "iterations", "status",
+    )  # fmt: skip
+    rows = [
+        _trajectory_row(f"{name} {k + 1}", t)
+        for name in ("estimation", "validation")
+        for k, t in enumerate(getattr(found, name))
+    ]
+    return Table("Trajectories", header, tuple(rows))
+
+
+def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
+    def spread(values: np.ndarray) -> str:
+        return " ".join(f"{value:.3g}" for value in values)
+
+    return (
+        label,
+        *(f"{value:.4g}" for value in t.kappa_variants.values()),
+        f"{t.kappa_start:.3g}",
+        spread(t.peak_position),
+        spread(t.peak_velocity),
+        spread(t.reach),
+        f"{t.cpu_seconds:.2f}",
+        str(t.iterations),
+        t.status.replace("_", " "),
+    )
+
+
+@table("parameter-ordering")
+def parameter_ordering(data: ReportData) -> Table:
+    """The order in which each heuristic takes the parameters."""
+    orderings = data.reduction.orderings
+    longest = max(o.order.size for o in orderings.values())
+    names = data.reduction.names
+    rows = [
+        (
+            str(n + 1),
+            *(names[o.order[n]] if n < o.order.size else "" for o in orderings.values()),
+        )
+        for n in range(longest)
+    ]
+    return Table("Parameter ordering", ("no.", *orderings), tuple(rows))
+
+
+@table("summary")
+def summary(data: ReportData) -> Table:
+    """Every heuristic at the selected number of parameters, both functions."""
+    n = data.validation.selected.n
+    full = data.validation.full
+    header = (
+        "heuristic", "parameters", "base r", "n", "d full", "d reduced", "saved", "ε_τ E", "ε_τ V",
+        "[M, δ] full", "[M, δ] reduced", "saved", "ε_z̈ E", "ε_z̈ V",
+    )  # fmt: skip
+    rows = []
+    for name, r in data.validation.heuristics.items():
+        if n > r.n.size:
+            continue
+        k = n - 1
+        cells = [name, str(int(data.model.affecting.sum())), str(data.reduction.rank), str(n)]
+        for key, error in (("inverse", "torque"), ("direct", "acceleration")):
+            whole = int(full[f"operations_{key}"])
+            reduced = int(getattr(r, f"operations_{key}")[k])
+            cells += [str(whole), str(reduced), f"{100 * (1 - reduced / whole):.0f} %"]
+            cells += [
+                percent(float(getattr(r, f"{error}_error_{which}")[k]))
+                for which in ("estimation", "validation")
+            ]
+        rows.append(tuple(cells))
+    return Table(f"Reduced models with {n} parameters", header, tuple(rows))
+
+
+@table("approximate-base-parameters")
+def approximate_base_parameters(data: ReportData) -> Table:
+    """The parameters of the selected model: value, and what they take over from the others."""
+    selected = data.validation.selected
+    rows = [
+        (str(k + 1), name, f"{value:.6g}", expression)
+        for k, (name, value, expression) in enumerate(
+            zip(selected.parameters, selected.values, selected.expressions, strict=True)
+        )
+    ]
+    title = f"Approximate base parameters: {selected.heuristic}, n = {selected.n}"
+    return Table(title, ("no.", "parameter", "φ' value", "made of"), tuple(rows))
+
+
+@table("operations")
+def operations(data: ReportData) -> Table:
+    """Operation counts by both rules for the full, the base and the selected model."""
+    selected = data.validation.selected
+    result = data.validation.heuristics[selected.heuristic]
+    keys = (
+        "operations_inverse",
+        "operations_inverse_paper_rule",
+        "operations_direct",
+        "operations_direct_paper_rule",
+    )
+    affecting = int(data.model.affecting.sum())
+    rows = [
+        ("full", str(affecting), *(f"{data.validation.full[key]:.0f}" for key in keys)),
+        (
+            "base",
+            str(data.model.base.columns.size),
+            *(f"{data.validation.full[f'base_{key}']:.0f}" for key in keys),
+        ),
+        (
+            selected.heuristic,
+            str(selected.n),
+            *(str(int(getattr(result, key)[selected.n - 1])) for key in keys),
+        ),
+    ]
+    header = ("model", "n", "d", "d, signs counted", "[M, δ]", "[M, δ], signs counted")
+    return Table("Operations", header, tuple(rows))

@@ -1,0 +1,1 @@
+"""Descriptions of robots, turned into a Mechanism."""

@@ -1,0 +1,103 @@
+"""build-model: from the description to parameters and their base."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.config import Config
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.multibody.base_parameters import (
+    affecting_columns,
+    base_parameters,
+    preference_order,
+)
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import FloatArray, Mechanism, Model
+from paramreduce_cli.registry import stage
+from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh
+
+_STATES = 300
+"""Random states on which ranks are decided; many more rows than columns."""
+
+
+@stage
+def build_model(config: Config) -> Model:
+    """Derive the model, its parameters and its base parameters.
+
+    The ranks are decided on seeded random states.
+    """
+    mechanism = _mechanism(config)
+    rng = np.random.default_rng(config.model.seed)
+    states = _random_states(config, mechanism, rng)
+    K = Dynamics(mechanism).regressor(*states)
+    W = K.reshape(-1, K.shape[2])
+    values = config.standard_parameters()
+    given = config.nominal_torque != "standard-deviation"
+    nominal = per_joint(config.nominal_torque, config.n_dof) if given else np.std(K @ values, axis=0)
+    if not np.all(nominal > 0):
+        joint = mechanism.coordinate_names[int(np.argmin(nominal))]
+        raise ConfigError(
+            f"nominal_torque: {joint} carries no torque or force, so its standard deviation is no "
+            "scale. Give nominal_torque in the config, in N m (N for a prismatic joint)."
+        )
+    return Model(
+        mechanism=mechanism,
+        values=values,
+        affecting=affecting_columns(W),
+        base=base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance),
+        nominal_torque=nominal,
+        nominal_torque_given=given,
+    )
+
+
+def per_joint(values: object, n_dof: int) -> FloatArray:
+    """A config entry that is one number for all joints or one for each, (n_dof,)."""
+    result = np.array(values, dtype=float)
+    return np.full(n_dof, result[0]) if result.size == 1 else result
+
+
+def _mechanism(config: Config) -> Mechanism:
+    names = config.body_names()
+    rows = [
+        DHRow(
+            name=names[k],
+            parent=_parent(joint.parent, names[k - 1] if k else None),
+            joint=joint.type,
+            a=joint.a,
+            alpha=joint.alpha,
+            d=joint.d,
+            theta=joint.theta,
+            gamma=joint.gamma,
+            b=joint.b,
+        )
+        for k, joint in enumerate(config.description.dh.joints)
+    ]
+    return mechanism_from_dh(
+        config.robot, rows, config.description.dh.convention, config.description.gravity
+    )
+
+
+def _parent(given: str | None, above: str | None) -> str | None:
+    if given == "base":
+        return None
+    return given if given is not None else above
+
+
+def _random_states(
+    config: Config, mechanism: Mechanism, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Anywhere within the position limits; speeds and accelerations normal."""
+    limits = np.array(config.trajectories.position_limits, dtype=float)
+    shape = (_STATES, mechanism.n_dof)
+    z = rng.uniform(limits[:, 0], limits[:, 1], size=shape)
+    return z, rng.normal(size=shape), rng.normal(size=shape)
+
+
+def _preference(config: Config, mechanism: Mechanism) -> np.ndarray:
+    """Preference order of columns, those that the config names first."""
+    names = mechanism.parameter_names
+    usual = preference_order(names)
+    if config.model.base_columns is None:
+        return usual
+    named = np.array([names.index(name) for name in config.model.base_columns], dtype=np.int64)
+    return np.concatenate([named, usual[~np.isin(usual, named)]])

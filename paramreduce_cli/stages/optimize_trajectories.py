@@ -1,0 +1,102 @@
+"""optimize-trajectories: exciting trajectories for both sets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.config import Config
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.excitation.limits import JointLimits
+from paramreduce_cli.excitation.optimiser import Settings, describe
+from paramreduce_cli.excitation.workers import Task, excitation_of, optimise_all
+from paramreduce_cli.records import Coefficients, FloatArray, Model, Run, Trajectories, Trajectory
+from paramreduce_cli.registry import stage
+from paramreduce_cli.stages.build_model import per_joint
+
+_SETS = ("estimation", "validation")
+
+
+@stage
+def optimize_trajectories(
+    config: Config, model: Model, coefficients: Coefficients | None, run: Run
+) -> Trajectories:
+    """Find exciting trajectories, or take the Fourier coefficients that the config names.
+
+    Finished trajectories are kept at once: an interrupted run goes on with what is missing.
+    """
+    wanted = config.trajectories
+    if coefficients is not None:
+        return _measured(config, model, coefficients)
+    task = Task(
+        mechanism=model.mechanism,
+        base=model.base,
+        nominal_torque=model.nominal_torque,
+        criterion=wanted.criterion,
+        settings=_settings(config, wanted.period, wanted.harmonics),
+        seed=wanted.seed,
+    )
+    counts = {"estimation": wanted.count, "validation": wanted.validation_count}
+    keys = [f"{name}-{k:04d}" for name in _SETS for k in range(counts[name])]
+    found = optimise_all(task, keys, run)
+    sets = {
+        name: tuple(found[key] for key in keys if key.startswith(name)) for name in _SETS
+    }
+    return Trajectories(
+        wanted.period, wanted.criterion, wanted.scaling, sets["estimation"], sets["validation"]
+    )
+
+
+def _settings(config: Config, period: float, harmonics: int) -> Settings:
+    wanted, n = config.trajectories, config.n_dof
+    pairs = np.array(wanted.position_limits, dtype=float)
+    pairs = np.broadcast_to(pairs, (n, 2)) if len(pairs) == 1 else pairs
+    limits = JointLimits(
+        lower=pairs[:, 0],
+        upper=pairs[:, 1],
+        velocity=per_joint(wanted.velocity_limits, n),
+        acceleration=per_joint(wanted.acceleration_limits or [np.inf], n),
+    )
+    return Settings(
+        period=period,
+        harmonics=harmonics,
+        points=max(wanted.points, 2 * harmonics + 1),
+        limits=limits,
+        mapping="gauge" if wanted.use_full_range else "ball",
+        starts=wanted.starts,
+        polished=wanted.polished,
+        max_iterations=wanted.max_iterations,
+        scaling=wanted.scaling,
+    )
+
+
+def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectories:
+    """The trajectories of coefficients that the user brings, measured but not changed."""
+    wanted, n = config.trajectories, config.n_dof
+    excitation = excitation_of(
+        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
+    )
+
+    def measure(coefficients: FloatArray) -> Trajectory:
+        settings = _settings(config, brought.period, (coefficients.shape[1] - 1) // 2)
+        return describe(
+            excitation,
+            settings,
+            coefficients,
+            kappa_start=np.nan,
+            cpu_seconds=0.0,
+            iterations=0,
+            status="brought",
+        )
+
+    sets = {}
+    for name in _SETS:
+        values = getattr(brought, name)
+        if values.shape[1] != n:
+            raise DataError(
+                f"{brought.source}: the {name} coefficients are for {values.shape[1]} joints, but "
+                f"{config.robot} has {n}."
+            )
+        sets[name] = tuple(measure(entry) for entry in values)
+    return Trajectories(
+        brought.period, "brought", wanted.scaling, sets["estimation"], sets["validation"]
+    )

@@ -1,0 +1,142 @@
+"""sample: states, torques and observation matrices of both sets."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Iterator
+
+import numpy as np
+
+from paramreduce_cli.config import Config
+from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.observation import (
+    BLOCK_SAMPLES,
+    ObservedSet,
+    StateBlock,
+    standard_deviation,
+)
+from paramreduce_cli.records import (
+    FloatArray,
+    Model,
+    Recording,
+    Recordings,
+    Samples,
+    Trajectories,
+    Trajectory,
+)
+from paramreduce_cli.registry import stage
+from paramreduce_cli.stages.build_model import per_joint
+
+
+@stage
+def sample(
+    config: Config, model: Model, trajectories: Trajectories | None, recordings: Recordings
+) -> Samples:
+    """Sample both sets: states, torques and observation matrices.
+
+    From the optimised trajectories, or from recorded states where the config names them.
+    """
+    dynamics = Dynamics(model.mechanism)
+    wanted = config.sampling
+    points = wanted.points or config.trajectories.points
+    estimation = _observed(model, dynamics, trajectories, "estimation", recordings.estimation, points)
+    points = wanted.validation_points or config.trajectories.points
+    validation = _observed(model, dynamics, trajectories, "validation", recordings.validation, points)
+    return Samples(
+        names=model.mechanism.parameter_names,
+        values=model.values,
+        nominal_torque=_nominal_torque(model, estimation),
+        nominal_acceleration=_nominal_acceleration(config, model, estimation),
+        estimation=estimation,
+        validation=validation,
+    )
+
+
+def _observed(
+    model: Model,
+    dynamics: Dynamics,
+    trajectories: Trajectories | None,
+    name: str,
+    recording: Recording | None,
+    points: int,
+) -> ObservedSet:
+    if recording is not None:
+        _warn_of_still_joints(model, recording)
+        return ObservedSet(
+            lambda: _recorded_blocks(recording), recording.time.size, dynamics, model.values
+        )
+    if trajectories is None:
+        raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
+    series: tuple[Trajectory, ...] = getattr(trajectories, name)
+    period = trajectories.period
+    return ObservedSet(
+        lambda: _series_blocks(series, period, points),
+        len(series) * points,
+        dynamics,
+        model.values,
+    )
+
+
+def _series_blocks(
+    series: tuple[Trajectory, ...], period: float, points: int
+) -> Iterator[StateBlock]:
+    times = sample_times(period, points)
+    for index, trajectory in enumerate(series):
+        harmonics = (trajectory.coefficients.shape[1] - 1) // 2
+        for start in range(0, points, BLOCK_SAMPLES):
+            basis = fourier_basis(period, harmonics, times[start : start + BLOCK_SAMPLES])
+            yield StateBlock(index, basis.time, *basis.states(trajectory.coefficients))
+
+
+def _recorded_blocks(r: Recording) -> Iterator[StateBlock]:
+    for start in range(0, r.time.size, BLOCK_SAMPLES):
+        part = slice(start, start + BLOCK_SAMPLES)
+        tau = None if r.tau is None else r.tau[part]
+        yield StateBlock(0, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
+
+
+def _warn_of_still_joints(model: Model, recording: Recording) -> None:
+    still = np.ptp(recording.z, axis=0) == 0
+    names = [n for n, s in zip(model.mechanism.coordinate_names, still, strict=True) if s]
+    if names:
+        warnings.warn(
+            f"{recording.source}: {', '.join(names)} never moves, so its dynamics is not seen",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+
+
+def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
+    if model.nominal_torque_given:
+        return model.nominal_torque
+    return _scale(
+        standard_deviation(block.tau for block in estimation.blocks()),
+        model,
+        "nominal_torque",
+        "torque",
+    )
+
+
+def _nominal_acceleration(config: Config, model: Model, estimation: ObservedSet) -> FloatArray:
+    given = config.sampling.nominal_acceleration
+    if given != "standard-deviation":
+        return per_joint(given, config.n_dof)
+    return _scale(
+        standard_deviation(block.ddz for block in estimation.blocks()),
+        model,
+        "sampling.nominal_acceleration",
+        "acceleration",
+    )
+
+
+def _scale(deviation: FloatArray, model: Model, key: str, what: str) -> FloatArray:
+    """A standard deviation that is to divide by, refused where it is zero."""
+    if not np.all(deviation > 0):
+        joint = model.mechanism.coordinate_names[int(np.argmin(deviation))]
+        raise DataError(
+            f"{joint} has no {what} over the estimation set, so its standard deviation is no scale. "
+            f"Give {key} in the config."
+        )
+    return deviation
