@@ -85,6 +85,8 @@ class BaseParameters:
     """Of W with its columns scaled to unit length, descending."""
     rank_gap: float
     """Last singular value kept over the first one dropped; infinite where none was dropped."""
+    expressions: tuple[str, ...] = ()
+    """Each base parameter in terms of standard ones, for people."""
 
 
 @dataclass(frozen=True)

@@ -120,7 +120,9 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
         with opener(path, "rt", encoding="utf-8", newline="") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
-            table = [[_number(path, k, cell) for cell in row] for k, row in enumerate(rows, 2) if row]
+            table = [
+                [_number(path, k, cell) for cell in row] for k, row in enumerate(rows, 2) if row
+            ]
     except FileNotFoundError as error:
         raise ArtifactError(f"{path}: there is no such file.") from error
     except (OSError, UnicodeDecodeError, csv.Error) as error:

@@ -192,11 +192,6 @@ class Reader:
         """One text."""
         return self.texts(name)[0]
 
-    def groups(self, name: str = "/") -> list[str]:
-        """Names of the groups below a group."""
-        where = self.file[name]
-        return [key for key in where if isinstance(where[key], h5py.Group)]
-
     def attribute(self, name: str, default: Any = None) -> Any:
         """An attribute of the file."""
         value = self.file.attrs.get(name, default)

@@ -16,7 +16,6 @@ import numpy as np
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, reading
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
-from paramreduce_cli.multibody.relations import expressions
 from paramreduce_cli.records import (
     BaseParameters,
     Block,
@@ -68,8 +67,7 @@ def save_model(writer: Writer, model: Model) -> None:
     writer.dataset("base/beta", base.beta)
     writer.dataset("base/singular_values", base.singular_values)
     writer.dataset("base/rank_gap", base.rank_gap)
-    relations = expressions(names, base.columns, base.beta, mechanism.lengths)
-    writer.dataset("base/expressions", relations)
+    writer.dataset("base/expressions", list(base.expressions))
     writer.dataset("coordinates/names", mechanism.coordinate_names)
     writer.dataset("nominal_torque", model.nominal_torque)
     writer.dataset("nominal_torque_given", model.nominal_torque_given)
@@ -87,6 +85,7 @@ def load_model(reader: Reader) -> Model:
             beta=reader.array("base/beta", 2),
             singular_values=reader.array("base/singular_values", 1),
             rank_gap=float(reader.array("base/rank_gap")),
+            expressions=reader.texts("base/expressions"),
         ),
         nominal_torque=reader.array("nominal_torque", 1),
         nominal_torque_given=bool(reader.array("nominal_torque_given")),
@@ -304,6 +303,7 @@ def save_reduction(writer: Writer, reduction: Reduction) -> None:
     writer.dataset("nominal_torque", reduction.nominal_torque)
     writer.dataset("rank", reduction.rank)
     writer.dataset("factor", reduction.factor)
+    writer.dataset("heuristics", list(reduction.orderings))
     for name, ordering in reduction.orderings.items():
         writer.dataset(f"{name}/order", ordering.order)
         for key in _ERRORS:
@@ -317,9 +317,7 @@ def save_reduction(writer: Writer, reduction: Reduction) -> None:
 def load_reduction(reader: Reader) -> Reduction:
     """reduction.h5"""
     orderings = {}
-    for name in reader.groups():
-        if f"{name}/order" not in reader:
-            continue
+    for name in reader.texts("heuristics"):
         order = reader.array(f"{name}/order", 1)
         orderings[name] = Ordering(
             heuristic=name,
@@ -345,6 +343,7 @@ def load_reduction(reader: Reader) -> Reduction:
 
 def save_validation(writer: Writer, validation: Validation) -> None:
     """validation.h5"""
+    writer.dataset("heuristics", list(validation.heuristics))
     for name, result in validation.heuristics.items():
         for field in dataclasses.fields(result):
             writer.dataset(f"{name}/{field.name}", getattr(result, field.name))
@@ -371,8 +370,7 @@ def load_validation(reader: Reader) -> Validation:
                 for field in dataclasses.fields(HeuristicValidation)
             }
         )
-        for name in reader.groups()
-        if f"{name}/n" in reader and f"{name}/operations_inverse" in reader
+        for name in reader.texts("heuristics")
     }
     values = reader.array("full/values", 1)
     names = reader.texts("full/names")

@@ -47,9 +47,7 @@ class Layout:
 
 LAYOUTS: dict[type, Layout] = {
     Model: Layout("model.h5", layouts.save_model, layouts.load_model),
-    Trajectories: Layout(
-        "trajectories.h5", layouts.save_trajectories, layouts.load_trajectories
-    ),
+    Trajectories: Layout("trajectories.h5", layouts.save_trajectories, layouts.load_trajectories),
     Samples: Layout("samples.h5", layouts.save_samples, layouts.load_samples),
     Reduction: Layout("reduction.h5", layouts.save_reduction, layouts.load_reduction),
     Validation: Layout("validation.h5", layouts.save_validation, layouts.load_validation),
@@ -135,9 +133,7 @@ class Store:
             lock.release()
 
 
-def load_file(
-    path: Path, record: type, robot: str | None, maker: str
-) -> tuple[Any, Stamp | None]:
+def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:
     """Read a record from any file; see :meth:`Store.load`."""
     hint = f"Make it with `paramreduce {maker}`." if maker else ""
     with reading(path, hint) as reader:

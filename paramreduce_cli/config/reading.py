@@ -71,9 +71,7 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Path, document: Docum
             result[key] = _build(loader, value_node, (*path, key), document)
         return result
     if isinstance(node, yaml.SequenceNode):
-        return [
-            _build(loader, item, (*path, k), document) for k, item in enumerate(node.value)
-        ]
+        return [_build(loader, item, (*path, k), document) for k, item in enumerate(node.value)]
     return loader.construct_object(node, deep=True)
 
 

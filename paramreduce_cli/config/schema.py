@@ -8,9 +8,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
+from paramreduce_cli import registry
 from paramreduce_cli.config.names import registered
 from paramreduce_cli.config.numbers import Number
-from paramreduce_cli import registry
 from paramreduce_cli.records import PARAMETER_KINDS
 
 Heuristic = Annotated[str, registered(registry.heuristic)]

@@ -17,7 +17,7 @@ _SMALLEST = 1e-300
 
 @criterion("condition-number")
 def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
-    """log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
+    """Log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
 
     Args:
         eigenvalues: Of W'W, (r,).

@@ -100,9 +100,7 @@ class _Memory:
             change = mix * change + (1 - mix) * product
             slope = float(step @ change)
         self.curvature = (
-            self.curvature
-            - np.outer(product, product) / bend
-            + np.outer(change, change) / slope
+            self.curvature - np.outer(product, product) / bend + np.outer(change, change) / slope
         )
 
 

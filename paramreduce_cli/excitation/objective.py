@@ -106,7 +106,5 @@ class FreeObjective:
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient at ``x``, the free series stacked joint by joint."""
         coefficients, pull = self._limits.admissible(x.reshape(self._shape), self._norm)
-        value, bar = self._excitation.value_and_gradient(
-            self._basis, coefficients, self._sharpness
-        )
+        value, bar = self._excitation.value_and_gradient(self._basis, coefficients, self._sharpness)
         return value, pull(bar).ravel()

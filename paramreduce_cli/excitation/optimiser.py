@@ -88,7 +88,11 @@ def optimise_trajectory(
         for level in levels:
             objective = FreeObjective(excitation, basis, limits, level.sharpness, level.norm)
             end = minimise(
-                objective, candidate.free.ravel(), settings.max_iterations, candidate.curvature, rule
+                objective,
+                candidate.free.ravel(),
+                settings.max_iterations,
+                candidate.curvature,
+                rule,
             )
             _advance(candidate, end)
             done += 1

@@ -48,14 +48,15 @@ class BatchFunction:
         inputs: Column vectors of symbols.
         outputs: Dense expressions; a matrix comes out flattened column by column, so hand
             in its transpose to get rows.
+        once: Whether it is evaluated so little that compiling it does not pay.
     """
 
-    def __init__(self, inputs: list[ca.SX], outputs: list[ca.SX]) -> None:
+    def __init__(self, inputs: list[ca.SX], outputs: list[ca.SX], *, once: bool = False) -> None:
         dense = ca.cse([ca.densify(ca.vec(output)) for output in outputs])
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
         self._out_sizes = [x.numel() for x in outputs]
-        self._library = _load(self._function)
+        self._library = None if once else _load(self._function)
 
     def __call__(self, *arrays: FloatArray) -> list[FloatArray]:
         """Evaluate.

@@ -203,8 +203,8 @@ class _Graph:
         return _Value(a.sign * b.sign, self._node(("*", low, high)))
 
     def operations(self, outputs: list[_Value]) -> int:
-        pending = [value.node for value in outputs]
-        seen = set(pending)
+        seen = {value.node for value in outputs}
+        pending = list(seen)
         count = 0
         while pending:
             key = self._keys[pending.pop()]

@@ -75,25 +75,37 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
             f"at {rank} is {gap:.3g}. Raise or lower model.rank_tolerance (now {tolerance:g})."
         )
     columns = affecting[taken]
+    return BaseParameters(columns, regrouping(W, columns), singular, gap)
+
+
+def regrouping(W: FloatArray, columns: IntArray) -> FloatArray:
+    """Express all other columns in the independent ones, W_others = W_columns beta.
+
+    Args:
+        W: Observation matrix, (n_rows, n).
+        columns: Independent columns, (r,).
+
+    Returns:
+        beta, (r, n - r); the others in ascending order, columns without effect as zeros.
+    """
     others = np.setdiff1d(np.arange(W.shape[1]), columns)
-    beta = np.zeros((rank, others.size))
-    live = np.isin(others, affecting)
-    scale_base = np.linalg.norm(W[:, columns], axis=0)
-    target = others[live]
-    target_norms = np.linalg.norm(W[:, target], axis=0)
-    solution, *_ = scipy.linalg.lstsq(W[:, columns] / scale_base, W[:, target] / target_norms)
-    solution = solution * target_norms / scale_base[:, None]
-    relevance = np.abs(solution) * scale_base[:, None] / target_norms
-    solution[relevance < _NUMERICALLY_ZERO] = 0.0
-    beta[:, live] = solution
-    return BaseParameters(columns, beta, singular, gap)
+    beta = np.zeros((columns.size, others.size))
+    live = affecting_columns(W)[others]
+    if not live.any() or columns.size == 0:
+        return beta
+    own = np.linalg.norm(W[:, columns], axis=0)
+    target = W[:, others[live]]
+    lengths = np.linalg.norm(target, axis=0)
+    solution, *_ = scipy.linalg.lstsq(W[:, columns] / own, target / lengths)
+    solution[np.abs(solution) < _NUMERICALLY_ZERO] = 0.0
+    beta[:, live] = solution * lengths / own[:, None]
+    return beta
 
 
 def independent_columns(scaled: FloatArray, wanted: list[int], rank: int) -> list[int]:
     """Take columns of unit length in the order wanted while they are independent of those taken.
 
-    A column is dependent when what is left of it is below the geometric middle between
-    round-off and the smallest residual an independent one shows.
+    A column is dependent when no more of it is left than the square root of the rounding unit.
     """
     residual = np.linalg.qr(scaled, mode="r")
     basis = np.empty((residual.shape[0], 0))

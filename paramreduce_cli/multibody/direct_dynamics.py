@@ -15,7 +15,6 @@ from paramreduce_cli.multibody.inverse_dynamics import (
     inverse_dynamics,
 )
 from paramreduce_cli.multibody.kinematics import (
-    ZERO,
     JointMotion,
     Matrix,
     Vector,

@@ -23,15 +23,15 @@ class Dynamics:
 
     Args:
         mechanism: The mechanism; its standard parameters stay free.
+        once: Whether it is evaluated so little that compiling it does not pay.
     """
 
-    def __init__(self, mechanism: Mechanism) -> None:
+    def __init__(self, mechanism: Mechanism, *, once: bool = False) -> None:
+        self._once = once
         self.mechanism = mechanism
         self.n_dof = mechanism.n_dof
         self.n_parameters = len(mechanism.parameter_names)
-        self._z, self._dz, self._ddz = (
-            ca.SX.sym(name, self.n_dof) for name in ("z", "dz", "ddz")
-        )
+        self._z, self._dz, self._ddz = (ca.SX.sym(name, self.n_dof) for name in ("z", "dz", "ddz"))
         self._phi = ca.SX.sym("phi", self.n_parameters)
 
     @cached_property
@@ -51,7 +51,7 @@ class Dynamics:
 
     @cached_property
     def _regressor(self) -> BatchFunction:
-        return BatchFunction([self._z, self._dz, self._ddz], [self._K.T])
+        return BatchFunction([self._z, self._dz, self._ddz], [self._K.T], once=self._once)
 
     @cached_property
     def _direct_regressor(self) -> BatchFunction:
@@ -118,9 +118,7 @@ class Dynamics:
         )
         return Program(function)
 
-    def count_operations(
-        self, kept: IntArray, *, signs_free: bool = True
-    ) -> tuple[int, int]:
+    def count_operations(self, kept: IntArray, *, signs_free: bool = True) -> tuple[int, int]:
         """Operations of IDM and [M | delta] when only some parameters are kept.
 
         Args:

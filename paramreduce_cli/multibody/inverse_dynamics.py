@@ -100,9 +100,7 @@ def body_motions(
             before = result[body.parent]
             omega, omega_dot = before.omega, before.omega_dot
             acceleration = add(before.acceleration, apply(before.U, joint.origin))
-        omega, omega_dot, acceleration = map(
-            joint.to_body, (omega, omega_dot, acceleration)
-        )
+        omega, omega_dot, acceleration = map(joint.to_body, (omega, omega_dot, acceleration))
         axis = [ca.SX(component) for component in joint.axis().tolist()]
         if body.joint == "revolute":
             turning = scale(dz[i], axis)

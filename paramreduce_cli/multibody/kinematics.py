@@ -24,22 +24,22 @@ ZERO: Vector = (ca.SX(0), ca.SX(0), ca.SX(0))
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """a + b"""
+    """A + b"""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def scale(factor: ca.SX, a: Vector) -> Vector:
-    """factor * a"""
+    """Factor * a"""
     return (factor * a[0], factor * a[1], factor * a[2])
 
 
 def dot(a: Sequence, b: Vector) -> ca.SX:
-    """a . b"""
+    """A . b"""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Sequence, b: Sequence) -> Vector:
-    """a x b"""
+    """A x b"""
     return (
         a[1] * b[2] - a[2] * b[1],
         a[2] * b[0] - a[0] * b[2],
@@ -48,7 +48,7 @@ def cross(a: Sequence, b: Sequence) -> Vector:
 
 
 def apply(matrix: Sequence[Sequence], a: Vector) -> Vector:
-    """matrix @ a"""
+    """Matrix @ a"""
     return (dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a))
 
 

@@ -86,9 +86,7 @@ class FactorAccumulator:
 
     def result(self) -> FloatArray:
         """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows."""
-        return np.array(
-            [[_square(factor) for factor in factors] for factors in self._factors]
-        )
+        return np.array([[_square(factor) for factor in factors] for factors in self._factors])
 
 
 def joint_factors(blocks: Iterable[Block]) -> FloatArray:

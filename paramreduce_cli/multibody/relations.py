@@ -1,89 +1,131 @@
 """Linear relations between parameters as readable text.
 
-Coefficients that are a simple function of the geometry are printed as such, but only where
-one function alone fits to rounding; anything doubtful stays a number.
+A coefficient that is a simple function of the geometry is printed as such, but only where the
+function still fits when the geometry is changed; everything else stays a number.
 """
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 
-_MATCH = 1e-9
+_MATCH = 1e-8
 _IGNORED = 1e-10
 
-
-class Geometry:
-    """Names for numbers that are products and sums of squares of the mechanism's lengths."""
-
-    def __init__(self, lengths: Mapping[str, float]) -> None:
-        values: dict[str, float] = {}
-        for name, value in lengths.items():
-            values[name] = value
-            values[f"2 {name}"] = 2 * value
-            values[f"{name}^2"] = value**2
-        for (one, x), (two, y) in itertools.combinations(lengths.items(), 2):
-            values[f"{one} {two}"] = x * y
-            values[f"2 {one} {two}"] = 2 * x * y
-            values[f"({one}^2 + {two}^2)"] = x**2 + y**2
-        self._values = values
-
-    def factor(self, number: float) -> str:
-        """Text for a positive number: a function of the lengths, a whole number, or its digits."""
-        if abs(number - round(number)) < _MATCH and round(number) != 0:
-            return f"{round(number)}"
-        matches = [
-            name
-            for name, value in self._values.items()
-            if abs(abs(value) - number) <= _MATCH * number
-        ]
-        if len(matches) != 1:
-            return f"{number:.6g}"
-        name = matches[0]
-        return name if self._values[name] > 0 else f"(-{name})"
+Lengths = Mapping[str, float]
 
 
-def linear_expression(
-    lead: str, names: Sequence[str], coefficients: Iterable[float], geometry: Geometry
-) -> str:
-    """``lead + c1 name1 - c2 name2 ...`` without the terms that vanish."""
-    text = lead
-    for name, coefficient in zip(names, coefficients, strict=True):
-        if abs(coefficient) <= _IGNORED:
-            continue
-        factor = geometry.factor(abs(coefficient))
-        shown = name if factor == "1" else f"{factor} {name}"
-        text += f" {'-' if coefficient < 0 else '+'} {shown}"
-    return text
+def candidates(lengths: Lengths) -> dict[str, float]:
+    """Simple functions of named lengths, by their text, simplest first."""
+    values = {"": 1.0, "2": 2.0}
+    for name, value in lengths.items():
+        values[name] = value
+        values[f"2 {name}"] = 2 * value
+        values[f"{name}^2"] = value**2
+    for (one, x), (two, y) in itertools.combinations(lengths.items(), 2):
+        values[f"{one} {two}"] = x * y
+        values[f"2 {one} {two}"] = 2 * x * y
+    for count in (2, 3):
+        for chosen in itertools.combinations(lengths.items(), count):
+            values |= _sums_of_squares(chosen)
+    return values
 
 
-def expressions(
+def _sums_of_squares(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
+    """Sums and differences of the squares of some lengths; the first one positive."""
+    result = {}
+    for signs in itertools.product((1, -1), repeat=len(lengths) - 1):
+        text, value = f"{lengths[0][0]}^2", lengths[0][1] ** 2
+        for sign, (name, length) in zip(signs, lengths[1:], strict=True):
+            text += f" {'+' if sign > 0 else '-'} {name}^2"
+            value += sign * length**2
+        result[f"({text})"] = value
+    return result
+
+
+def named_coefficient(values: Sequence[float], functions: Sequence[dict[str, float]]) -> str | None:
+    """Text of the function of the geometry that a coefficient is, with its sign.
+
+    Args:
+        values: The coefficient for each of several geometries.
+        functions: :func:`candidates` of the same geometries.
+
+    Returns:
+        Such as ``- a_3^2``; None where no function fits all geometries, or more than one does.
+    """
+    found = []
+    for text in functions[0]:
+        known = [f[text] for f in functions]
+        for sign in (1.0, -1.0):
+            if all(
+                abs(v - sign * k) <= _MATCH * abs(k) for v, k in zip(values, known, strict=True)
+            ):
+                found.append(f"{'+' if sign > 0 else '-'} {text}".rstrip())
+    return found[0] if len(found) == 1 else None
+
+
+def regrouping_expressions(
     names: Sequence[str],
     kept: IntArray,
-    beta: FloatArray,
-    lengths: Mapping[str, float],
-    known: FloatArray | None = None,
+    beta: Sequence[FloatArray],
+    lengths: Sequence[Lengths],
 ) -> list[str]:
-    """Each kept parameter with what it takes over from the others.
+    """Base parameters in terms of standard ones, coefficients named where geometry explains them.
 
     Args:
         names: Of all parameters, (n,).
-        kept: Their columns, (r,).
-        beta: Coefficients of the others in ascending order, (r, n - r).
-        lengths: Of the mechanism, by name; empty for plain numbers.
-        known: Values of all parameters; terms of others that are zero are then left out.
+        kept: Columns of the base parameters, (r,).
+        beta: For several geometries of the same structure, the real one first, each (r, n - r).
+        lengths: Of the same geometries, by name.
     """
-    geometry = Geometry(lengths)
-    others = np.setdiff1d(np.arange(len(names)), kept)
+    functions = [candidates(entry) for entry in lengths]
+
+    def term(row: int, column: int) -> str:
+        values = [float(b[row, column]) for b in beta]
+        return named_coefficient(values, functions) or signed_number(values[0])
+
+    return _expressions(names, kept, beta[0], term)
+
+
+def approximate_expressions(
+    names: Sequence[str], kept: IntArray, beta: FloatArray, known: FloatArray | None = None
+) -> list[str]:
+    """Approximate base parameters in terms of standard ones, with plain numbers.
+
+    Args:
+        names: Of all parameters, (n,).
+        kept: Columns of the approximate base parameters, (n_kept,).
+        beta: Coefficients of the others in ascending order, (n_kept, n - n_kept).
+        known: Values of all parameters; those that are zero are left out of the sums.
+    """
+    shown = beta
     if known is not None:
-        used = known[others] != 0
-        others, beta = others[used], beta[:, used]
-    other_names = [names[k] for k in others]
+        others = np.setdiff1d(np.arange(len(names)), kept)
+        shown = np.where(known[others] != 0, beta, 0.0)
+    return _expressions(names, kept, shown, lambda i, j: signed_number(float(shown[i, j])))
+
+
+def signed_number(value: float) -> str:
+    """Such as ``- 0.4318``."""
+    return f"{'-' if value < 0 else '+'} {abs(value):.6g}"
+
+
+def _expressions(
+    names: Sequence[str], kept: IntArray, beta: FloatArray, term: Callable[[int, int], str]
+) -> list[str]:
+    others = np.setdiff1d(np.arange(len(names)), kept)
     return [
-        linear_expression(names[column], other_names, row, geometry)
-        for column, row in zip(kept, beta, strict=True)
+        " ".join(
+            [names[column]]
+            + [
+                f"{term(i, j)} {names[other]}"
+                for j, other in enumerate(others)
+                if abs(beta[i, j]) > _IGNORED
+            ]
+        )
+        for i, column in enumerate(kept)
     ]

@@ -6,13 +6,13 @@ import numpy as np
 import scipy.linalg
 
 from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.registry import heuristic
 from paramreduce_cli.reduction.problem import (
     FULL_PRECISION,
     SelectionProblem,
     first_of_the_best,
     independent_subset,
 )
+from paramreduce_cli.registry import heuristic
 
 
 @heuristic("backward-elimination")

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from paramreduce_cli.records import IntArray
-from paramreduce_cli.registry import heuristic
-from paramreduce_cli.reduction.remainder import Remainder
 from paramreduce_cli.reduction.problem import (
     FULL_PRECISION,
     SelectionProblem,
     first_of_the_best,
 )
+from paramreduce_cli.reduction.remainder import Remainder
+from paramreduce_cli.registry import heuristic
 
 
 @heuristic("forward-selection")

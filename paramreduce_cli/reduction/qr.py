@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from paramreduce_cli.records import IntArray
-from paramreduce_cli.registry import heuristic
-from paramreduce_cli.reduction.remainder import Remainder
 from paramreduce_cli.reduction.problem import SelectionProblem, first_of_the_best
+from paramreduce_cli.reduction.remainder import Remainder
+from paramreduce_cli.registry import heuristic
 
 
 @heuristic("qr")

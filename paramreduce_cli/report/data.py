@@ -65,8 +65,6 @@ class ReportData:
     validation: Validation
     motion: Motion
     skeletons: tuple[Skeleton, ...]
-    relations: tuple[str, ...]
-    """Base parameters as expressions."""
 
 
 def first_motion(

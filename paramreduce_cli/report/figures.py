@@ -48,7 +48,9 @@ FORMATS: dict[str, dict] = {
 }
 
 
-def render(draw: Callable[[ReportData], Figure], data: ReportData, formats: list[str]) -> dict[str, bytes]:
+def render(
+    draw: Callable[[ReportData], Figure], data: ReportData, formats: list[str]
+) -> dict[str, bytes]:
     """Draw a figure and encode it in each format."""
     with mpl.rc_context(_STYLE):
         drawn = draw(data)
@@ -73,39 +75,51 @@ def _joint_label(data: ReportData, j: int) -> str:
 def poses(data: ReportData) -> Figure:
     """The mechanism in a few poses of the validation set."""
     count = len(data.skeletons)
-    drawn = Figure(figsize=(2.7 * count, 3.0))
-    reach = max(float(np.abs(s.poses[:, :3, 3]).max()) for s in data.skeletons) or 1.0
+    drawn = Figure(figsize=(2.8 * count, 3.1))
+    corners = np.array([_extent(skeleton) for skeleton in data.skeletons])
+    low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
+    half = 0.55 * float((high - low).max()) or 1.0
     for k, skeleton in enumerate(data.skeletons):
         axes = drawn.add_subplot(1, count, k + 1, projection="3d")
-        _draw_skeleton(axes, skeleton, reach)
+        _draw_skeleton(axes, skeleton, half)
+        for setter, middle in zip(
+            (axes.set_xlim, axes.set_ylim, axes.set_zlim), (low + high) / 2, strict=True
+        ):
+            setter(middle - half, middle + half)
     return drawn
 
 
-def _draw_skeleton(axes: Axes, skeleton: Skeleton, reach: float) -> None:
-    base = np.zeros(3)
+def _extent(skeleton: Skeleton) -> FloatArray:
+    """Corners of the box around a pose and the base, (2, 3), m."""
+    points = np.vstack([np.zeros(3), skeleton.poses[:, :3, 3], skeleton.joints[:, :3, 3]])
+    return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
     for i, parent in enumerate(skeleton.parents):
-        start = base if parent < 0 else skeleton.poses[parent][:3, 3]
+        start = np.zeros(3) if parent < 0 else skeleton.poses[parent][:3, 3]
         middle, end = skeleton.joints[i][:3, 3], skeleton.poses[i][:3, 3]
         path = np.array([start, middle, end]).T
         axes.plot(*path, color="#44607a", linewidth=4, solid_capstyle="round", alpha=0.9)
-        axis = skeleton.joints[i][:3, 2] * 0.13 * reach
+        axis = skeleton.joints[i][:3, 2] * 0.14 * half
         ends = np.array([middle - axis, middle + axis]).T
         colour = "#d9730d" if skeleton.kinds[i] == "revolute" else "#2f8f5b"
-        axes.plot(*ends, color=colour, linewidth=2.2, solid_capstyle="butt")
+        axes.plot(*ends, color=colour, linewidth=2.4, solid_capstyle="butt")
     tip = skeleton.poses[-1]
     for column, colour in zip(range(3), ("#c2384f", "#2f8f5b", "#0b62c4"), strict=True):
-        arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.22 * reach * tip[:3, column]]).T
+        arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.25 * half * tip[:3, column]]).T
         axes.plot(*arrow, color=colour, linewidth=1.4)
     axes.scatter(0, 0, 0, marker="s", s=40, color="#30363d")
-    for setter in (axes.set_xlim, axes.set_ylim, axes.set_zlim):
-        setter(-reach, reach)
-    axes.set_box_aspect((1, 1, 1), zoom=1.25)
+    axes.set_box_aspect((1, 1, 1), zoom=1.15)
     axes.view_init(elev=22, azim=-60)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
         axis.set_ticklabels([])
         axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
-    text = ", ".join(f"{value:.2f}" for value in skeleton.z)
-    axes.set_title(f"z = ({text})", fontsize=7, y=-0.02, color="#57606a")
+    shown = ", ".join(f"{value:.2f}" for value in skeleton.z)
+    axes.text2D(
+        0.5, 0.98, f"z = ({shown})", transform=axes.transAxes, ha="center", fontsize=6.5,
+        color="#57606a",
+    )  # fmt: skip
 
 
 @figure("trajectory")
@@ -122,7 +136,9 @@ def trajectory(data: ReportData) -> Figure:
     for axes, (values, label) in zip(all_axes, rows, strict=True):
         _joint_lines(axes, data, values)
         axes.set_ylabel(label)
-    all_axes[0].legend(ncols=values.shape[1], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    all_axes[0].legend(
+        ncols=values.shape[1], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
     all_axes[-1].set_xlabel("t (s)")
     return drawn
 
@@ -130,7 +146,9 @@ def trajectory(data: ReportData) -> Figure:
 def _joint_lines(axes: Axes, data: ReportData, values: FloatArray, **style: object) -> None:
     for j in range(values.shape[1]):
         colour = _JOINT_COLOURS[j % len(_JOINT_COLOURS)]
-        axes.plot(data.motion.time, values[:, j], color=colour, label=_joint_label(data, j), **style)
+        axes.plot(
+            data.motion.time, values[:, j], color=colour, label=_joint_label(data, j), **style
+        )
 
 
 @figure("torque-error")

@@ -106,7 +106,7 @@ def base_parameters(data: ReportData) -> Table:
     values = data.model.values[base.columns] + base.beta @ data.model.values[others]
     rows = [
         (str(k + 1), expression, f"{value:.6g}")
-        for k, (expression, value) in enumerate(zip(data.relations, values, strict=True))
+        for k, (expression, value) in enumerate(zip(base.expressions, values, strict=True))
     ]
     return Table("Base parameters", ("no.", "expression", "value"), tuple(rows))
 

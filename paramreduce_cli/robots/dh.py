@@ -153,5 +153,7 @@ def _angle_text(angle: float) -> str:
             if top == 0:
                 return "0"
             sign, top = ("-" if top < 0 else ""), abs(top)
-            return f"{sign}{'' if top == 1 else top}pi{'' if denominator == 1 else f'/{denominator}'}"
+            return (
+                f"{sign}{'' if top == 1 else top}pi{'' if denominator == 1 else f'/{denominator}'}"
+            )
     return f"{angle:g}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from paramreduce_cli.config import Config
@@ -10,14 +12,18 @@ from paramreduce_cli.multibody.base_parameters import (
     affecting_columns,
     base_parameters,
     preference_order,
+    regrouping,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import FloatArray, Mechanism, Model
+from paramreduce_cli.multibody.relations import regrouping_expressions
+from paramreduce_cli.records import BaseParameters, FloatArray, Mechanism, Model
 from paramreduce_cli.registry import stage
 from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh
 
 _STATES = 300
 """Random states on which ranks are decided; many more rows than columns."""
+_CHANGED_GEOMETRIES = 2
+"""On which a guess of what a coefficient is must hold too."""
 
 
 @stage
@@ -26,25 +32,29 @@ def build_model(config: Config) -> Model:
 
     The ranks are decided on seeded random states.
     """
-    mechanism = _mechanism(config)
+    mechanism = _mechanism(config, 1.0)
     rng = np.random.default_rng(config.model.seed)
     states = _random_states(config, mechanism, rng)
     K = Dynamics(mechanism).regressor(*states)
     W = K.reshape(-1, K.shape[2])
     values = config.standard_parameters()
     given = config.nominal_torque != "standard-deviation"
-    nominal = per_joint(config.nominal_torque, config.n_dof) if given else np.std(K @ values, axis=0)
+    nominal = (
+        per_joint(config.nominal_torque, config.n_dof) if given else np.std(K @ values, axis=0)
+    )
     if not np.all(nominal > 0):
         joint = mechanism.coordinate_names[int(np.argmin(nominal))]
         raise ConfigError(
             f"nominal_torque: {joint} carries no torque or force, so its standard deviation is no "
             "scale. Give nominal_torque in the config, in N m (N for a prismatic joint)."
         )
+    base = base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance)
+    texts = _expressions(config, mechanism, base, states, rng)
     return Model(
         mechanism=mechanism,
         values=values,
         affecting=affecting_columns(W),
-        base=base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance),
+        base=dataclasses.replace(base, expressions=tuple(texts)),
         nominal_torque=nominal,
         nominal_torque_given=given,
     )
@@ -56,19 +66,42 @@ def per_joint(values: object, n_dof: int) -> FloatArray:
     return np.full(n_dof, result[0]) if result.size == 1 else result
 
 
-def _mechanism(config: Config) -> Mechanism:
+def _expressions(
+    config: Config,
+    mechanism: Mechanism,
+    base: BaseParameters,
+    states: tuple[FloatArray, FloatArray, FloatArray],
+    rng: np.random.Generator,
+) -> list[str]:
+    """Regrouping relations, coefficients named where they follow changed lengths as well."""
+    betas, lengths = [base.beta], [mechanism.lengths]
+    for _ in range(_CHANGED_GEOMETRIES):
+        changed = _mechanism(config, rng)
+        K = Dynamics(changed, once=True).regressor(*states)
+        betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns))
+        lengths.append(changed.lengths)
+    return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
+
+
+def _mechanism(config: Config, stretch: np.random.Generator | float) -> Mechanism:
+    """The mechanism of a config, its lengths multiplied by a number or by random ones."""
+
+    def stretched(length: float) -> float:
+        factor = stretch if isinstance(stretch, float) else float(stretch.uniform(0.8, 1.25))
+        return length * factor
+
     names = config.body_names()
     rows = [
         DHRow(
             name=names[k],
             parent=_parent(joint.parent, names[k - 1] if k else None),
             joint=joint.type,
-            a=joint.a,
+            a=stretched(joint.a),
             alpha=joint.alpha,
-            d=joint.d,
+            d=stretched(joint.d),
             theta=joint.theta,
             gamma=joint.gamma,
-            b=joint.b,
+            b=stretched(joint.b),
         )
         for k, joint in enumerate(config.description.dh.joints)
     ]

@@ -38,9 +38,7 @@ def optimize_trajectories(
     counts = {"estimation": wanted.count, "validation": wanted.validation_count}
     keys = [f"{name}-{k:04d}" for name in _SETS for k in range(counts[name])]
     found = optimise_all(task, keys, run)
-    sets = {
-        name: tuple(found[key] for key in keys if key.startswith(name)) for name in _SETS
-    }
+    sets = {name: tuple(found[key] for key in keys if key.startswith(name)) for name in _SETS}
     return Trajectories(
         wanted.period, wanted.criterion, wanted.scaling, sets["estimation"], sets["validation"]
     )

@@ -36,7 +36,7 @@ def reduce(config: Config | None, model: Model | None, samples: Samples) -> Redu
     weights = _weights(wanted, samples)
     factor = combined_factor(samples.estimation.factors(), weights)
     problem = _problem(factor, model, samples)
-    rank = len(independent_subset(problem.W, problem.preference))
+    rank = len(independent_subset(problem.W, problem.candidates_by_preference))
     found = {name: _ordered(problem, name, wanted.stop) for name in wanted.heuristics}
     orderings = _with_norms(found, samples, weights)
     return Reduction(samples.names, weights, rank, factor, orderings)
@@ -66,9 +66,7 @@ def _problem(factor: FloatArray, model: Model | None, samples: Samples) -> Selec
     return SelectionProblem(W, chi, candidates, preference_order(samples.names))
 
 
-def _ordered(
-    problem: SelectionProblem, name: str, stop: Stop
-) -> tuple[IntArray, list[Fit], float]:
+def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> tuple[IntArray, list[Fit], float]:
     started = time.perf_counter()
     order = registry.heuristic[name](problem)
     seconds = time.perf_counter() - started

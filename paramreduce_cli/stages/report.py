@@ -9,7 +9,6 @@ import numpy as np
 from paramreduce_cli import registry
 from paramreduce_cli.config import Config
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.multibody.relations import expressions
 from paramreduce_cli.records import (
     BASE,
     FloatArray,
@@ -80,10 +79,6 @@ def _gather(
     column = model_column(ordering.subset(selected.n), selected.values, len(reduction.names))
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), column, reduction.nominal_torque)
-    mechanism = model.mechanism
-    relations = expressions(
-        mechanism.parameter_names, model.base.columns, model.base.beta, mechanism.lengths
-    )
     return ReportData(
         title=config.report.title or config.robot,
         model=model,
@@ -94,7 +89,6 @@ def _gather(
         validation=validation,
         motion=motion,
         skeletons=tuple(_skeleton(model, z) for z in _shown_poses(config, motion)),
-        relations=tuple(relations),
     )
 
 

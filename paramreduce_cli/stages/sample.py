@@ -41,9 +41,13 @@ def sample(
     dynamics = Dynamics(model.mechanism)
     wanted = config.sampling
     points = wanted.points or config.trajectories.points
-    estimation = _observed(model, dynamics, trajectories, "estimation", recordings.estimation, points)
+    estimation = _observed(
+        model, dynamics, trajectories, "estimation", recordings.estimation, points
+    )
     points = wanted.validation_points or config.trajectories.points
-    validation = _observed(model, dynamics, trajectories, "validation", recordings.validation, points)
+    validation = _observed(
+        model, dynamics, trajectories, "validation", recordings.validation, points
+    )
     return Samples(
         names=model.mechanism.parameter_names,
         values=model.values,

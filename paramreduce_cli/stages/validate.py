@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.relations import expressions
+from paramreduce_cli.multibody.relations import approximate_expressions
 from paramreduce_cli.records import (
     FloatArray,
     HeuristicValidation,
@@ -181,14 +181,12 @@ def _select(config: Config, model: Model, reduction: Reduction) -> Selected:
         parameters=tuple(reduction.names[k] for k in kept),
         values=ordering.parameters[n - 1],
         expressions=tuple(
-            expressions(reduction.names, kept, ordering.beta[n - 1], {}, model.values)
+            approximate_expressions(reduction.names, kept, ordering.beta[n - 1], model.values)
         ),
     )
 
 
-def _verdict(
-    config: Config, selected: Selected, result: HeuristicValidation
-) -> tuple[bool, str]:
+def _verdict(config: Config, selected: Selected, result: HeuristicValidation) -> tuple[bool, str]:
     """Whether the selected model keeps to the limits of the config, and the sentence for it."""
     limits = config.validation.accept
     met, missed = [], []

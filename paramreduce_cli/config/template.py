@@ -1,0 +1,66 @@
+"""A commented config for a new arm that validates as it is."""
+
+from __future__ import annotations
+
+_HEAD = """\
+# {name}: fill in what is marked TODO. Units are SI; numbers may be written as 1e-3 or pi/2.
+# `paramreduce schema` lists every key with its meaning, unit and default.
+robot: {name}
+
+description:
+  gravity: [0, 0, -9.81]        # acceleration of gravity in the base frame, m/s^2
+  dh:
+    convention: modified        # modified (Khalil, Craig) or standard
+    # TODO one row per joint; a and d in m, alpha and theta in rad. A revolute joint adds its
+    # coordinate to theta, a prismatic one (type: prismatic) to d. For a tree give each row a
+    # name and the name of its parent.
+    joints:
+"""
+
+_TAIL = """
+nominal_torque: standard-deviation   # or one value per joint, N m (N for a prismatic joint)
+
+trajectories:
+  count: 10                     # trajectories of the estimation set
+  validation_count: 1
+  harmonics: 4
+  period: 2*pi                  # s
+  points: 100                   # samples over a period
+  position_limits: [-pi/2, pi/2]     # TODO for all joints, or a list of one pair per joint, rad (m)
+  velocity_limits: 1.5               # TODO for all joints, or one per joint, rad/s (m/s)
+  # acceleration_limits: 10          # rad/s^2 (m/s^2)
+
+selected:
+  heuristic: forward-selection
+  torque_error: 0.01            # the smallest model with an error of at most 1 %; or n: 18
+
+validation:
+  accept:                       # exit code 1 where these are not met
+    torque_error_validation: 0.02
+"""
+
+
+def dh_template(name: str, joints: int) -> str:
+    """Text of a config for an arm of some revolute joints.
+
+    Args:
+        name: Of the robot.
+        joints: How many.
+    """
+    rows = "".join(
+        f"      - {{a: {0.3 if k in (2, 3) else 0}, alpha: {'pi/2' if k % 2 else 0}, d: 0, theta: 0}}\n"
+        for k in range(joints)
+    )
+    bodies = "".join(
+        f"    {k + 1}: {{m: {mass:g}, com: [0.1, 0.02, 0.01], inertia_com: [{i:g}, 0, 0, {2 * i:g}, "
+        f"0, {2 * i:g}]}}\n"
+        for k, (mass, i) in enumerate((10 / (k + 1), 0.1 / (k + 1)) for k in range(joints))
+    )
+    parameters = (
+        "\nparameter_sets:\n"
+        "  # TODO the body's mass (kg), centre of mass in its frame (m) and inertia about the centre\n"
+        "  # of mass [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] (kg m^2); or first moments mx my mz (kg m) and\n"
+        "  # Ixx Ixy Ixz Iyy Iyz Izz about the frame's origin.\n"
+        "  nominal:\n"
+    )
+    return _HEAD.format(name=name) + rows + parameters + bodies + _TAIL

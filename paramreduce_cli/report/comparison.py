@@ -1,0 +1,154 @@
+"""Compare two summaries: what differs, by how much, and whether that is tolerable."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far two numbers may be apart: relative, and absolute near zero."""
+
+    relative: float
+    absolute: float = 0.0
+
+    def holds(self, a: float | None, b: float | None) -> bool:
+        """Whether two numbers are near enough; None stands for an infinite one."""
+        if a is None or b is None:
+            return a is b
+        return math.isclose(a, b, rel_tol=self.relative, abs_tol=self.absolute)
+
+
+TOLERANCES: dict[str, Tolerance] = {
+    "kappa": Tolerance(0.05),
+    "torque_error": Tolerance(1e-4, 1e-9),
+    "acceleration_error": Tolerance(1e-3, 1e-6),
+    "operations": Tolerance(0.0),
+}
+_TIE = Tolerance(1e-7, 1e-9)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One quantity that is not the same in both summaries."""
+
+    what: str
+    first: str
+    second: str
+    tolerated: bool
+
+
+Summary = Mapping[str, Any]
+Quantity = Callable[[Summary, Summary, Mapping[str, Tolerance]], Iterator[Difference]]
+
+
+def compare(
+    first: Summary,
+    second: Summary,
+    tolerances: Mapping[str, Tolerance] = TOLERANCES,
+    only: tuple[str, ...] = (),
+) -> list[Difference]:
+    """All differences between two summaries, tolerable ones included.
+
+    Args:
+        first: What is expected.
+        second: What was found.
+        tolerances: By quantity.
+        only: Quantities to look at; all if empty.
+    """
+    names = only or tuple(QUANTITIES)
+    return [d for name in names for d in QUANTITIES[name](first, second, tolerances)]
+
+
+def _model(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    for key in ("n_dof", "n_parameters", "n_affecting", "n_base", "names"):
+        yield from _exact(f"model.{key}", a["model"][key], b["model"][key])
+
+
+def _exact(what: str, a: Any, b: Any) -> Iterator[Difference]:
+    if a != b:
+        yield Difference(what, str(a), str(b), tolerated=False)
+
+
+def _kappa(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    """The optimiser is random, so it is gated by its best and its median, and only upwards."""
+    if a["trajectories"] is None or b["trajectories"] is None:
+        yield from _exact("trajectories", a["trajectories"], b["trajectories"])
+        return
+    limit = 1 + tolerances["kappa"].relative
+    for label, pick in (("best", min), ("median", _median)):
+        x, y = (pick([t["kappa"] for t in s["trajectories"]["estimation"]]) for s in (a, b))
+        if x != y:
+            yield Difference(f"kappa, {label}", f"{x:.5g}", f"{y:.5g}", tolerated=y <= x * limit)
+
+
+def _median(values: list[float]) -> float:
+    ordered = sorted(values)
+    middle = len(ordered) // 2
+    return (ordered[middle] + ordered[~middle]) / 2
+
+
+def _rows(a: Summary, b: Summary, part: str) -> Iterator[tuple[str, Any, Any]]:
+    """Rows of a part of the validation that both summaries have, by label."""
+    for name, rows in a["validation"].items():
+        for x, y in zip(rows, b["validation"].get(name, []), strict=False):
+            for key in x[part]:
+                yield f"{part}.{key}, {name}, n = {x['n']}", x[part][key], y[part].get(key)
+
+
+def _numbers(part: str) -> Quantity:
+    def quantity(
+        a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+    ) -> Iterator[Difference]:
+        for what, x, y in _rows(a, b, part):
+            for k, (p, q) in enumerate(zip(_listed(x), _listed(y), strict=False)):
+                if p != q:
+                    label = f"{what}, joint {k + 1}" if isinstance(x, list) else what
+                    yield Difference(label, _text(p), _text(q), tolerances[part].holds(p, q))
+
+    return quantity
+
+
+def _listed(value: Any) -> list[Any]:
+    return value if isinstance(value, list) else [value]
+
+
+def _text(value: float | None) -> str:
+    return "infinite" if value is None else f"{value:.6g}"
+
+
+def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    """Orders are the same up to ties: another subset with the same error is no difference."""
+    yield from _exact("heuristics", sorted(a["reduction"]), sorted(b["reduction"]))
+    for name in a["reduction"]:
+        if name not in b["reduction"]:
+            continue
+        x, y = a["reduction"][name]["order"], b["reduction"][name]["order"]
+        yield from _exact(f"parameters ordered, {name}", len(x), len(y))
+        errors = zip(a["validation"][name], b["validation"][name], strict=False)
+        for n, (row_a, row_b) in enumerate(errors, start=1):
+            if set(x[:n]) == set(y[:n]):
+                continue
+            p, q = (row["torque_error"]["estimation"] for row in (row_a, row_b))
+            yield Difference(
+                f"order, {name}, n = {n}", x[n - 1], y[n - 1], tolerated=_TIE.holds(p, q)
+            )
+
+
+def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    for key in ("heuristic", "n", "accepted"):
+        yield from _exact(f"selected.{key}", a["selected"][key], b["selected"][key])
+
+
+QUANTITIES: dict[str, Quantity] = {
+    "model": _model,
+    "kappa": _kappa,
+    "order": _order,
+    "torque_error": _numbers("torque_error"),
+    "acceleration_error": _numbers("acceleration_error"),
+    "operations": _numbers("operations"),
+    "selected": _selected,
+}

@@ -1,0 +1,43 @@
+"""The declared stages as rules for other tools."""
+
+from __future__ import annotations
+
+from paramreduce_cli.artifacts.store import file_of
+from paramreduce_cli.runner import Stage, pipeline
+
+
+def make_rules() -> str:
+    """One pattern rule per stage for GNU Make; kept in pipelines/stages.mk."""
+    lines = [
+        "# Written by `paramreduce graph --format make`; do not edit.",
+        "# One rule per stage: `make results/ROBOT/reduction.h5` does just what is missing.",
+        "PARAMREDUCE ?= paramreduce",
+        "CONFIGS ?= configs",
+        "RESULTS ?= results",
+        "PARAMREDUCE_FLAGS ?=",
+        "# What must be there before paramreduce can be called, such as an installation.",
+        "PARAMREDUCE_READY ?=",
+    ]
+    for stage in pipeline():
+        target = f"$(RESULTS)/%/{file_of(stage.output)}"
+        needs = [f"$(RESULTS)/%/{file_of(entry.type)}" for entry in stage.artifacts]
+        lines += [
+            "",
+            f"{target}: {' '.join(['$(CONFIGS)/%.yaml', *needs])} | $(PARAMREDUCE_READY)",
+            f"\t$(PARAMREDUCE) {stage.name} $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)",
+        ]
+    kept = " ".join(f"$(RESULTS)/%/{file_of(stage.output)}" for stage in pipeline())
+    return "\n".join([*lines, "", f".PRECIOUS: {kept}", ""])
+
+
+def outline() -> str:
+    """The stages with what they read and write, for people."""
+    return "\n".join(_line(stage) for stage in pipeline()) + "\n"
+
+
+def _line(stage: Stage) -> str:
+    needs = ", ".join(file_of(entry.type) for entry in stage.artifacts)
+    return f"{stage.name}: {needs or 'the config'} -> {file_of(stage.output)}"
+
+
+FORMATS = {"make": make_rules, "text": outline}

@@ -1,0 +1,28 @@
+# Written by `paramreduce graph --format make`; do not edit.
+# One rule per stage: `make results/ROBOT/reduction.h5` does just what is missing.
+PARAMREDUCE ?= paramreduce
+CONFIGS ?= configs
+RESULTS ?= results
+PARAMREDUCE_FLAGS ?=
+# What must be there before paramreduce can be called, such as an installation.
+PARAMREDUCE_READY ?=
+
+$(RESULTS)/%/model.h5: $(CONFIGS)/%.yaml | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) build-model $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/trajectories.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) optimize-trajectories $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/samples.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) sample $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/reduction.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) reduce $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/validation.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) validate $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) report $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+.PRECIOUS: $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/report/summary.json

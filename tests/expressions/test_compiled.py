@@ -1,0 +1,64 @@
+import warnings
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.expressions import compiled
+from paramreduce_cli.expressions.compiled import BatchFunction
+
+
+@pytest.fixture(autouse=True)
+def own_cache(tmp_path, monkeypatch):
+    monkeypatch.setenv("PARAMREDUCE_CACHE", str(tmp_path / "cache"))
+    compiled.compiler.cache_clear()
+    yield
+    compiled.compiler.cache_clear()
+
+
+def example():
+    x, y = ca.SX.sym("x", 2), ca.SX.sym("y", 3)
+    return BatchFunction([x, y], [x[0] * y, ca.vertcat(ca.sin(x[1]), y[2])])
+
+
+def check(function):
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(20, 2)), rng.normal(size=(20, 3))
+    one, two = function(x, y)
+    assert np.allclose(one, x[:, :1] * y, atol=1e-15)
+    assert np.allclose(two, np.column_stack([np.sin(x[:, 1]), y[:, 2]]), atol=1e-15)
+
+
+def test_compiled_loop():
+    if compiled.compiler() is None:
+        pytest.skip("there is no C compiler")
+    check(example())
+    assert len(list(compiled.cache_folder().glob("*.so"))) == 1
+    check(example())
+    assert len(list(compiled.cache_folder().glob("*.so"))) == 1
+
+
+def test_without_a_compiler_the_result_is_the_same_and_it_is_said_once(monkeypatch):
+    monkeypatch.delenv("CC", raising=False)
+    monkeypatch.setattr(compiled.shutil, "which", lambda name: None)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        check(example())
+        check(example())
+    assert [w.category for w in caught] == [ParamreduceWarning]
+
+
+def test_a_compiler_that_fails_is_survived(monkeypatch, tmp_path):
+    broken = tmp_path / "broken-cc"
+    broken.write_text("#!/bin/sh\necho 'no such thing' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setenv("CC", str(broken))
+    with pytest.warns(ParamreduceWarning, match="no such thing"):
+        function = example()
+    check(function)
+
+
+def test_states_that_do_not_fit_are_refused():
+    with pytest.raises(ValueError):
+        example()(np.zeros((4, 2)), np.zeros((4, 4)))

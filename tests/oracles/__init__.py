@@ -1,0 +1,1 @@
+"""Independent implementations; none shares code with what it checks."""
