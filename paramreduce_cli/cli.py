@@ -41,7 +41,6 @@ from paramreduce_cli.runner import (
     Outcome,
     Runner,
     Stage,
-    check_accepted,
     pipeline,
     stages_to_run,
 )
@@ -167,7 +166,7 @@ def _stage_command(stage: Stage) -> click.Command:
             outcome = runner.run(stage, force=force)
         if not quiet:
             _say_outcome(outcome)
-        return _exit_code(stage, outcome, store, quiet)
+        return _exit_code(stage, outcome, quiet)
 
     params: list[Any] = [RESULTS, SET, FORCE, QUIET]
     if takes_jobs:
@@ -213,21 +212,23 @@ def _say_outcome(outcome: Outcome) -> None:
     say(f"{outcome.stage}: {state}, {outcome.path}")
 
 
-def _exit_code(stage: Stage, outcome: Outcome, store: Store, quiet: bool) -> int:
-    record = outcome.record
-    if outcome.current and stage.output is Validation:
-        record, _ = load_file(outcome.path, Validation, None, stage.name)
-    verdict = check_accepted(record)
-    if verdict is None:
+def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
+    if stage.output is not Validation:
         return 0
+    record = outcome.record or load_file(outcome.path, Validation, None, stage.name)[0]
     if not quiet:
         for remark in record.remarks:
             _remark(remark.rstrip("."))
-    if not verdict[0]:
-        err.print(f"Not accepted: {verdict[1]}", markup=False)
-    elif not quiet:
-        say(verdict[1])
-    return 0 if verdict[0] else NOT_ACCEPTED
+    return _say_verdict(record.accepted, record.verdict, quiet)
+
+
+def _say_verdict(accepted: bool, verdict: str, quiet: bool) -> int:
+    if not accepted:
+        err.print(f"Not accepted: {verdict}", markup=False)
+        return NOT_ACCEPTED
+    if not quiet:
+        say(verdict)
+    return 0
 
 
 for _stage in pipeline():
@@ -299,12 +300,8 @@ def run(
     if not quiet:
         _say_summary(summary)
         say(f"Report: {store.path(Report).with_name('index.html')}")
-    if not summary["selected"]["accepted"]:
-        err.print(f"Not accepted: {summary['selected']['verdict']}", markup=False)
-        return NOT_ACCEPTED
-    if not quiet:
-        say(summary["selected"]["verdict"])
-    return 0
+    selected = summary["selected"]
+    return _say_verdict(selected["accepted"], selected["verdict"], quiet)
 
 
 def _say_summary(summary: dict[str, Any]) -> None:
@@ -321,7 +318,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
             f"median {kappas[len(kappas) // 2]:.4g}, worst {kappas[-1]:.4g}"
         )
     table = rich.table.Table(title=f"Reduced models with {n} parameters", box=rich.box.SIMPLE)
-    headings = ("heuristic", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "ops d", "ops M|δ")
+    headings = ("heuristic", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "d", "M|δ")
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
     for name, rows in summary["validation"].items():

@@ -6,7 +6,6 @@ from, the return type which artifact is written.
 
 from __future__ import annotations
 
-import dataclasses
 import hashlib
 import inspect
 import json
@@ -14,7 +13,7 @@ import time
 import types
 import typing
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +26,6 @@ from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.artifacts.store import LAYOUTS, Parts, Store, file_digest, file_of, load_file
 from paramreduce_cli.config import Config, section_digest
-from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.records import (
     Coefficients,
     Progress,
@@ -36,6 +34,7 @@ from paramreduce_cli.records import (
     Recordings,
     Report,
     Run,
+    Samples,
     Trajectories,
 )
 from paramreduce_cli.registry import stages
@@ -149,6 +148,27 @@ class Outcome:
     record: Any = None
 
 
+class _Inputs:
+    """What one stage has read so far: sections of the config, and files by their digests."""
+
+    def __init__(self, config: Config | None) -> None:
+        self.config = config
+        self.watched = _Watched(config) if config is not None else None
+        self.digests: dict[str, str] = {}
+
+    def section(self, name: str) -> None:
+        """Note a section that was read on the stage's behalf."""
+        if self.watched is not None:
+            getattr(self.watched, name)
+
+    def files(self, kind: type) -> dict[str, Path]:
+        """Files of a kind that the config names, by name; noted as read."""
+        found = brought_files(self.config, kind)
+        for path in found.values():
+            self.digests[str(path)] = file_digest(path)
+        return found
+
+
 @dataclass
 class Runner:
     """Runs stages on one robot in one folder.
@@ -168,7 +188,6 @@ class Runner:
     progress: Callable[[Progress], None] = lambda _: None
     samples: Path | None = None
     remark: Callable[[str], None] = lambda _: None
-    _brought: dict[str, str] = field(default_factory=dict)
 
     def run(self, stage: Stage, *, force: bool = False) -> Outcome:
         """Run one stage, unless its artifact is up to date.
@@ -182,14 +201,11 @@ class Runner:
             stamp = self.store.stamp(stage.output)
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
-        watched = _Watched(self.config) if self.config is not None else None
-        digests: dict[str, str] = {}
-        arguments = {i.name: self._argument(i, watched, digests) for i in stage.inputs}
-        parts = self._lend_run(stage, arguments, watched, digests)
+        inputs = _Inputs(self.config)
+        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type is not Run}
+        parts = self._lend_run(stage, arguments, inputs)
         record = stage.function(**arguments)
-        # Lazy records read the config while they are written, so sections are stamped twice.
-        stamp = self._stamp(stage, watched, digests, started)
-        self.store.save(record, stamp)
+        self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
             parts.clear()
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
@@ -199,119 +215,95 @@ class Runner:
         stamp = self.store.stamp(stage.output)
         if stamp is None or self.config is None or self.samples is not None:
             return False
-        if (stamp.schema, stamp.stage, stamp.robot) != (SCHEMA, stage.name, self.config.robot):
+        made = (stamp.schema, stamp.stage, stamp.robot, stamp.versions)
+        if made != (SCHEMA, stage.name, self.config.robot, versions()):
             return False
-        if stamp.versions != versions():
-            return False
-        for name, digest in stamp.sections.items():
-            if name not in Config.model_fields:
-                return False
-            if _digest(section_digest(self.config, name)) != digest:
-                return False
-        return stamp.inputs == self._input_digests(stage)
+        return not self._changed_sections(stamp) and stamp.inputs == self._input_digests(stage)
+
+    def _changed_sections(self, stamp: Stamp) -> list[str]:
+        assert self.config is not None
+        return [
+            name
+            for name, digest in stamp.sections.items()
+            if name not in Config.model_fields
+            or _digest(section_digest(self.config, name)) != digest
+        ]
 
     def _input_digests(self, stage: Stage) -> dict[str, str]:
-        digests: dict[str, str] = {}
+        inputs = _Inputs(self.config)
         for entry in stage.inputs:
             if entry.type in ARTIFACTS:
                 stamp = self.store.stamp(entry.type)
                 if stamp is not None:
-                    digests[file_of(entry.type)] = stamp.digest
-            elif entry.type in (Coefficients, Recordings) and self.config is not None:
-                for path in _brought_files(self.config, entry.type).values():
-                    digests[str(path)] = file_digest(path)
-        return digests
+                    inputs.digests[file_of(entry.type)] = stamp.digest
+            else:
+                inputs.files(entry.type)
+        return inputs.digests
 
-    def _argument(
-        self, entry: StageInput, watched: _Watched | None, digests: dict[str, str]
-    ) -> Any:
+    def _argument(self, entry: StageInput, inputs: _Inputs) -> Any:
         if entry.type is Config:
-            return watched
-        if entry.type is Run:
-            return None  # lent once all other inputs are known
+            return inputs.watched
         if entry.type is Provenance:
             return self._provenance()
         if entry.type is Coefficients:
-            return self._coefficients(watched, digests)
+            inputs.section("trajectories")
+            paths = inputs.files(Coefficients)
+            return load_coefficients(paths["coefficients"]) if paths else None
         if entry.type is Recordings:
-            return self._recordings(watched, digests)
-        return self._artifact(entry, digests)
+            return self._recordings(inputs)
+        return self._artifact(entry, inputs)
 
-    def _artifact(self, entry: StageInput, digests: dict[str, str]) -> Any:
-        brought = self.samples if file_of(entry.type) == "samples.h5" else None
+    def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:
+        brought = self.samples if entry.type is Samples else None
         path = brought or self.store.path(entry.type)
         if entry.optional and (not path.exists() or self.config is None):
             return None
         robot = self.config.robot if self.config is not None and brought is None else None
         record, stamp = load_file(path, entry.type, robot, "" if brought else maker_of(entry.type))
-        digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
-        if stamp is not None and brought is None:
-            self._remark_if_stale(entry.type, stamp)
+        inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
+        if stamp is not None and robot is not None:
+            self._remark_if_stale(path, stamp)
         return record
 
-    def _remark_if_stale(self, record: type, stamp: Stamp) -> None:
-        assert self.config is not None
-        changed = [
-            name
-            for name, digest in stamp.sections.items()
-            if name in Config.model_fields and _digest(section_digest(self.config, name)) != digest
-        ]
+    def _remark_if_stale(self, path: Path, stamp: Stamp) -> None:
+        changed = self._changed_sections(stamp)
         if changed:
             self.remark(
-                f"{self.store.path(record)} was made with another {', '.join(changed)} section; "
-                "`paramreduce run` rebuilds it"
+                f"{path} was made with another {', '.join(changed)} section; `paramreduce run` "
+                "rebuilds it"
             )
 
-    def _coefficients(
-        self, watched: _Watched | None, digests: dict[str, str]
-    ) -> Coefficients | None:
-        assert self.config is not None and watched is not None
-        _ = watched.trajectories
-        files = _brought_files(self.config, Coefficients)
-        for path in files.values():
-            digests[str(path)] = file_digest(path)
-            return load_coefficients(path)
-        return None
-
-    def _recordings(self, watched: _Watched | None, digests: dict[str, str]) -> Recordings:
-        assert self.config is not None and watched is not None
-        _ = watched.sampling
+    def _recordings(self, inputs: _Inputs) -> Recordings:
+        assert self.config is not None
+        inputs.section("sampling")
         found: dict[str, Recording | None] = {"estimation": None, "validation": None}
-        for name, path in _brought_files(self.config, Recordings).items():
-            digests[str(path)] = file_digest(path)
+        for name, path in inputs.files(Recordings).items():
             found[name] = load_recording(path, self.config.n_dof)
         return Recordings(**found)
 
-    def _lend_run(
-        self,
-        stage: Stage,
-        arguments: dict[str, Any],
-        watched: _Watched | None,
-        digests: dict[str, str],
-    ) -> Parts | None:
-        lent = next((entry for entry in stage.inputs if entry.type is Run), None)
-        if lent is None:
+    def _lend_run(self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs) -> Parts | None:
+        """Hand workers, finished parts and progress to a stage that asks for them."""
+        asked = next((entry.name for entry in stage.inputs if entry.type is Run), None)
+        if asked is None:
             return None
-        assert self.config is not None and watched is not None
-        # A part belongs to a run with the same settings, seed and inputs.
-        _ = (watched.trajectories, watched.description)
-        stamp = self._stamp(stage, watched, digests, time.perf_counter())
-        folder = self.store.path(stage.output)
-        parts = Parts(folder.with_name(f"{folder.name}.parts"), stamp)
-        arguments[lent.name] = Run(self.jobs, parts, self.progress)
+        # A part may be used again only if nothing that could change it has changed.
+        inputs.section("trajectories")
+        path = self.store.path(stage.output)
+        stamp = self._stamp(stage, inputs, time.perf_counter())
+        parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
+        arguments[asked] = Run(self.jobs, parts, self.progress)
         return parts
 
-    def _stamp(
-        self, stage: Stage, watched: _Watched | None, digests: dict[str, str], started: float
-    ) -> Stamp:
+    def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:
+        config = self.config
         return Stamp(
             schema=SCHEMA,
-            robot=self.config.robot if self.config is not None else self.store.folder.name,
+            robot=config.robot if config is not None else self.store.folder.resolve().name,
             stage=stage.name,
             versions=versions(),
-            sections=watched.digests() if watched is not None else {},
-            inputs=dict(digests),
-            seed=self.config.trajectories.seed if self.config is not None else 0,
+            sections=inputs.watched.digests() if inputs.watched is not None else {},
+            inputs=dict(inputs.digests),
+            seed=config.trajectories.seed if config is not None else 0,
             seconds=time.perf_counter() - started,
         )
 
@@ -326,10 +318,12 @@ class Runner:
         return Provenance(self.config.robot, _digest(text), versions(), seconds)
 
 
-def _brought_files(config: Config, kind: type) -> dict[str, Path]:
-    if kind is Coefficients:
+def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
+    """Files of the user's own that a config names for an input of a stage, by name."""
+    files: dict[str, Path | None] = {}
+    if config is not None and kind is Coefficients:
         files = {"coefficients": config.trajectories.file}
-    else:
+    elif config is not None and kind is Recordings:
         files = {
             "estimation": config.sampling.estimation_file,
             "validation": config.sampling.validation_file,
@@ -339,24 +333,5 @@ def _brought_files(config: Config, kind: type) -> dict[str, Path]:
 
 def stages_to_run(config: Config) -> list[Stage]:
     """The stages of a full run: without trajectories where both sets are recordings."""
-    recorded = len(_brought_files(config, Recordings)) == 2
+    recorded = len(brought_files(config, Recordings)) == 2
     return [s for s in pipeline() if not (recorded and s.output is Trajectories)]
-
-
-def check_accepted(record: Any) -> tuple[bool, str] | None:
-    """The verdict that a record carries, if it carries one."""
-    if dataclasses.is_dataclass(record) and hasattr(record, "accepted"):
-        return bool(record.accepted), str(record.verdict)
-    return None
-
-
-__all__ = [
-    "ARTIFACTS",
-    "Outcome",
-    "ParamreduceError",
-    "Runner",
-    "Stage",
-    "check_accepted",
-    "pipeline",
-    "stages_to_run",
-]

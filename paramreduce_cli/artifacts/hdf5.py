@@ -7,11 +7,13 @@ one, so that a crash or a full disk leaves what was there before.
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import errno
 import hashlib
 import json
 import os
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -117,10 +119,12 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
     Raises:
         ArtifactError: It cannot be written.
     """
+    started = time.perf_counter()
     with atomically(path) as temporary, h5py.File(temporary, "w") as file:
         writer = Writer(file)
         fill(writer)
-        done = Stamp(**{**stamp.__dict__, "digest": writer.digest})
+        seconds = stamp.seconds + time.perf_counter() - started
+        done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
         for name, value in _attributes(done).items():
             file.attrs[name] = value
     return done

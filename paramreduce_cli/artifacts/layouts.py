@@ -6,6 +6,7 @@ docs/artifacts.md describes the same for people, with shapes and units.
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 from collections.abc import Iterator
 from pathlib import Path
@@ -224,18 +225,13 @@ class StoredSet:
                         f"{self._path}: /{base} holds numbers that are not finite between samples "
                         f"{start} and {stop}. Remove those samples."
                     )
-                yield Block(
-                    int(owner[start]),
-                    time[start:stop],
-                    *self._states(reader, start, stop),
-                    tau_block,
-                    W_block,
-                )
+                z, dz, ddz = self._states(reader, start, stop)
+                yield Block(int(owner[start]), time[start:stop], z, dz, ddz, tau_block, W_block)
 
-    def _states(self, reader: Reader, start: int, stop: int) -> tuple[FloatArray, ...]:
+    def _states(self, reader: Reader, start: int, stop: int) -> list[FloatArray]:
         if not self._has_states:
-            return tuple(np.full((stop - start, self.n_dof), np.nan) for _ in range(3))
-        return tuple(reader.rows(f"{self._name}/{key}")[start:stop] for key in ("z", "dz", "ddz"))
+            return [np.full((stop - start, self.n_dof), np.nan)] * 3
+        return [reader.rows(f"{self._name}/{key}")[start:stop] for key in ("z", "dz", "ddz")]
 
     def _column(self, reader: Reader, key: str) -> FloatArray:
         name = f"{self._name}/{key}"
@@ -252,7 +248,7 @@ class StoredSet:
 def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
     """Consecutive ranges of samples, none longer than ``most`` or over two trajectories."""
     edges = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), owner.size]
-    for first, last in zip(edges[:-1], edges[1:], strict=True):
+    for first, last in itertools.pairwise(edges):
         for start in range(first, last, most):
             yield start, min(start + most, last)
 

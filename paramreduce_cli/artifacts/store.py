@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import hashlib
 import json
 import os
@@ -234,7 +235,7 @@ def _save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
         digest.update(name.encode() + content)
         with atomically(folder / name) as path:
             path.write_bytes(content)
-    done = Stamp(**{**stamp.__dict__, "digest": digest.hexdigest()})
+    done = dataclasses.replace(stamp, digest=digest.hexdigest())
     summary = {**report.summary, "provenance": done.__dict__}
     with atomically(folder / Path(SUMMARY).name) as path:
         path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")

@@ -127,7 +127,9 @@ def _load(function: ca.Function) -> ctypes.CDLL | None:
     if cc is None:
         return None
     text = _c_text(function)
-    digest = hashlib.sha256("\n".join([text, cc, *_FLAGS, ca.__version__]).encode()).hexdigest()
+    digest = hashlib.sha256(
+        "\n".join([text, cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
+    ).hexdigest()
     try:
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)

@@ -32,7 +32,7 @@ def preference_order(names: tuple[str, ...]) -> IntArray:
     after all others. This order breaks every tie in the project.
     """
     rank = {kind: k for k, kind in enumerate(PREFERENCE)}
-    kinds = [rank.get(name.split("_", 1)[0], len(PREFERENCE)) for name in names]
+    kinds = np.array([rank.get(name.split("_", 1)[0], len(PREFERENCE)) for name in names])
     return np.lexsort((np.arange(len(names)), kinds)).astype(np.int64)
 
 
@@ -107,7 +107,7 @@ def independent_columns(scaled: FloatArray, wanted: list[int], rank: int) -> lis
 
     A column is dependent when no more of it is left than the square root of the rounding unit.
     """
-    residual = np.linalg.qr(scaled, mode="r")
+    residual: FloatArray = np.linalg.qr(scaled, mode="r")  # type: ignore[assignment]
     basis = np.empty((residual.shape[0], 0))
     taken: list[int] = []
     for k in wanted:

@@ -71,7 +71,7 @@ def mass_matrix(mechanism: Mechanism, z: ca.SX, phi: ca.SX) -> list[list[ca.SX]]
 
 def _unit_acceleration(joint: JointMotion, body: BodyInertia) -> tuple[Vector, Vector]:
     """Wrench about the body's origin that gives its joint a unit acceleration from rest."""
-    axis = joint.axis().tolist()
+    axis = joint.axis()
     if joint.body.joint == "prismatic":
         return scale(body.m, axis), cross(body.moment, axis)
     spin = tuple(dot(axis, row) for row in body.tensor)
@@ -82,7 +82,7 @@ def _unit_acceleration(joint: JointMotion, body: BodyInertia) -> tuple[Vector, V
 
 def _along(joint: JointMotion, force: Vector, moment: Vector) -> ca.SX:
     """Component of a wrench about the body's origin along the joint."""
-    axis = joint.axis().tolist()
+    axis = joint.axis()
     if joint.body.joint == "prismatic":
         return dot(axis, force)
     return dot(axis, add(moment, cross(joint.arm(), force)))
@@ -126,7 +126,7 @@ def _shift(tensor: Matrix, r: Vector, old: Vector, new: Vector) -> Matrix:
 
 def _turn(rotation: list[list[float]], tensor: Matrix) -> Matrix:
     """R I R' for a constant rotation; by its quarter turns where it has them."""
-    half = [[dot(tensor[i], tuple(rotation[j])) for j in range(3)] for i in range(3)]
+    half = [[dot(rotation[j], tensor[i]) for j in range(3)] for i in range(3)]
     full = [
         [
             rotation[i][0] * half[0][j] + rotation[i][1] * half[1][j] + rotation[i][2] * half[2][j]

@@ -101,7 +101,7 @@ def body_motions(
             omega, omega_dot = before.omega, before.omega_dot
             acceleration = add(before.acceleration, apply(before.U, joint.origin))
         omega, omega_dot, acceleration = map(joint.to_body, (omega, omega_dot, acceleration))
-        axis = [ca.SX(component) for component in joint.axis().tolist()]
+        axis = joint.axis()
         if body.joint == "revolute":
             turning = scale(dz[i], axis)
             rise = add(scale(ddz[i], axis), cross(omega, turning))
@@ -174,7 +174,7 @@ def transmit(
     tau = [ca.SX(0)] * mechanism.n_dof
     for i in reversed(range(mechanism.n_dof)):
         joint = joints[i]
-        axis = joint.axis().tolist()
+        axis = joint.axis()
         if joint.body.joint == "revolute":
             about_axis = add(moments[i], cross(joint.arm(), forces[i]))
             tau[i] = dot(axis, about_axis)

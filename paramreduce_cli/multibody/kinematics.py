@@ -77,9 +77,10 @@ class JointMotion:
         turned = (self.cosine * x - self.sine * y, self.cosine * y + self.sine * x, z)
         return apply(self.body.before[:3, :3].tolist(), turned)
 
-    def axis(self) -> FloatArray:
-        """The joint's axis in the body's frame, (3,)."""
-        return self.body.after[2, :3].copy()
+    def axis(self) -> Vector:
+        """The joint's axis in the body's frame."""
+        x, y, z = self.body.after[2, :3].tolist()
+        return (ca.SX(x), ca.SX(y), ca.SX(z))
 
     def arm(self) -> Vector:
         """From a fixed point of the joint's axis to the body's origin, in the body's frame, m."""

@@ -104,12 +104,17 @@ def joint_factors(blocks: Iterable[Block]) -> FloatArray:
 def append_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
     """Triangular factor of [factor; rows]."""
     stacked = np.vstack([factor, rows])
-    return np.linalg.qr(stacked, mode="r") if stacked.shape[0] > stacked.shape[1] else stacked
+    return _triangular(stacked) if stacked.shape[0] > stacked.shape[1] else stacked
+
+
+def _triangular(rows: FloatArray) -> FloatArray:
+    result: FloatArray = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
+    return result
 
 
 def _square(factor: FloatArray) -> FloatArray:
     size = factor.shape[1]
-    triangular = np.linalg.qr(factor, mode="r")
+    triangular = _triangular(factor)
     result = np.zeros((size, size))
     result[: triangular.shape[0]] = triangular
     return result

@@ -57,15 +57,17 @@ def named_coefficient(values: Sequence[float], functions: Sequence[dict[str, flo
     Returns:
         Such as ``- a_3^2``; None where no function fits all geometries, or more than one does.
     """
-    found = []
-    for text in functions[0]:
-        known = [f[text] for f in functions]
-        for sign in (1.0, -1.0):
-            if all(
-                abs(v - sign * k) <= _MATCH * abs(k) for v, k in zip(values, known, strict=True)
-            ):
-                found.append(f"{'+' if sign > 0 else '-'} {text}".rstrip())
+    found = [
+        f"{'+' if sign > 0 else '-'} {text}".rstrip()
+        for text in functions[0]
+        for sign in (1.0, -1.0)
+        if all(_same(v, sign * f[text]) for v, f in zip(values, functions, strict=True))
+    ]
     return found[0] if len(found) == 1 else None
+
+
+def _same(a: float, b: float) -> bool:
+    return abs(a - b) <= _MATCH * abs(b)
 
 
 def regrouping_expressions(

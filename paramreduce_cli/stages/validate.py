@@ -189,7 +189,8 @@ def _select(config: Config, model: Model, reduction: Reduction) -> Selected:
 def _verdict(config: Config, selected: Selected, result: HeuristicValidation) -> tuple[bool, str]:
     """Whether the selected model keeps to the limits of the config, and the sentence for it."""
     limits = config.validation.accept
-    met, missed = [], []
+    met: list[str] = []
+    missed: list[str] = []
     for key in type(limits).model_fields:
         limit = getattr(limits, key)
         if limit is None:

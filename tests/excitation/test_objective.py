@@ -1,0 +1,114 @@
+import numpy as np
+import pytest
+from conftest import puma_mechanism
+
+from paramreduce_cli import registry
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.limits import JointLimits, LimitMap
+from paramreduce_cli.excitation.objective import Excitation, FreeObjective
+from paramreduce_cli.multibody.base_parameters import base_parameters, preference_order
+from paramreduce_cli.multibody.dynamics import Dynamics
+
+NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
+
+
+@pytest.fixture(scope="module")
+def parts():
+    mechanism = puma_mechanism()
+    dynamics = Dynamics(mechanism)
+    rng = np.random.default_rng(0)
+    K = dynamics.regressor(*(rng.normal(size=(100, 6)) for _ in range(3)))
+    base = base_parameters(K.reshape(-1, 60), preference_order(mechanism.parameter_names), 1e-9)
+    return dynamics, base
+
+
+def excitation(parts, criterion="condition-number", scaling="column-normalised"):
+    dynamics, base = parts
+    observation = dynamics.observation(base.columns)
+    return Excitation(
+        observation.forward,
+        observation.adjoint,
+        base.beta,
+        NOMINAL,
+        registry.criterion[criterion],
+        registry.scaling[scaling],
+    )
+
+
+def basis_and_limits(mapping="gauge", acceleration=np.inf):
+    basis = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 100))
+    limits = JointLimits(
+        np.full(6, -1.2), np.full(6, 1.6), np.full(6, 1.45), np.full(6, acceleration)
+    )
+    return basis, LimitMap(limits, basis, mapping), limits
+
+
+@pytest.mark.parametrize("mapping", ["gauge", "ball"])
+@pytest.mark.parametrize("scaling", list(registry.scaling))
+@pytest.mark.parametrize("criterion", list(registry.criterion))
+def test_gradients_against_finite_differences(parts, criterion, scaling, mapping):
+    basis, limits, _ = basis_and_limits(mapping)
+    objective = FreeObjective(excitation(parts, criterion, scaling), basis, limits, 4, 30)
+    rng = np.random.default_rng(1)
+    x = rng.normal(size=54) * 0.5
+    _, gradient = objective(x)
+    for _ in range(4):
+        direction = rng.normal(size=54)
+        step = 1e-6
+        slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
+            2 * step
+        )
+        assert slope == pytest.approx(gradient @ direction, rel=2e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("scaling", list(registry.scaling))
+def test_sharp_objective_is_the_logarithm_of_the_condition_number(parts, scaling):
+    measured = excitation(parts, scaling=scaling)
+    basis, limits, _ = basis_and_limits()
+    coefficients = limits.scaled(np.random.default_rng(2).normal(size=(6, 9)))
+    value, _ = measured.value_and_gradient(basis, coefficients, np.inf)
+    kappa = measured.condition_numbers(basis.states(coefficients))[scaling]
+    assert np.exp(value) == pytest.approx(kappa, rel=1e-4)
+
+
+def test_variants_by_their_definitions(parts):
+    dynamics, base = parts
+    basis, limits, _ = basis_and_limits()
+    states = basis.states(limits.scaled(np.random.default_rng(3).normal(size=(6, 9))))
+    W = dynamics.regressor(*states).reshape(-1, 60) / np.tile(NOMINAL, 100)[:, None]
+    Wb = W[:, base.columns]
+    equilibrated = Wb / np.abs(Wb).max(axis=0)
+    equilibrated = equilibrated / np.abs(equilibrated).max(axis=1, keepdims=True)
+    singular = np.linalg.svd(W, compute_uv=False)
+    expected = {
+        "column-normalised": np.linalg.cond(Wb / np.linalg.norm(Wb, axis=0)),
+        "weighted": np.linalg.cond(Wb),
+        "equilibrated": np.linalg.cond(equilibrated),
+        "full": singular[0] / singular[35],
+    }
+    found = excitation(parts).condition_numbers(states)
+    assert found == pytest.approx(expected, rel=1e-8)
+
+
+@pytest.mark.parametrize("acceleration", [np.inf, 2.0])
+def test_limits_hold_between_the_grid_points_and_are_reached(acceleration):
+    _, limits, given = basis_and_limits("gauge", acceleration)
+    coefficients = limits.scaled(np.random.default_rng(4).normal(size=(6, 9)))
+    fine = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 5000))
+    z, dz, ddz = fine.states(coefficients)
+    assert (z >= given.lower).all()
+    assert (z <= given.upper).all()
+    assert (np.abs(dz) <= given.velocity).all()
+    assert (np.abs(ddz) <= given.acceleration).all()
+    shares = np.maximum(np.abs(z - given.middle).max(axis=0) / given.reach,
+                        np.abs(dz).max(axis=0) / given.velocity)  # fmt: skip
+    shares = np.maximum(shares, np.abs(ddz).max(axis=0) / given.acceleration)
+    assert (shares > 0.97).all()
+
+
+def test_the_ball_leaves_small_series_alone():
+    _, limits, _ = basis_and_limits("ball")
+    small = np.random.default_rng(5).normal(size=(6, 9)) * 1e-3
+    coefficients, _ = limits.admissible(small, 30)
+    coefficients[:, 0] -= 0.2  # the middle of the range
+    assert np.allclose(coefficients, small, rtol=1e-12)

@@ -1,0 +1,59 @@
+import numpy as np
+import pytest
+from conftest import branching_tree, random_states
+
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Block
+from paramreduce_cli.reduction.acceleration import acceleration_errors
+
+
+def setup(seed=0):
+    mechanism = branching_tree()
+    dynamics = Dynamics(mechanism)
+    rng = np.random.default_rng(seed)
+    phi = np.zeros(50)
+    for k in range(5):
+        phi[10 * k] = 2.0
+        phi[10 * k + 4], phi[10 * k + 7], phi[10 * k + 9] = rng.uniform(1, 2, size=3)
+    z, dz, ddz = random_states(mechanism, 30, seed)
+    W = dynamics.regressor(z, dz, ddz).reshape(-1, 50)
+    tau = (W @ phi).reshape(-1, 5)
+    return dynamics, phi, [Block(0, z[:, 0], z, dz, ddz, tau, W)]
+
+
+def test_the_full_model_predicts_the_accelerations():
+    dynamics, phi, blocks = setup()
+    found = acceleration_errors(blocks, dynamics.direct_regressor, phi[:, None], np.ones(5))
+    assert found.error[0] < 1e-10
+    assert found.smallest_eigenvalue[0] > 0
+
+
+def test_error_condition_and_eigenvalue_by_definition():
+    dynamics, phi, blocks = setup()
+    reduced = phi.copy()
+    reduced[[4, 17, 29]] *= 0.9
+    nominal = np.array([1.0, 2.0, 0.5, 3.0, 1.5])
+    found = acceleration_errors(
+        blocks, dynamics.direct_regressor, np.column_stack([phi, reduced]), nominal
+    )
+    (b,) = blocks
+    A, B = dynamics.direct_regressor(b.z, b.dz)
+    errors, conditions, smallest = [], [], []
+    for k in range(30):
+        M = A[k] @ reduced
+        errors.append((np.linalg.solve(M, b.tau[k] - B[k] @ reduced) - b.ddz[k]) / nominal)
+        conditions.append(np.linalg.cond(M))
+        smallest.append(np.linalg.eigvalsh(M)[0])
+    expected = np.linalg.norm(errors) / np.linalg.norm(b.ddz / nominal)
+    assert found.error[1] == pytest.approx(expected, rel=1e-9)
+    assert found.condition[1] == pytest.approx(max(conditions), rel=1e-9)
+    assert found.smallest_eigenvalue[1] == pytest.approx(min(smallest), rel=1e-9)
+
+
+def test_a_singular_mass_matrix_is_an_infinite_error():
+    dynamics, phi, blocks = setup()
+    one = np.zeros((50, 1))
+    one[0] = 1.0
+    found = acceleration_errors(blocks, dynamics.direct_regressor, one, np.ones(5))
+    assert np.isinf(found.error[0])
+    assert np.isinf(found.condition[0])
