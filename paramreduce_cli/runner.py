@@ -196,6 +196,7 @@ class Runner:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
         """
         path = self.store.path(stage.output)
+        self._remark_if_stale(stage)
         if not force and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
@@ -261,17 +262,20 @@ class Runner:
         robot = self.config.robot if self.config is not None and brought is None else None
         record, stamp = load_file(path, entry.type, robot, "" if brought else maker_of(entry.type))
         inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
-        if stamp is not None and robot is not None:
-            self._remark_if_stale(path, stamp)
         return record
 
-    def _remark_if_stale(self, path: Path, stamp: Stamp) -> None:
-        changed = self._changed_sections(stamp)
-        if changed:
-            self.remark(
-                f"{path} was made with another {', '.join(changed)} section; `paramreduce run` "
-                "rebuilds it"
-            )
+    def _remark_if_stale(self, stage: Stage) -> None:
+        """Say which inputs were made with a config that has changed since."""
+        for entry in stage.artifacts:
+            stamp = self.store.stamp(entry.type)
+            if self.config is None or stamp is None:
+                continue
+            changed = self._changed_sections(stamp)
+            if changed:
+                self.remark(
+                    f"{self.store.path(entry.type)} was made with another {', '.join(changed)} "
+                    "section; `paramreduce run` rebuilds it"
+                )
 
     def _recordings(self, inputs: _Inputs) -> Recordings:
         assert self.config is not None

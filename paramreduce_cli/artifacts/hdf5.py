@@ -47,11 +47,71 @@ class Stamp:
     """Of all datasets; set when the file is complete."""
 
 
-class Writer:
-    """Writes datasets and digests them as they pass."""
+class _PatientFile:
+    """A file for HDF5 to write to that keeps the first error to itself.
 
-    def __init__(self, group: h5py.Group) -> None:
+    HDF5 cannot close a file whose disk is full and takes the process down at its end. So
+    after an error writing goes on into nothing, the file is closed in peace, and
+    :meth:`check` raises what happened.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._file = path.open("r+b", buffering=0)
+        self._error: OSError | None = None
+
+    def check(self) -> None:
+        """Raise the error that was kept, if there is one."""
+        if self._error is not None:
+            raise self._error
+
+    def write(self, data: Any) -> int:
+        view = memoryview(data).cast("B")
+        done = 0
+        try:
+            while self._error is None and done < len(view):
+                done += self._file.write(view[done:])
+        except OSError as error:
+            self._error = error
+        return len(view)
+
+    def truncate(self, size: int) -> int:
+        try:
+            if self._error is None:
+                self._file.truncate(size)
+        except OSError as error:
+            self._error = error
+        return size
+
+    def readinto(self, buffer: Any) -> int:
+        return self._file.readinto(buffer) or 0
+
+    def read(self, size: int = -1) -> bytes:
+        return self._file.read(size) or b""
+
+    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+    def flush(self) -> None:
+        """Nothing is buffered."""
+
+    def close(self) -> None:
+        self._file.close()
+
+
+class Writer:
+    """Writes datasets and digests them as they pass.
+
+    Args:
+        group: Where to.
+        check: Raises an error that writing met so far.
+    """
+
+    def __init__(self, group: h5py.Group, check: Callable[[], None]) -> None:
         self._group = group
+        self._check = check
         self._hash = hashlib.sha256()
 
     @property
@@ -101,6 +161,7 @@ class Writer:
         return append
 
     def _note(self, name: str, content: bytes) -> None:
+        self._check()
         self._hash.update(name.encode())
         self._hash.update(content)
 
@@ -120,13 +181,15 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
         ArtifactError: It cannot be written.
     """
     started = time.perf_counter()
-    with atomically(path) as temporary, h5py.File(temporary, "w") as file:
-        writer = Writer(file)
-        fill(writer)
-        seconds = stamp.seconds + time.perf_counter() - started
-        done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
-        for name, value in _attributes(done).items():
-            file.attrs[name] = value
+    with atomically(path) as temporary, contextlib.closing(_PatientFile(temporary)) as disk:
+        with h5py.File(disk, "w") as file:
+            writer = Writer(file, disk.check)
+            fill(writer)
+            seconds = stamp.seconds + time.perf_counter() - started
+            done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
+            for name, value in _attributes(done).items():
+                file.attrs[name] = value
+        disk.check()
     return done
 
 

@@ -110,6 +110,7 @@ def save_trajectory_set(writer: Writer, name: str, items: tuple[Trajectory, ...]
     """One group of trajectories."""
     writer.dataset(f"{name}/coefficients", np.array([t.coefficients for t in items]))
     writer.dataset(f"{name}/condition_number", [t.kappa for t in items])
+    writer.dataset(f"{name}/scalings", list(items[0].kappa_variants))
     for variant in items[0].kappa_variants:
         values = [t.kappa_variants[variant] for t in items]
         writer.dataset(f"{name}/condition_number_variants/{variant}", values)
@@ -135,7 +136,7 @@ def load_trajectory_set(reader: Reader, name: str) -> tuple[Trajectory, ...]:
     kappa = reader.array(f"{name}/condition_number", 1)
     variants = {
         key: reader.array(f"{name}/condition_number_variants/{key}", 1)
-        for key in reader.file[f"{name}/condition_number_variants"]
+        for key in reader.texts(f"{name}/scalings")
     }
     columns = {key: reader.array(f"{name}/{key}") for key in _PER_JOINT + _SCALARS}
     status = reader.texts(f"{name}/status")

@@ -112,7 +112,7 @@ class _Call(ca.Callback):
         name: str,
         inputs: list[ca.Sparsity],
         outputs: list[ca.Sparsity],
-        function: Callable[[FloatArray], list],
+        function: Callable[..., list],
     ) -> None:
         ca.Callback.__init__(self)
         self._inputs, self._outputs, self._function = inputs, outputs, function
@@ -131,7 +131,7 @@ class _Call(ca.Callback):
         return self._outputs[i]
 
     def eval(self, arguments: list[ca.DM]) -> list:
-        return self._function(np.array(arguments[0].nonzeros()))
+        return self._function(*(np.array(argument.nonzeros()) for argument in arguments))
 
 
 def minimise(
@@ -160,11 +160,12 @@ def minimise(
     upper = ca.Sparsity.upper(n)
     rows, columns = (np.array(index) for index in upper.get_triplet())
 
-    def hessian(x: FloatArray) -> list:
-        return [ca.DM(upper, memory.curvature_at(x)[rows, columns])]
+    def hessian(x: FloatArray, _p: FloatArray, scale: FloatArray, _g: FloatArray) -> list:
+        # IPOPT scales steep objectives and says so through the objective's multiplier.
+        return [ca.DM(upper, scale[0] * memory.curvature_at(x)[rows, columns])]
 
     value = _Call("f", [x_sparsity], [scalar], lambda x: [memory.at(x)[0]])
-    slope = _Call("grad_f", [x_sparsity, none], [scalar, x_sparsity], lambda x: [*memory.at(x)])
+    slope = _Call("grad_f", [x_sparsity, none], [scalar, x_sparsity], lambda x, _: [*memory.at(x)])
     bend = _Call("hess_lag", [x_sparsity, none, scalar, none], [upper], hessian)
     x = ca.MX.sym("x", n)
     options = {

@@ -130,6 +130,8 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
         yield from _exact(f"parameters ordered, {name}", len(x), len(y))
         errors = zip(a["validation"][name], b["validation"][name], strict=False)
         for n, (row_a, row_b) in enumerate(errors, start=1):
+            if n > min(len(x), len(y)):
+                break
             if set(x[:n]) == set(y[:n]):
                 continue
             p, q = (row["torque_error"]["estimation"] for row in (row_a, row_b))

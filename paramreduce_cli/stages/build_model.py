@@ -34,7 +34,7 @@ def build_model(config: Config) -> Model:
     """
     mechanism = _mechanism(config, 1.0)
     rng = np.random.default_rng(config.model.seed)
-    states = _random_states(config, mechanism, rng)
+    states = _random_states(mechanism, rng)
     K = Dynamics(mechanism).regressor(*states)
     W = K.reshape(-1, K.shape[2])
     values = config.standard_parameters()
@@ -117,12 +117,13 @@ def _parent(given: str | None, above: str | None) -> str | None:
 
 
 def _random_states(
-    config: Config, mechanism: Mechanism, rng: np.random.Generator
+    mechanism: Mechanism, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Anywhere within the position limits; speeds and accelerations normal."""
-    limits = np.array(config.trajectories.position_limits, dtype=float)
+    """Anywhere: whole turns, slides as long as the arm, speeds and accelerations normal."""
+    longest = max((abs(length) for length in mechanism.lengths.values()), default=1.0)
+    reach = [np.pi if body.joint == "revolute" else longest for body in mechanism.bodies]
     shape = (_STATES, mechanism.n_dof)
-    z = rng.uniform(limits[:, 0], limits[:, 1], size=shape)
+    z = rng.uniform(-1, 1, size=shape) * reach
     return z, rng.normal(size=shape), rng.normal(size=shape)
 
 

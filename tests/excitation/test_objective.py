@@ -54,11 +54,11 @@ def test_gradients_against_finite_differences(parts, criterion, scaling, mapping
     _, gradient = objective(x)
     for _ in range(4):
         direction = rng.normal(size=54)
-        step = 1e-6
+        step = 1e-4
         slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
             2 * step
         )
-        assert slope == pytest.approx(gradient @ direction, rel=2e-4, abs=1e-6)
+        assert slope == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-4)
 
 
 @pytest.mark.parametrize("scaling", list(registry.scaling))

@@ -17,9 +17,7 @@ def small():
 def test_results_do_not_depend_on_the_number_of_processes(small):
     config, model = small
     one, two = (optimize_trajectories(config, model, None, Run(jobs)) for jobs in (1, 2))
-    for a, b in zip(
-        one.estimation + one.validation, two.estimation + two.validation, strict=True
-    ):
+    for a, b in zip(one.estimation + one.validation, two.estimation + two.validation, strict=True):
         assert np.array_equal(a.coefficients, b.coefficients)
 
 

@@ -41,7 +41,9 @@ def test_norms_by_their_definitions():
     models = rng.normal(size=(4, 2))
     states = np.zeros((20, 3))
     blocks = [
-        Block(0, states[k : k + 7, 0], *[states[k : k + 7]] * 3, tau[k : k + 7], W[3 * k : 3 * k + 21])
+        Block(
+            0, states[k : k + 7, 0], *[states[k : k + 7]] * 3, tau[k : k + 7], W[3 * k : 3 * k + 21]
+        )
         for k in range(0, 20, 7)
     ]
     found = torque_errors(blocks, models, weights)

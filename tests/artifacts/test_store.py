@@ -1,0 +1,194 @@
+import dataclasses
+import resource
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+
+from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
+from paramreduce_cli.artifacts.layouts import mechanism_from_json, mechanism_to_json
+from paramreduce_cli.artifacts.store import LAYOUTS, Parts, Store, load_file
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.records import Model, Reduction, Samples, Trajectories, Validation
+
+
+def stamp(robot="arm", stage="build-model", **changes):
+    versions = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
+    made = Stamp(SCHEMA, robot, stage, versions, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)
+    return dataclasses.replace(made, **changes)
+
+
+def same(a, b):
+    if dataclasses.is_dataclass(a):
+        return all(same(getattr(a, f.name), getattr(b, f.name)) for f in dataclasses.fields(a))
+    if isinstance(a, np.ndarray):
+        return np.array_equal(a, b, equal_nan=True)
+    if isinstance(a, dict):
+        return list(a) == list(b) and all(same(a[k], b[k]) for k in a)
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(same, a, b))
+    return a == b
+
+
+@pytest.mark.parametrize("record", [Model, Trajectories, Reduction, Validation])
+def test_records_survive_being_written_and_read(record, two_link_copy):
+    store = Store(two_link_copy)
+    first, made = store.load(record, "two_link", "")
+    store.save(first, made)
+    second, again = store.load(record, "two_link", "")
+    assert same(first, second)
+    assert again.digest == made.digest
+
+
+def test_samples_are_what_the_layout_says(two_link_results):
+    with h5py.File(two_link_results / "samples.h5") as file:
+        z, W, tau = (file[f"estimation/{key}"][:] for key in ("z", "W", "tau"))
+        phi = file["parameters/values"][:]
+        t = file["estimation/time"][:]
+        assert z.shape == (80, 2)
+        assert W.shape == (160, 20)
+        assert np.allclose((W @ phi).reshape(-1, 2), tau, atol=1e-13)
+        assert t[:40] == pytest.approx(np.arange(40) * 2 * np.pi / 40)
+        with h5py.File(two_link_results / "trajectories.h5") as series:
+            q0, a1, b1, a2, b2 = series["estimation/coefficients"][0, 1]
+        t = t[:40]
+        expected = (
+            q0 + a1 * np.sin(t) - b1 * np.cos(t) + a2 / 2 * np.sin(2 * t) - b2 / 2 * np.cos(2 * t)
+        )
+        assert z[:40, 1] == pytest.approx(expected)
+
+
+def test_a_mechanism_survives_as_text(mechanism):
+    assert same(mechanism_from_json(mechanism_to_json(mechanism)), mechanism)
+
+
+def test_names_relied_on_outside(two_link_results):
+    expected = {
+        "model.h5": ["parameters/names", "parameters/values", "parameters/affecting", "base/columns",
+                     "base/beta", "coordinates/names", "nominal_torque", "mechanism"],
+        "trajectories.h5": ["estimation/coefficients", "validation/coefficients",
+                            "estimation/condition_number"],
+        "samples.h5": [f"{s}/{k}" for s in ("estimation", "validation")
+                       for k in ("time", "z", "dz", "ddz", "tau", "W")] + ["nominal_acceleration"],
+        "reduction.h5": ["qr/order", "qr/torque_error", "qr/parameters/3", "qr/seconds"],
+        "validation.h5": [f"qr/{k}" for k in (
+            "n", "torque_error_estimation", "torque_error_validation", "acceleration_error_estimation",
+            "acceleration_error_validation", "operations_inverse", "operations_direct",
+            "mass_matrix_condition")],
+    }  # fmt: skip
+    for name, datasets in expected.items():
+        with h5py.File(two_link_results / name) as file:
+            assert not [d for d in datasets if d not in file]
+            for attribute in ("schema", "robot", "stage", "paramreduce_version", "numpy_version",
+                              "config_sections", "inputs", "seed", "wall_seconds"):  # fmt: skip
+                assert attribute in file.attrs
+    with h5py.File(two_link_results / "trajectories.h5") as file:
+        assert file.attrs["period"] == pytest.approx(2 * np.pi)
+    with h5py.File(two_link_results / "model.h5") as file:
+        assert file["base/beta"].shape == (6, 14)
+
+
+def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
+    path = tmp_path / "x.h5"
+    write(path, stamp(), lambda w: w.dataset("a", 1))
+    before = path.read_bytes()
+
+    def fail(writer: Writer) -> None:
+        writer.dataset("a", 2)
+        raise OSError(28, "No space left on device")
+
+    with pytest.raises(ArtifactError, match="disk is full"):
+        write(path, stamp(), fail)
+    assert path.read_bytes() == before
+    assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
+
+
+def test_a_disk_that_fills_up(two_link_copy):
+    """A limit on file size stands in for a full disk; the old samples must survive."""
+    samples = two_link_copy / "samples.h5"
+    before = samples.read_bytes()
+    from conftest import CONFIGS
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "paramreduce_cli", "sample", CONFIGS / "two_link.yaml",
+         "--results", two_link_copy, "--force", "--quiet"],
+        capture_output=True, text=True, preexec_fn=limit, check=False,
+    )  # fmt: skip
+    assert done.returncode == 2
+    assert "samples.h5: cannot be written" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert samples.read_bytes() == before
+    assert not list(two_link_copy.glob(".*.tmp"))
+
+
+@pytest.mark.parametrize("damage", ["missing", "truncated", "foreign", "text", "empty"])
+@pytest.mark.parametrize("record", list(LAYOUTS))
+def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy):
+    store = Store(two_link_copy)
+    path = store.path(record)
+    if damage == "missing":
+        path.unlink()
+    elif damage == "truncated":
+        path.write_bytes(path.read_bytes()[:1000])
+    elif damage == "foreign":
+        path.unlink()
+        with h5py.File(path, "w") as file:
+            file["something"] = 1.0
+    elif damage == "text":
+        path.write_text("z1,z2\n1,2\n")
+    else:
+        path.write_bytes(b"")
+    with pytest.raises(ArtifactError, match=path.name):
+        store.load(record, "two_link", "make-it")
+
+
+@pytest.mark.parametrize("record", list(LAYOUTS))
+def test_a_file_without_one_of_its_datasets_is_refused(record, two_link_copy):
+    path = Store(two_link_copy).path(record)
+    victims = {Model: "base/beta", Trajectories: "validation/coefficients", Samples: "estimation/W",
+               Reduction: "qr/order", Validation: "qr/n"}  # fmt: skip
+    with h5py.File(path, "a") as file:
+        del file[victims[record]]
+    with pytest.raises(ArtifactError, match=victims[record]):
+        load_file(path, record, "two_link", "")
+
+
+def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
+    store = Store(two_link_copy)
+    with pytest.raises(ArtifactError, match="belongs to the robot two_link, not to other"):
+        store.load(Model, "other", "")
+    with h5py.File(store.path(Model), "a") as file:
+        file.attrs["schema"] = SCHEMA - 1
+    with pytest.raises(ArtifactError, match="older layout.*paramreduce run"):
+        store.load(Model, "two_link", "")
+
+
+def test_one_run_at_a_time(tmp_path):
+    store = Store(tmp_path)
+    with store.locked(), pytest.raises(ArtifactError, match="another run"), store.locked():
+        pass
+    with store.locked():
+        pass
+
+
+def test_parts_belong_to_one_origin(two_link_results, tmp_path):
+    trajectories, _ = Store(two_link_results).load(Trajectories, "two_link", "")
+    parts = Parts(tmp_path / "parts", stamp())
+    parts["a"] = trajectories.estimation[0]
+    assert same(parts["a"], trajectories.estimation[0])
+    assert "a" not in Parts(tmp_path / "parts", stamp(sections={"model": "changed"}))
+    (tmp_path / "parts" / "a.h5").write_bytes(b"cut off")
+    assert "a" not in parts
+    parts.clear()
+    assert not (tmp_path / "parts").exists()
+
+
+def test_stamp_survives(tmp_path):
+    made = write(tmp_path / "x.h5", stamp(), lambda w: w.dataset("a", [1.0, 2.0]))
+    assert read_stamp(tmp_path / "x.h5") == made
+    assert made.digest

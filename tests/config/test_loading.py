@@ -1,0 +1,200 @@
+import re
+import warnings
+
+import numpy as np
+import pytest
+from conftest import CONFIGS
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from paramreduce_cli.config import config_schema, load_config
+from paramreduce_cli.config.template import dh_template
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+
+pytestmark = pytest.mark.filterwarnings("ignore::paramreduce_cli.errors.ParamreduceWarning")
+
+
+def errors_of(path, *overrides):
+    with pytest.raises(ConfigError) as caught:
+        load_config(path, overrides)
+    return str(caught.value).splitlines()
+
+
+@pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda p: p.stem)
+def test_configs_that_ship_are_valid(path):
+    config = load_config(path)
+    assert config.robot == path.stem
+    for name in config.parameter_sets:
+        load_config(path, [f"parameters={name}"])
+
+
+def test_misprint_of_the_papers_table_stays_in_its_own_set():
+    values = {
+        name: load_config(CONFIGS / "puma560.yaml", [f"parameters={name}"]).standard_parameters()
+        for name in ("unrounded", "table")
+    }
+    assert values["unrounded"][56] == 0.0002  # Ixz_6
+    assert values["table"][56] == 0.002
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("harmonics: 2", "harmonic: 2", 22, ["trajectories.harmonic", "did you mean harmonics?"]),
+        ("count: 2", "count: -2", 20, ["trajectories.count", "greater than or equal to 1", "-2"]),
+        ("count: 2", "count: many", 20, ["trajectories.count", "many"]),
+        ("velocity_limits: 3", "velocity_limits: [1, 2, 3]", 25,
+         ["trajectories.velocity_limits has 3 values, but two_link has 2 joints", "rad/s"]),
+        ("velocity_limits: 3", "velocity_limits: fast", 25, ["velocity_limits", "'fast' is not a number"]),
+        ("velocity_limits: 3", "velocity_limits: -3", 25, ["velocity_limits", "greater than 0"]),
+        ("[-pi/2, pi/2]", "[pi/2, -pi/2]", 24, ["position_limits", "the limits cross"]),
+        ("[-pi/2, pi/2]", "[1, 1]", 24, ["position_limits", "never moves"]),
+        ("points: 40", "points: 4", 23, ["trajectories.points", "4 points cannot hold 2 harmonics"]),
+        ("convention: modified", "convention: moddified", 7, ["convention", "'modified' or 'standard'"]),
+        ("a: 0.5", "a: 0.5m", 10, ["joints.1.a", "'0.5m' is not a number"]),
+        ("name: fore", "name: upper", 10, ["joints.1.name", "taken"]),
+        ("name: fore", "name: fore, parent: base_", 10, ["parent", "did you mean base?"]),
+        ("    fore: {m", "    for: {m", 15, ["parameter_sets.slender_rods.for", "did you mean fore?"]),
+        ("com: [0.2, 0.01, 0]", "com: [0.2, 0.01]", 15, ["fore.com", "3 items"]),
+        ("com: [0.2, 0.01, 0]", "mx: 1", 15, ["inertia_com needs com"]),
+        ("nominal_torque: [20, 5]", "nominal_torque: [20, 0]", 17, ["nominal_torque", "greater than 0"]),
+        ("heuristic: forward-selection", "heuristic: forward_selction", 30,
+         ["heuristic", "did you mean forward-selection?"]),
+        ("  n: 4", "  n: 40", 31, ["selected.n is 40, but two_link has 20 parameters"]),
+        ("  n: 4", "  n: 4\n  torque_error: 0.1", 29, ["give n or torque_error, not both"]),
+        ("robot: two_link", "robot: two/link", 2, ["robot"]),
+        ("starts: 3", "starts: 1\n  polished: 2", 27, ["polished"]),
+        ("gravity: [0, -9.81, 0]", "gravity: 9.81", 5, ["gravity"]),
+    ],
+)  # fmt: skip
+def test_errors_name_file_line_key_and_remedy(write_config, old, new, line, says):
+    replacements = [(old, new)]
+    if "polished" in new:
+        replacements = [("  starts: 3\n  polished: 1", "  starts: 1\n  polished: 2")]
+    path = write_config(*replacements)
+    messages = errors_of(path)
+    matching = [m for m in messages if all(text in m for text in says)]
+    assert matching, messages
+    assert f"{path}, line {line}:" in matching[0]
+
+
+def test_all_errors_of_a_file_come_at_once(write_config):
+    path = write_config(
+        ("harmonics: 2", "harmonic: 2"),
+        ("velocity_limits: 3", "velocity_limits: [1, 2, 3]"),
+        ("[-pi/2, pi/2]", "[pi/2, -pi/2]"),
+        ("count: 2", "count: -2"),
+        ("    fore: {m: 1.0", "    fore: {m: heavy"),
+    )
+    messages = errors_of(path)
+    assert len(messages) == 5
+    assert sorted(int(re.search(r"line (\d+)", m)[1]) for m in messages) == [15, 20, 22, 24, 25]
+
+
+def test_a_missing_key_says_what_it_would_hold(write_config):
+    path = write_config(("  velocity_limits: 3\n", ""))
+    (message,) = errors_of(path)
+    assert "trajectories.velocity_limits is missing" in message
+    assert "rad/s" in message
+
+
+def test_a_key_that_stands_twice_is_an_error(write_config):
+    path = write_config(("  count: 2", "  count: 2\n  count: 3"))
+    (message,) = errors_of(path)
+    assert "line 21" in message
+    assert "already on line 20" in message
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("robot: [", "not YAML"), ("", "mapping"), ("- 1", "mapping"), ("robot: !!python/object:x 1", "not YAML")],
+)  # fmt: skip
+def test_what_is_no_config_at_all(tmp_path, text, says):
+    path = tmp_path / "x.yaml"
+    path.write_text(text)
+    assert says in errors_of(path)[0]
+
+
+def test_a_missing_file_offers_those_that_are_there(tmp_path, write_config):
+    write_config()
+    (message,) = errors_of(tmp_path / "two_lnk.yaml")
+    assert "two_link.yaml" in message
+
+
+def test_overrides(write_config):
+    path = write_config()
+    config = load_config(
+        path, ["trajectories.count=3", "description.dh.joints.1.a=2*pi", "model.seed=5"]
+    )
+    assert config.trajectories.count == 3
+    assert config.description.dh.joints[1].a == pytest.approx(2 * np.pi)
+    assert config.model.seed == 5
+    (message,) = errors_of(path, "trajectories.count=none_at_all")
+    assert message.startswith("--set trajectories.count=none_at_all: ")
+    for wrong in ("trajectories.count", "robot.name=1", "description.dh.joints.9.a=1", "a=[", "=1"):
+        assert wrong in errors_of(path, wrong)[0]
+
+
+def test_centre_of_mass_form_is_the_parallel_axis_theorem(write_config):
+    config = load_config(write_config())
+    upper = config.standard_parameters()[:10]
+    assert upper == pytest.approx(
+        [2, 0.5, 0, 0, 1e-3, 0, 0, 1 / 24 + 2 * 0.25**2, 0, 1 / 24 + 2 * 0.25**2]
+    )
+    fore = config.standard_parameters()[10:]
+    assert fore[5] == pytest.approx(-1.0 * 0.2 * 0.01)  # Ixy of a point mass
+
+
+@pytest.mark.parametrize(
+    ("old", "new"), [("m: 2.0", "m: -2.0"), ("1e-3, 0, 0, 1/24", "1, 0, 0, 1/24")]
+)
+def test_bodies_that_cannot_exist_are_remarked_on_and_go_on(write_config, old, new):
+    with pytest.warns(ParamreduceWarning, match="upper"):
+        load_config(write_config((old, new)))
+
+
+def test_every_key_of_the_schema_is_documented():
+    schema = config_schema()
+    models = [schema, *schema["$defs"].values()]
+    missing = [
+        (model["title"], key)
+        for model in models
+        for key, entry in model.get("properties", {}).items()
+        if not entry.get("description")
+    ]
+    assert not missing
+
+
+def test_schema_lists_registered_names():
+    heuristics = config_schema()["$defs"]["SelectedSection"]["properties"]["heuristic"]["enum"]
+    assert set(heuristics) >= {"qr", "forward-selection", "backward-elimination"}
+
+
+@pytest.mark.parametrize("joints", [1, 2, 6, 9])
+def test_the_template_is_valid_and_physical(tmp_path, joints):
+    path = tmp_path / "arm.yaml"
+    path.write_text(dh_template("arm", joints))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert load_config(path).n_dof == joints
+
+
+@settings(
+    max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.sampled_from(["robot", "description", "trajectories", "selected", "nominal_torque", "report"]),
+    st.recursive(
+        st.none() | st.booleans() | st.integers() | st.floats() | st.text(max_size=5),
+        lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=5), inner, max_size=3),
+        max_leaves=5,
+    ),
+)  # fmt: skip
+def test_nothing_in_a_config_raises_anything_but_a_config_error(write_config, key, value):
+    import json
+
+    path = write_config()
+    try:
+        load_config(path, [f"{key}={json.dumps(value)}"])
+    except ConfigError as error:
+        assert str(error)

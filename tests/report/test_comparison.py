@@ -1,0 +1,90 @@
+import copy
+import json
+
+import pytest
+
+from paramreduce_cli.report.comparison import TOLERANCES, Tolerance, compare
+
+
+@pytest.fixture
+def summary(two_link_results):
+    return json.loads((two_link_results / "report" / "summary.json").read_text())
+
+
+def bad(a, b, **options):
+    return [d.what for d in compare(a, b, **options) if not d.tolerated]
+
+
+def test_a_summary_agrees_with_itself(summary):
+    assert compare(summary, copy.deepcopy(summary)) == []
+
+
+def changed(summary, path, change):
+    result = copy.deepcopy(summary)
+    where = result
+    for step in path[:-1]:
+        where = where[step]
+    where[path[-1]] = change(where[path[-1]])
+    return result
+
+
+FS = "forward-selection"
+
+
+@pytest.mark.parametrize(
+    ("path", "change", "what"),
+    [
+        (["model", "n_base"], lambda v: v + 1, "model.n_base"),
+        (["validation", FS, 2, "torque_error", "validation"], lambda v: v * 1.01, "torque_error"),
+        (
+            ["validation", FS, 2, "torque_error", "joints_estimation", 1],
+            lambda v: v * 1.01,
+            "joint 2",
+        ),
+        (
+            ["validation", FS, 2, "acceleration_error", "estimation"],
+            lambda v: v * 1.01,
+            "acceleration",
+        ),
+        (["validation", FS, 2, "acceleration_error", "estimation"], lambda v: None, "acceleration"),
+        (["validation", FS, 2, "operations", "direct"], lambda v: v + 1, "operations.direct"),
+        (["selected", "accepted"], lambda v: not v, "selected.accepted"),
+        (["reduction", FS, "order"], lambda v: v[:-1], "parameters ordered"),
+        (["trajectories", "estimation", 0, "kappa"], lambda v: v * 1.2, "kappa"),
+    ],
+)
+def test_differences_are_found(summary, path, change, what):
+    found = bad(summary, changed(summary, path, change))
+    assert found
+    assert any(what in entry for entry in found)
+
+
+def test_small_differences_are_tolerated_and_tolerances_can_be_set(summary):
+    other = changed(
+        summary, ["validation", FS, 2, "torque_error", "estimation"], lambda v: v * 1.00001
+    )
+    assert bad(summary, other) == []
+    tight = {**TOLERANCES, "torque_error": Tolerance(1e-9)}
+    assert bad(summary, other, tolerances=tight)
+
+
+def test_better_trajectories_are_no_regression(summary):
+    other = copy.deepcopy(summary)
+    for t in other["trajectories"]["estimation"]:
+        t["kappa"] *= 0.5
+    assert bad(summary, other) == []
+    assert bad(other, summary)
+
+
+def test_orders_are_compared_up_to_ties(summary):
+    swap = changed(summary, ["reduction", FS, "order"], lambda v: [v[1], v[0], *v[2:]])
+    assert bad(summary, swap) == []  # same errors: a tie
+    different = changed(
+        swap, ["validation", FS, 0, "torque_error", "estimation"], lambda v: v * 1.5
+    )
+    assert any("order" in entry for entry in bad(summary, different))
+
+
+def test_only_what_is_asked(summary):
+    other = changed(summary, ["model", "n_base"], lambda v: v + 1)
+    assert bad(summary, other, only=("kappa", "order")) == []

@@ -1,0 +1,113 @@
+import csv
+import io
+import json
+import xml.etree.ElementTree as ET
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+from paramreduce_cli import registry
+from paramreduce_cli.report.tables import Table
+
+PAPER_FIGURES = (
+    "trajectory",
+    "torque-error",
+    "operations",
+    "error-vs-operations",
+    "torques",
+    "acceleration-error",
+)
+
+
+@pytest.fixture(scope="module")
+def folder(two_link_results):
+    return two_link_results / "report"
+
+
+@pytest.fixture(scope="module")
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+@pytest.mark.parametrize("name", [*PAPER_FIGURES, "poses", "mass-matrix-condition"])
+def test_figures_are_there_in_every_format(folder, name):
+    assert name in registry.figure
+    assert (folder / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+    assert (folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    ET.fromstring((folder / "figures" / f"{name}.svg").read_text())
+
+
+@pytest.mark.parametrize("name", list(registry.table))
+def test_tables_are_rectangular(folder, name):
+    rows = list(csv.reader(io.StringIO((folder / "tables" / f"{name}.csv").read_text())))
+    assert len({len(row) for row in rows}) == 1
+    latex = (folder / "tables" / f"{name}.tex").read_text()
+    assert latex.count(r"\begin{tabular}") == 1
+    assert latex.count("&") == len(rows) * (len(rows[0]) - 1)
+
+
+def test_the_page_needs_nothing_else(folder):
+    class Links(HTMLParser):
+        found: list[str] = []  # noqa: RUF012
+
+        def handle_starttag(self, tag, attrs):
+            self.found += [v for k, v in attrs if k in ("src", "href") and v]
+
+    page = (folder / "index.html").read_text()
+    links = Links()
+    links.feed(page)
+    assert len(links.found) == 8
+    assert all(link.startswith("data:image/svg+xml;base64,") for link in links.found)
+    assert "http" not in page.split("<body>")[1].replace("data:image", "")[:2000]
+
+
+def test_summary_holds_what_a_regression_job_compares(summary):
+    assert {"robot", "config_sha256", "versions", "seconds", "model", "trajectories", "reduction",
+            "validation", "selected"} <= set(summary)  # fmt: skip
+    assert {"n_dof", "n_parameters", "n_affecting", "n_base", "rank_gap", "names"} <= set(
+        summary["model"]
+    )
+    assert set(summary["seconds"]) == {
+        "build-model",
+        "optimize-trajectories",
+        "sample",
+        "reduce",
+        "validate",
+    }
+    entry = summary["trajectories"]["estimation"][0]
+    assert {"kappa_start", "kappa", "kappa_variants", "peak_position", "peak_velocity", "cpu_seconds",
+            "iterations", "status"} <= set(entry)  # fmt: skip
+    for name in ("qr", "forward-selection", "backward-elimination"):
+        assert sorted(summary["reduction"][name]["order"]) == sorted(
+            summary["reduction"]["qr"]["order"]
+        )
+        row = summary["validation"][name][3]
+        assert row["n"] == 4
+        assert {"estimation", "validation"} <= set(row["torque_error"])
+        assert {"estimation", "validation"} <= set(row["acceleration_error"])
+        assert {"inverse", "direct", "inverse_paper_rule", "direct_paper_rule"} == set(
+            row["operations"]
+        )
+
+
+def test_summary_agrees_with_the_samples(summary, two_link_results):
+    """The selected model's torque error, recomputed from the samples alone."""
+    import h5py
+
+    with h5py.File(two_link_results / "samples.h5") as file:
+        names = [name.decode() for name in file["parameters/names"]]
+        weights = file["nominal_torque"][:]
+        for which in ("estimation", "validation"):
+            W, tau = file[f"{which}/W"][:], file[f"{which}/tau"][:]
+            phi = np.array([summary["selected"]["parameters"].get(name, 0.0) for name in names])
+            left = (tau - (W @ phi).reshape(tau.shape)) / weights
+            expected = np.linalg.norm(left) / np.linalg.norm(tau / weights)
+            assert summary["selected"]["torque_error"][which] == pytest.approx(expected, rel=1e-9)
+
+
+def test_latex_escapes_what_latex_would_trip_over():
+    table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
+    text = table.to_latex()
+    for piece in (r"$\kappa$ \& 5 \%", r"$m_{3}$", r"50 \%", r"$\varepsilon_\tau$", r"x\^{}2"):
+        assert piece in text
