@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import sys
+import threading
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -60,8 +62,36 @@ def say(message: str) -> None:
     out.print(message, markup=False)
 
 
+class _Interruption:
+    """Ctrl-C that cannot get lost.
+
+    A KeyboardInterrupt raised while a library calls back into Python may be swallowed there;
+    it is remembered and raised again at the next step of the work.
+    """
+
+    def __init__(self) -> None:
+        self._met = False
+
+    def install(self) -> None:
+        """Take over the signal."""
+        signal.signal(signal.SIGINT, self._note)
+
+    def _note(self, *_: object) -> None:
+        self._met = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raise an interruption that was met but did not get through."""
+        if self._met and threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+
+
+interruption = _Interruption()
+
+
 def main() -> None:
     """Run the command line; every outcome becomes a message and an exit code."""
+    interruption.install()
     warnings.simplefilter("once", ParamreduceWarning)
     warnings.showwarning = _show_warning
     try:
@@ -238,6 +268,18 @@ for _stage in pipeline():
 @contextmanager
 def progress_bars(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     """Show long work: bars on a terminal, plain lines elsewhere, nothing if quiet."""
+    with _shown_progress(quiet) as show:
+
+        def step(p: Progress) -> None:
+            show(p)
+            interruption.check()
+
+        yield step
+    interruption.check()
+
+
+@contextmanager
+def _shown_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
     if quiet:
         yield lambda _: None
     elif not err.is_terminal:
@@ -294,6 +336,7 @@ def run(
         runner = Runner(loaded, store, jobs or _cores(), progress, remark=_remark)
         for stage in stages_to_run(loaded):
             outcome = runner.run(stage, force=force)
+            interruption.check()
             if not quiet:
                 _say_outcome(outcome)
     summary = load_json(store.path(Report))

@@ -255,7 +255,7 @@ def test_inspect_shows_contents_and_provenance(invoke, two_link_results):
 
 def test_init_writes_a_config_that_runs(invoke, tmp_path):
     path = tmp_path / "configs" / "my_arm.yaml"
-    code, out, _ = invoke("init", "--dh", "my_arm", "--joints", 3, "--output", path)
+    code, _, _ = invoke("init", "--dh", "my_arm", "--joints", 3, "--output", path)
     assert code == 0
     code, _, err = invoke("init", "--dh", "my_arm", "--output", path)
     assert code == 2
@@ -289,7 +289,7 @@ def test_wrong_usage(invoke, arguments):
 
 def slow_config(tmp_path):
     data = yaml.safe_load((CONFIGS / "puma560.yaml").read_text())
-    data["trajectories"].update(count=6, starts=2, polished=1)
+    data["trajectories"].update(count=12, starts=2, polished=1)
     path = tmp_path / "puma560.yaml"
     path.write_text(yaml.safe_dump(data))
     return path
@@ -318,7 +318,7 @@ def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(tmp_path):
         os.killpg(process.pid, signal.SIGINT)
         _, err = process.communicate(timeout=30)
     kept = sorted(p.name for p in parts.glob("*.h5"))
-    assert process.returncode == 130
+    assert process.returncode == 130, err
     assert "Interrupted" in err
     assert "Traceback" not in err
     assert len(kept) >= 2

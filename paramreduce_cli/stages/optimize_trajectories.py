@@ -32,7 +32,7 @@ def optimize_trajectories(
         base=model.base,
         nominal_torque=model.nominal_torque,
         criterion=wanted.criterion,
-        settings=_settings(config, wanted.period, wanted.harmonics),
+        settings=joint_settings(config, wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
     counts = {"estimation": wanted.count, "validation": wanted.validation_count}
@@ -44,7 +44,8 @@ def optimize_trajectories(
     )
 
 
-def _settings(config: Config, period: float, harmonics: int) -> Settings:
+def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
+    """What the config asks of every trajectory."""
     wanted, n = config.trajectories, config.n_dof
     pairs = np.array(wanted.position_limits, dtype=float)
     pairs = np.broadcast_to(pairs, (n, 2)) if len(pairs) == 1 else pairs
@@ -75,7 +76,7 @@ def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectori
     )
 
     def measure(coefficients: FloatArray) -> Trajectory:
-        settings = _settings(config, brought.period, (coefficients.shape[1] - 1) // 2)
+        settings = joint_settings(config, brought.period, (coefficients.shape[1] - 1) // 2)
         return describe(
             excitation,
             settings,

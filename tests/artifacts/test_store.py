@@ -164,7 +164,7 @@ def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
         store.load(Model, "other", "")
     with h5py.File(store.path(Model), "a") as file:
         file.attrs["schema"] = SCHEMA - 1
-    with pytest.raises(ArtifactError, match="older layout.*paramreduce run"):
+    with pytest.raises(ArtifactError, match=r"older layout.*paramreduce run"):
         store.load(Model, "two_link", "")
 
 

@@ -1,3 +1,5 @@
+import contextlib
+import json
 import re
 import warnings
 
@@ -191,10 +193,6 @@ def test_the_template_is_valid_and_physical(tmp_path, joints):
     ),
 )  # fmt: skip
 def test_nothing_in_a_config_raises_anything_but_a_config_error(write_config, key, value):
-    import json
-
     path = write_config()
-    try:
-        load_config(path, [f"{key}={json.dumps(value)}"])
-    except ConfigError as error:
-        assert str(error)
+    with contextlib.suppress(ConfigError):
+        assert load_config(path, [f"{key}={json.dumps(value)}"]).robot

@@ -51,7 +51,7 @@ def test_error_condition_and_eigenvalue_by_definition():
 
 
 def test_a_singular_mass_matrix_is_an_infinite_error():
-    dynamics, phi, blocks = setup()
+    dynamics, _, blocks = setup()
     one = np.zeros((50, 1))
     one[0] = 1.0
     found = acceleration_errors(blocks, dynamics.direct_regressor, one, np.ones(5))

@@ -1,3 +1,5 @@
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -121,4 +123,4 @@ def test_errors_never_rise_with_n(seed, columns, name):
     p = problem(seed, rows=20, rank=max(1, columns - 2), columns=columns)
     order = registry.heuristic[name](p)
     errors = [fit(p, order[:n]).torque_error for n in range(1, columns + 1)]
-    assert all(b <= a + 1e-10 for a, b in zip(errors, errors[1:], strict=False))
+    assert all(b <= a + 1e-10 for a, b in pairwise(errors))

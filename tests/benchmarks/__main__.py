@@ -1,0 +1,27 @@
+"""Run all benchmarks and print one table of ratios."""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import rich.box
+import rich.console
+import rich.table
+
+from tests.benchmarks import gradients, memory, selection
+
+
+def main():
+    table = rich.table.Table(title="Ratios, all measured in this run", box=rich.box.SIMPLE)
+    for heading in ("what", "ratio", "at most", ""):
+        table.add_column(heading)
+    for benchmark in (selection, gradients, memory):
+        for what, ratio, limit in benchmark.rows():
+            shown = f"{ratio:.3f}" if ratio > 0.01 else f"1/{1 / ratio:.0f}"
+            most = f"{limit:g}" if limit >= 1 else f"1/{1 / limit:.0f}"
+            table.add_row(what, shown, most, "reached" if ratio <= limit else "MISSED")
+    rich.console.Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

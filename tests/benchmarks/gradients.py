@@ -1,0 +1,70 @@
+"""One descent through IPOPT with exact gradients against finite differences, in CPU time."""
+
+import time
+from pathlib import Path
+
+import numpy as np
+import scipy.linalg
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.excitation.ipopt import minimise
+from paramreduce_cli.excitation.limits import LimitMap
+from paramreduce_cli.excitation.objective import FreeObjective
+from paramreduce_cli.excitation.optimiser import SCREENING, settings_basis
+from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.stages.build_model import build_model
+from paramreduce_cli.stages.optimize_trajectories import joint_settings
+
+CONFIG = Path(__file__).resolve().parents[2] / "configs" / "puma560.yaml"
+
+
+class Differences:
+    """The same objective with forward differences for its gradient, and values without adjoints."""
+
+    def __init__(self, excitation, basis, limits, level):
+        self._excitation, self._basis = excitation, basis
+        self._limits, self._level = limits, level
+
+    def value(self, x):
+        coefficients, _ = self._limits.admissible(x.reshape(6, 9), self._level.norm)
+        W = self._excitation.weighted(self._basis.states(coefficients))
+        scaled, _ = self._excitation.scaling(W, self._excitation.beta)
+        eigenvalues = scipy.linalg.eigvalsh(scaled.T @ scaled, check_finite=False)
+        return self._excitation.criterion(eigenvalues, self._level.sharpness)[0]
+
+    def __call__(self, x):
+        value = self.value(x)
+        steps = 1e-7 * np.eye(x.size)
+        return value, np.array([(self.value(x + step) - value) / 1e-7 for step in steps])
+
+
+def descend(make, start):
+    started = time.process_time()
+    x, curvature = start, None
+    for level in SCREENING:
+        end = minimise(make(level), x, 100, curvature)
+        x, curvature = end.x, end.curvature
+    return time.process_time() - started, end.value
+
+
+def rows():
+    config = load_config(CONFIG)
+    model = build_model(config)
+    wanted = config.trajectories
+    excitation = excitation_of(
+        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
+    )
+    settings = joint_settings(config, wanted.period, wanted.harmonics)
+    basis = settings_basis(settings)
+    limits = LimitMap(settings.limits, basis, "gauge")
+
+    def objective(level):
+        return FreeObjective(excitation, basis, limits, level.sharpness, level.norm)
+
+    ratios = []
+    for seed in range(3):
+        start = np.random.default_rng(seed).normal(size=54)
+        exact, _ = descend(objective, start)
+        differences, _ = descend(lambda level: Differences(excitation, basis, limits, level), start)
+        ratios.append(exact / differences)
+    yield "trajectory, CPU time: exact gradients / finite differences", np.median(ratios), 1 / 8
