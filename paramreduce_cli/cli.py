@@ -332,11 +332,11 @@ def run(
     """
     loaded = load_config(config, overrides)
     store = _store(loaded, results)
-    with store.locked(), progress_bars(quiet) as progress:
-        runner = Runner(loaded, store, jobs or _cores(), progress, remark=_remark)
+    with store.locked():
         for stage in stages_to_run(loaded):
-            outcome = runner.run(stage, force=force)
-            interruption.check()
+            with progress_bars(quiet) as progress:
+                runner = Runner(loaded, store, jobs or _cores(), progress, remark=_remark)
+                outcome = runner.run(stage, force=force)
             if not quiet:
                 _say_outcome(outcome)
     summary = load_json(store.path(Report))

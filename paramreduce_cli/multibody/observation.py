@@ -15,7 +15,7 @@ import numpy as np
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, FloatArray
 
-BLOCK_SAMPLES = 500
+BLOCK_SAMPLES = 150
 """Samples evaluated at a time: small enough for the cache, large enough for the loops."""
 
 
