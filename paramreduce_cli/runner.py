@@ -7,11 +7,9 @@ from, the return type which artifact is written.
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import time
 import types
-import typing
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -24,8 +22,9 @@ import scipy
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
-from paramreduce_cli.artifacts.store import LAYOUTS, Parts, Store, file_digest, file_of, load_file
+from paramreduce_cli.artifacts.store import Parts, Store, file_digest, file_of, load_file
 from paramreduce_cli.config import Config, section_digest
+from paramreduce_cli.pipeline import ARTIFACTS, Stage, StageInput, brought_files, maker_of, pipeline
 from paramreduce_cli.records import (
     Coefficients,
     Progress,
@@ -35,70 +34,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
-    Trajectories,
 )
-from paramreduce_cli.registry import stages
-
-ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
-
-
-@dataclass(frozen=True)
-class StageInput:
-    """One parameter of a stage."""
-
-    name: str
-    type: type
-    optional: bool
-
-
-@dataclass(frozen=True)
-class Stage:
-    """A declared stage as its signature describes it."""
-
-    name: str
-    function: Callable[..., Any]
-    inputs: tuple[StageInput, ...]
-    output: type
-
-    @property
-    def artifacts(self) -> list[StageInput]:
-        """The inputs that other stages make."""
-        return [entry for entry in self.inputs if entry.type in ARTIFACTS]
-
-
-def describe_stage(name: str, function: Callable[..., Any]) -> Stage:
-    """Read a stage's signature."""
-    hints = typing.get_type_hints(function)
-    output = hints.pop("return")
-    inputs = []
-    for parameter in inspect.signature(function).parameters:
-        hint = hints[parameter]
-        optional = isinstance(hint, types.UnionType)
-        members = [a for a in typing.get_args(hint) if a is not type(None)] if optional else [hint]
-        inputs.append(StageInput(parameter, members[0], optional))
-    return Stage(name, function, tuple(inputs), output)
-
-
-def pipeline() -> list[Stage]:
-    """All stages, each after those whose artifacts it reads."""
-    waiting = [describe_stage(name, function) for name, function in stages().items()]
-    ordered: list[Stage] = []
-    made: set[type] = set()
-    while waiting:
-        ready = [s for s in waiting if all(a.type in made for a in s.artifacts)]
-        if not ready:
-            raise ValueError(f"stages wait for each other: {[s.name for s in waiting]}")
-        # Of several that are ready the one with the fewest needs is the earliest.
-        ready.sort(key=lambda s: (len(s.artifacts), s.name))
-        ordered.append(ready[0])
-        made.add(ready[0].output)
-        waiting.remove(ready[0])
-    return ordered
-
-
-def maker_of(record: type) -> str:
-    """Name of the stage that makes a record."""
-    return next(s.name for s in pipeline() if s.output is record)
 
 
 class _Watched:
@@ -320,22 +256,3 @@ class Runner:
                 seconds[stage.name] = stamp.seconds
         text = json.dumps(self.config.model_dump(mode="json"), sort_keys=True)
         return Provenance(self.config.robot, _digest(text), versions(), seconds)
-
-
-def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
-    """Files of the user's own that a config names for an input of a stage, by name."""
-    files: dict[str, Path | None] = {}
-    if config is not None and kind is Coefficients:
-        files = {"coefficients": config.trajectories.file}
-    elif config is not None and kind is Recordings:
-        files = {
-            "estimation": config.sampling.estimation_file,
-            "validation": config.sampling.validation_file,
-        }
-    return {name: path for name, path in files.items() if path is not None}
-
-
-def stages_to_run(config: Config) -> list[Stage]:
-    """The stages of a full run: without trajectories where both sets are recordings."""
-    recorded = len(brought_files(config, Recordings)) == 2
-    return [s for s in pipeline() if not (recorded and s.output is Trajectories)]

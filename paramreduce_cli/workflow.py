@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from paramreduce_cli.artifacts.store import file_of
-from paramreduce_cli.runner import Stage, pipeline
+from paramreduce_cli.pipeline import Stage, pipeline
 
 
 def make_rules() -> str:

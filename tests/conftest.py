@@ -10,8 +10,9 @@ import pytest
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
 from paramreduce_cli.config import load_config
+from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh
-from paramreduce_cli.runner import Runner, stages_to_run
+from paramreduce_cli.runner import Runner
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from conftest import CONFIGS
 
-from paramreduce_cli.runner import pipeline
+from paramreduce_cli.pipeline import pipeline
 
 COMMANDS = [stage.name for stage in pipeline()] + [
     "run",

@@ -11,6 +11,7 @@ PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
     {"cli", "__main__"},
     {"workflow", "runner"},
+    {"pipeline"},
     {"stages", "artifacts"},
     {"config", "robots", "excitation", "reduction", "report"},
     {"multibody"},
@@ -20,7 +21,7 @@ LAYERS = [
     {"errors"},
 ]
 LEVEL = {name: k for k, names in enumerate(LAYERS) for name in names}
-SAME_LAYER = {("__main__", "cli"), ("workflow", "runner")}
+SAME_LAYER = {("__main__", "cli")}
 FILES = sorted(p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem != "__init__")
 
 

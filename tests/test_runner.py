@@ -4,7 +4,8 @@ from conftest import CONFIGS
 
 from paramreduce_cli.artifacts.store import Store, file_of
 from paramreduce_cli.config import load_config
-from paramreduce_cli.runner import Runner, pipeline, stages_to_run
+from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.runner import Runner
 
 ORDER = ["build-model", "optimize-trajectories", "sample", "reduce", "validate", "report"]
 

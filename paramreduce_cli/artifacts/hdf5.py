@@ -1,18 +1,11 @@
-"""HDF5 files written whole or not at all, with where they came from; read with clear refusals.
-
-A file is written under a temporary name in its own folder, synced, then renamed over the old
-one, so that a crash or a full disk leaves what was there before.
-"""
+"""HDF5 files with where they came from: written whole, read with clear refusals."""
 
 from __future__ import annotations
 
 import contextlib
 import dataclasses
-import errno
 import hashlib
 import json
-import os
-import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -22,6 +15,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from paramreduce_cli.artifacts.atomic import PatientFile, atomically
 from paramreduce_cli.errors import ArtifactError
 
 SCHEMA = 1
@@ -45,60 +39,6 @@ class Stamp:
     seconds: float
     digest: str = ""
     """Of all datasets; set when the file is complete."""
-
-
-class _PatientFile:
-    """A file for HDF5 to write to that keeps the first error to itself.
-
-    HDF5 cannot close a file whose disk is full and takes the process down at its end. So
-    after an error writing goes on into nothing, the file is closed in peace, and
-    :meth:`check` raises what happened.
-    """
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("r+b", buffering=0)
-        self._error: OSError | None = None
-
-    def check(self) -> None:
-        """Raise the error that was kept, if there is one."""
-        if self._error is not None:
-            raise self._error
-
-    def write(self, data: Any) -> int:
-        view = memoryview(data).cast("B")
-        done = 0
-        try:
-            while self._error is None and done < len(view):
-                done += self._file.write(view[done:])
-        except OSError as error:
-            self._error = error
-        return len(view)
-
-    def truncate(self, size: int) -> int:
-        try:
-            if self._error is None:
-                self._file.truncate(size)
-        except OSError as error:
-            self._error = error
-        return size
-
-    def readinto(self, buffer: Any) -> int:
-        return self._file.readinto(buffer) or 0
-
-    def read(self, size: int = -1) -> bytes:
-        return self._file.read(size) or b""
-
-    def seek(self, offset: int, whence: int = os.SEEK_SET) -> int:
-        return self._file.seek(offset, whence)
-
-    def tell(self) -> int:
-        return self._file.tell()
-
-    def flush(self) -> None:
-        """Nothing is buffered."""
-
-    def close(self) -> None:
-        self._file.close()
 
 
 class Writer:
@@ -181,7 +121,7 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
         ArtifactError: It cannot be written.
     """
     started = time.perf_counter()
-    with atomically(path) as temporary, contextlib.closing(_PatientFile(temporary)) as disk:
+    with atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
         with h5py.File(disk, "w") as file:
             writer = Writer(file, disk.check)
             fill(writer)
@@ -191,41 +131,6 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
                 file.attrs[name] = value
         disk.check()
     return done
-
-
-@contextlib.contextmanager
-def atomically(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that takes its place when the block ends well.
-
-    Raises:
-        ArtifactError: The disk is full, the folder is not writable, or the like.
-    """
-    temporary = None
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=".tmp")
-        os.close(handle)
-        temporary = Path(name)
-        temporary.chmod(0o644)
-        yield temporary
-        with temporary.open("rb") as file:
-            os.fsync(file.fileno())
-        temporary.replace(path)
-    except (OSError, RuntimeError) as error:
-        raise ArtifactError(f"{path}: cannot be written: {_reason(error)}") from error
-    finally:
-        if temporary is not None:
-            temporary.unlink(missing_ok=True)
-
-
-def _reason(error: Exception) -> str:
-    number = getattr(error, "errno", None)
-    text = str(error)
-    if number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or "No space left" in text:
-        return "the disk is full. What was there before is unchanged; make room and run it again."
-    if number in (errno.EACCES, errno.EROFS, errno.EPERM):
-        return "the folder is not writable. Choose another with --results."
-    return f"{text.splitlines()[0] if text else type(error).__name__}."
 
 
 class Reader:

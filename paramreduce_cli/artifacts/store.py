@@ -15,16 +15,17 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.hdf5 import (
     SCHEMA,
     Reader,
     Stamp,
     Writer,
-    atomically,
     read_stamp,
     reading,
     write,
 )
+from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import (
     Model,
@@ -49,7 +50,7 @@ class Layout:
 LAYOUTS: dict[type, Layout] = {
     Model: Layout("model.h5", layouts.save_model, layouts.load_model),
     Trajectories: Layout("trajectories.h5", layouts.save_trajectories, layouts.load_trajectories),
-    Samples: Layout("samples.h5", layouts.save_samples, layouts.load_samples),
+    Samples: Layout("samples.h5", save_samples, load_samples),
     Reduction: Layout("reduction.h5", layouts.save_reduction, layouts.load_reduction),
     Validation: Layout("validation.h5", layouts.save_validation, layouts.load_validation),
 }

@@ -1,0 +1,151 @@
+"""samples.h5, the project's own or one that a user brings: written and read block by block."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.artifacts.hdf5 import Reader, Writer, reading
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
+from paramreduce_cli.records import Block, FloatArray, Samples, SampleSet
+
+
+def save_samples(writer: Writer, samples: Samples) -> None:
+    """samples.h5, block by block."""
+    writer.dataset("parameters/names", samples.names)
+    for name in ("values", "nominal_torque", "nominal_acceleration"):
+        value = getattr(samples, name)
+        if value is not None:
+            writer.dataset("parameters/values" if name == "values" else name, value)
+    save_sample_set(writer, "estimation", samples.estimation)
+    if samples.validation is not None:
+        save_sample_set(writer, "validation", samples.validation)
+
+
+_STATES = ("z", "dz", "ddz", "tau")
+
+
+def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
+    """One set; its triangular factors are collected on the way."""
+    accumulator = FactorAccumulator()
+    appenders: dict[str, Any] = {}
+    for block in sample_set.blocks():
+        if not appenders:
+            n_dof = block.tau.shape[1]
+            appenders = {key: writer.rows(f"{name}/{key}", n_dof) for key in _STATES}
+            appenders["time"] = writer.rows(f"{name}/time", None)
+            appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
+            appenders["W"] = writer.rows(f"{name}/W", block.W.shape[1])
+        for key in (*_STATES, "time", "W"):
+            appenders[key](getattr(block, key))
+        appenders["trajectory"](np.full(block.time.size, float(block.trajectory)))
+        accumulator.add(block)
+    writer.dataset(f"{name}/factors", accumulator.result())
+
+
+class StoredSet:
+    """A sample set in a file, read in slices.
+
+    Raises:
+        ArtifactError: W and tau do not fit each other, or hold numbers that are not finite.
+    """
+
+    def __init__(self, path: Path, name: str, n_parameters: int) -> None:
+        self._path, self._name = path, name
+        with reading(path) as reader:
+            W, tau = reader.rows(f"{name}/W"), reader.rows(f"{name}/tau")
+            if W.ndim != 2 or tau.ndim != 2 or W.shape[0] != tau.shape[0] * tau.shape[1]:
+                raise ArtifactError(
+                    f"{path}: /{name}/W has shape {W.shape} and /{name}/tau {tau.shape}; W needs "
+                    "one row per sample and joint, (n_samples * n_dof, n_parameters)."
+                )
+            if W.shape[1] != n_parameters:
+                raise ArtifactError(
+                    f"{path}: /{name}/W has {W.shape[1]} columns for {n_parameters} parameters."
+                )
+            self.n_samples, self.n_dof = tau.shape
+            self._has_states = all(f"{name}/{key}" in reader for key in ("z", "dz", "ddz"))
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+        with reading(self._path) as reader:
+            base = self._name
+            W, tau = reader.rows(f"{base}/W"), reader.rows(f"{base}/tau")
+            owner = self._column(reader, "trajectory")
+            time = self._column(reader, "time")
+            for start, stop in _slices(owner, BLOCK_SAMPLES):
+                tau_block = tau[start:stop]
+                W_block = W[start * self.n_dof : stop * self.n_dof]
+                if not (np.isfinite(tau_block).all() and np.isfinite(W_block).all()):
+                    raise ArtifactError(
+                        f"{self._path}: /{base} holds numbers that are not finite between samples "
+                        f"{start} and {stop}. Remove those samples."
+                    )
+                z, dz, ddz = self._states(reader, start, stop)
+                yield Block(int(owner[start]), time[start:stop], z, dz, ddz, tau_block, W_block)
+
+    def _states(self, reader: Reader, start: int, stop: int) -> list[FloatArray]:
+        if not self._has_states:
+            return [np.full((stop - start, self.n_dof), np.nan)] * 3
+        return [reader.rows(f"{self._name}/{key}")[start:stop] for key in ("z", "dz", "ddz")]
+
+    def _column(self, reader: Reader, key: str) -> FloatArray:
+        name = f"{self._name}/{key}"
+        return reader.array(name, 1) if name in reader else np.zeros(self.n_samples)
+
+    def factors(self) -> FloatArray:
+        """Triangular factors per trajectory and joint, stored or computed."""
+        with reading(self._path) as reader:
+            if f"{self._name}/factors" in reader:
+                return reader.array(f"{self._name}/factors", 4)
+        return joint_factors(self.blocks())
+
+
+def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
+    """Consecutive ranges of samples, none longer than ``most`` or over two trajectories."""
+    edges = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), owner.size]
+    for first, last in itertools.pairwise(edges):
+        for start in range(first, last, most):
+            yield start, min(start + most, last)
+
+
+def load_samples(reader: Reader) -> Samples:
+    """samples.h5, the project's own or one that a user brings."""
+    W = reader.rows("estimation/W")
+    if W.ndim != 2:
+        raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
+    n = W.shape[1]
+    if "parameters/names" in reader:
+        names = reader.texts("parameters/names")
+        if len(names) != n or len(set(names)) != n:
+            raise ArtifactError(
+                f"{reader.path}: /parameters/names must hold {n} different names, one per column "
+                "of W."
+            )
+    else:
+        names = tuple(f"p{k + 1}" for k in range(n))
+    estimation = StoredSet(reader.path, "estimation", n)
+    has_validation = "validation/W" in reader
+    validation = StoredSet(reader.path, "validation", n) if has_validation else None
+    return Samples(
+        names=names,
+        values=_optional(reader, "parameters/values", n),
+        nominal_torque=_optional(reader, "nominal_torque", estimation.n_dof),
+        nominal_acceleration=_optional(reader, "nominal_acceleration", estimation.n_dof),
+        estimation=estimation,
+        validation=validation,
+    )
+
+
+def _optional(reader: Reader, name: str, size: int) -> FloatArray | None:
+    if name not in reader:
+        return None
+    value = reader.array(name, 1)
+    if value.size != size or not np.isfinite(value).all():
+        raise ArtifactError(f"{reader.path}: /{name} must hold {size} finite numbers.")
+    return value

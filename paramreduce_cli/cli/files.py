@@ -1,0 +1,171 @@
+"""Commands that look at files or write new ones: no stage is run here."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import click
+import rich.markup
+import rich.table
+
+from paramreduce_cli.artifacts.inspection import contents
+from paramreduce_cli.artifacts.store import Store, load_file, load_json
+from paramreduce_cli.cli.terminal import out, say
+from paramreduce_cli.config import config_schema
+from paramreduce_cli.config.template import dh_template
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.multibody.relations import approximate_expressions
+from paramreduce_cli.records import Reduction, Report
+from paramreduce_cli.report.comparison import (
+    QUANTITIES,
+    TOLERANCES,
+    Difference,
+    Tolerance,
+    compare,
+)
+from paramreduce_cli.workflow import FORMATS
+
+DIFFERENT = 1
+
+
+@click.command()
+def schema() -> None:
+    """Print the JSON Schema of a config, for editors.
+
+    Example: paramreduce schema > paramreduce.schema.json
+    """
+    click.echo(json.dumps(config_schema(), indent=2, default=str))
+
+
+@click.command()
+@click.argument("name")
+@click.option("--dh", is_flag=True, required=True, help="A Denavit-Hartenberg description.")
+@click.option("--joints", type=click.IntRange(1, 30), default=6, show_default=True)
+@click.option("--output", type=click.Path(path_type=Path), help="[default: configs/NAME.yaml]")
+def init(name: str, dh: bool, joints: int, output: Path | None) -> None:
+    """Write a commented config for a new arm.
+
+    Example: paramreduce init --dh my_arm --joints 6
+    """
+    path = output or Path("configs") / f"{name}.yaml"
+    if not name.replace("_", "").replace("-", "").isalnum():
+        raise ConfigError(f"NAME: {name!r} may hold letters, digits, - and _ only.")
+    if path.exists():
+        raise ConfigError(f"{path}: exists already; choose another with --output.")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(dh_template(name, joints), encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
+    say(f"Wrote {path}. Fill in what is marked TODO, then: paramreduce run {path}")
+
+
+@click.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--model", "chosen", metavar="HEURISTIC:N", help="Show a model of a reduction.h5.")
+def inspect(file: Path, chosen: str | None) -> None:
+    """Show what is in an artifact and where it came from.
+
+    Example: paramreduce inspect results/puma560/reduction.h5 --model forward-selection:18
+    """
+    if chosen is not None:
+        _say_model(file, chosen)
+        return
+    attributes, datasets = contents(file)
+    for name, value in attributes.items():
+        say(f"{name}: {value}")
+    table = rich.table.Table(box=None, pad_edge=False)
+    for heading in ("dataset", "shape", "content"):
+        table.add_column(heading, overflow="fold")
+    for row in datasets:
+        table.add_row(*(rich.markup.escape(cell) for cell in row))
+    out.print(table)
+
+
+def _say_model(file: Path, chosen: str) -> None:
+    reduction, _ = load_file(file, Reduction, None, "reduce")
+    name, _, number = chosen.partition(":")
+    ordering = reduction.orderings.get(name)
+    if ordering is None or not number.isdigit() or not 1 <= int(number) <= ordering.order.size:
+        known = ", ".join(f"{k}:1...{o.order.size}" for k, o in reduction.orderings.items())
+        raise ConfigError(f"--model {chosen}: there is {known}.")
+    n = int(number)
+    kept = ordering.subset(n)
+    texts = approximate_expressions(reduction.names, kept, ordering.beta[n - 1])
+    flag = ", minimum-norm fit beyond the rank" if ordering.minimum_norm[n - 1] else ""
+    say(f"{name}, n = {n}, torque error {ordering.torque_error[n - 1]:.6g}{flag}")
+    for value, text in zip(ordering.parameters[n - 1], texts, strict=True):
+        say(f"{value: .9e}  =  {text}")
+
+
+@click.command(name="compare")
+@click.argument("first", type=click.Path(path_type=Path))
+@click.argument("second", type=click.Path(path_type=Path))
+@click.option(
+    "--tolerance", "given", multiple=True, metavar="QUANTITY=RELATIVE",
+    help=f"Relative tolerance of {', '.join(TOLERANCES)}; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--only", multiple=True, type=click.Choice(list(QUANTITIES)), help="Compare only this."
+)
+def compare_command(
+    first: Path, second: Path, given: tuple[str, ...], only: tuple[str, ...]
+) -> int:
+    """Compare two summaries or results folders; exit code 1 if they differ too much.
+
+    Orders are compared up to ties, trajectories by the best and the median condition number.
+
+    Example: paramreduce compare results/reference/puma560.json results/puma560
+    """
+    summaries = [_load_summary(path) for path in (first, second)]
+    tolerances = {**TOLERANCES, **dict(map(_tolerance, given))}
+    try:
+        differences = compare(summaries[0], summaries[1], tolerances, only)
+    except (KeyError, TypeError, IndexError) as error:
+        raise ConfigError(
+            f"{first} or {second}: is no summary of this version ({error})."
+        ) from error
+    bad = [d for d in differences if not d.tolerated]
+    for difference in bad:
+        say(_difference_text(difference))
+    tolerated = len(differences) - len(bad)
+    if bad:
+        say(f"{len(bad)} differences beyond tolerance, {tolerated} within.")
+        return DIFFERENT
+    say(f"{first} and {second} agree: {tolerated} differences, all within tolerance.")
+    return 0
+
+
+def _difference_text(d: Difference) -> str:
+    return f"{d.what}: {d.first} -> {d.second}"
+
+
+def _tolerance(text: str) -> tuple[str, Tolerance]:
+    name, _, value = text.partition("=")
+    try:
+        return name, Tolerance(float(value), TOLERANCES[name].absolute)
+    except (KeyError, ValueError) as error:
+        raise ConfigError(
+            f"--tolerance {text}: write QUANTITY=NUMBER with one of {', '.join(TOLERANCES)}."
+        ) from error
+
+
+def _load_summary(path: Path) -> dict[str, Any]:
+    if path.is_dir():
+        path = Store(path).path(Report)
+    loaded = load_json(path)
+    if not isinstance(loaded, dict):
+        raise ConfigError(f"{path}: is no summary.json.")
+    return loaded
+
+
+@click.command()
+@click.option("--format", "kind", type=click.Choice(list(FORMATS)), default="text")
+def graph(kind: str) -> None:
+    """Print the stages with their inputs and outputs, or as rules for Make.
+
+    Example: paramreduce graph --format make > pipelines/stages.mk
+    """
+    click.echo(FORMATS[kind](), nl=False)

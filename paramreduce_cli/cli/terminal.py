@@ -1,0 +1,108 @@
+"""What goes to the terminal: text, warnings, progress, and Ctrl-C coming from it."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import rich.console
+import rich.progress
+
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.records import Progress
+
+out = rich.console.Console(highlight=False, soft_wrap=True)
+err = rich.console.Console(stderr=True, highlight=False, soft_wrap=True)
+
+
+def say(message: str) -> None:
+    """Print to standard output as it is, without markup."""
+    out.print(message, markup=False)
+
+
+def show_errors(text: str) -> None:
+    for line in text.splitlines():
+        err.print(f"Error: {line}", markup=False)
+
+
+def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    if issubclass(category, ParamreduceWarning):
+        err.print(f"Warning: {message}.", markup=False)
+
+
+def remark(message: str) -> None:
+    """Tell the user something that does not stop the work."""
+    err.print(f"Warning: {message}.", markup=False)
+
+
+class Interruption:
+    """Ctrl-C that cannot get lost.
+
+    A KeyboardInterrupt raised while a library calls back into Python may be swallowed there;
+    it is remembered and raised again at the next step of the work.
+    """
+
+    def __init__(self) -> None:
+        self._met = False
+
+    def install(self) -> None:
+        """Take over the signal."""
+        signal.signal(signal.SIGINT, self._note)
+
+    def _note(self, *_: object) -> None:
+        self._met = True
+        raise KeyboardInterrupt
+
+    def check(self) -> None:
+        """Raise an interruption that was met but did not get through."""
+        if self._met and threading.current_thread() is threading.main_thread():
+            raise KeyboardInterrupt
+
+
+interruption = Interruption()
+
+
+@contextmanager
+def progress_bars(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    """Show long work: bars on a terminal, plain lines elsewhere, nothing if quiet."""
+    with _shown_progress(quiet) as show:
+
+        def step(p: Progress) -> None:
+            show(p)
+            interruption.check()
+
+        yield step
+    interruption.check()
+
+
+@contextmanager
+def _shown_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
+    if quiet:
+        yield lambda _: None
+    elif not err.is_terminal:
+        yield _plain_line
+    else:
+        columns = (
+            rich.progress.TextColumn("{task.description}"),
+            rich.progress.BarColumn(),
+            rich.progress.TaskProgressColumn(),
+            rich.progress.TimeElapsedColumn(),
+            rich.progress.TextColumn("{task.fields[remark]}"),
+        )
+        with rich.progress.Progress(*columns, console=err) as bars:
+            tasks: dict[str, rich.progress.TaskID] = {}
+
+            def advance(p: Progress) -> None:
+                if p.task not in tasks:
+                    tasks[p.task] = bars.add_task(p.task, total=p.total, remark="")
+                bars.update(tasks[p.task], completed=p.done, remark=p.remark)
+
+            yield advance
+
+
+def _plain_line(p: Progress) -> None:
+    if p.done >= p.total:
+        err.print(f"{p.task}: done{', ' + p.remark if p.remark else ''}", markup=False)
