@@ -26,9 +26,5 @@ class RankError(ParamreduceError):
     """Columns that had to be independent are not."""
 
 
-class InfeasibleError(ParamreduceError):
-    """No trajectory can satisfy the limits that were asked for."""
-
-
 class ParamreduceWarning(UserWarning):
     """A remark for the user that does not stop the work."""

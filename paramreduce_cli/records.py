@@ -121,7 +121,8 @@ class Trajectory:
     peak_velocity: FloatArray
     """(n_dof,), rad/s or m/s."""
     reach: FloatArray
-    """Largest share of a position, velocity or acceleration limit that is used, (n_dof,)."""
+    """Largest share of half the position range, or of the velocity or acceleration limit, that the
+    motion about its offset uses, (n_dof,)."""
     cpu_seconds: float
     iterations: int
     status: str

@@ -22,7 +22,14 @@ import scipy
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
-from paramreduce_cli.artifacts.store import Parts, Store, file_digest, file_of, load_file
+from paramreduce_cli.artifacts.store import (
+    Parts,
+    Store,
+    check_schema,
+    file_digest,
+    file_of,
+    load_file,
+)
 from paramreduce_cli.config import Config, section_digest
 from paramreduce_cli.pipeline import ARTIFACTS, Stage, StageInput, brought_files, maker_of, pipeline
 from paramreduce_cli.records import (
@@ -132,7 +139,8 @@ class Runner:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
         """
         path = self.store.path(stage.output)
-        self._remark_if_stale(stage)
+        self.store.refuse_to_replace(stage.output, self._robot)
+        self._look_at_inputs(stage)
         if not force and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
@@ -200,18 +208,36 @@ class Runner:
         inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
         return record
 
-    def _remark_if_stale(self, stage: Stage) -> None:
-        """Say which inputs were made with a config that has changed since."""
+    @property
+    def _robot(self) -> str:
+        if self.config is not None:
+            return self.config.robot
+        return self.store.folder.resolve().name
+
+    def _look_at_inputs(self, stage: Stage) -> None:
+        """Refuse inputs of another layout; say which ones do not fit what they were made from."""
         for entry in stage.artifacts:
             stamp = self.store.stamp(entry.type)
             if self.config is None or stamp is None:
                 continue
-            changed = self._changed_sections(stamp)
+            path = self.store.path(entry.type)
+            check_schema(path, stamp)
+            changed = [f"another {name} section" for name in self._changed_sections(stamp)]
+            changed += [f"another {name}" for name in self._changed_artifacts(entry.type, stamp)]
             if changed:
                 self.remark(
-                    f"{self.store.path(entry.type)} was made with another {', '.join(changed)} "
-                    "section; `paramreduce run` rebuilds it"
+                    f"{path} was made with {' and '.join(changed)}; `paramreduce run` rebuilds it"
                 )
+
+    def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
+        """Files of the folder that are not those a record was made from."""
+        maker = next(stage for stage in pipeline() if stage.output is record)
+        stamps = {file_of(entry.type): self.store.stamp(entry.type) for entry in maker.artifacts}
+        return [
+            name
+            for name, found in stamps.items()
+            if found is not None and name in stamp.inputs and found.digest != stamp.inputs[name]
+        ]
 
     def _recordings(self, inputs: _Inputs) -> Recordings:
         assert self.config is not None
@@ -235,15 +261,20 @@ class Runner:
         return parts
 
     def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:
-        config = self.config
+        sections = inputs.watched.digests() if inputs.watched is not None else {}
+        seeds = [
+            getattr(self.config, name).seed
+            for name in sections
+            if hasattr(getattr(self.config, name), "seed")
+        ]
         return Stamp(
             schema=SCHEMA,
-            robot=config.robot if config is not None else self.store.folder.resolve().name,
+            robot=self._robot,
             stage=stage.name,
             versions=versions(),
-            sections=inputs.watched.digests() if inputs.watched is not None else {},
+            sections=sections,
             inputs=dict(inputs.digests),
-            seed=config.trajectories.seed if config is not None else 0,
+            seed=next(iter(seeds), 0),
             seconds=time.perf_counter() - started,
         )
 

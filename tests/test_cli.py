@@ -179,6 +179,83 @@ def test_observation_matrices_that_do_not_fit(invoke, brought, tmp_path, change,
     assert not (tmp_path / "r" / "reduction.h5").exists()
 
 
+@pytest.mark.parametrize(
+    ("name", "value", "says"),
+    [
+        ("estimation/trajectory", np.zeros(7), "150 finite numbers"),
+        ("estimation/trajectory", np.full(150, -1.0), "0, 1, 2"),
+        ("estimation/time", np.full(150, np.nan), "150 finite numbers"),
+        ("estimation/z", np.zeros((3, 2)), "(150, 2)"),
+        ("parameters/names", np.arange(7), "must hold text"),
+    ],
+)
+def test_extras_of_an_observation_matrix_are_checked(invoke, brought, tmp_path, name, value, says):
+    with h5py.File(brought, "a") as file:
+        file[name] = value
+    code, _, err = invoke("reduce", "--samples", brought, "--results", tmp_path / "r")
+    assert code == 2
+    assert says in err
+
+
+@pytest.mark.parametrize(
+    ("W", "says"),
+    [
+        (np.zeros((300, 7)), "no column"),
+        (np.zeros((0, 7)), "empty"),
+        (np.full((300, 7), 1e308), "too large"),
+        (np.ones((300, 7)) * 1j, "real numbers"),
+        (np.random.default_rng(0).normal(size=(4, 30)), "4 rows are too few for 30 parameters"),
+    ],
+)
+def test_observation_matrices_with_nothing_to_choose_from(invoke, tmp_path, W, says):
+    with h5py.File(tmp_path / "mine.h5", "w") as file:
+        file["estimation/W"] = W
+        file["estimation/tau"] = np.random.default_rng(1).normal(size=(len(W) // 2, 2))
+    code, _, err = invoke("reduce", "--samples", tmp_path / "mine.h5", "--results", tmp_path / "r")
+    assert code == 2
+    assert says in err
+
+
+def test_triangular_factors_of_others_are_not_trusted(invoke, brought, tmp_path):
+    with h5py.File(brought, "a") as file:
+        file["estimation/factors"] = np.zeros((1, 2, 8, 8))
+    code, _, _ = invoke("reduce", "--samples", brought, "--results", tmp_path / "r")
+    assert code == 0
+    with h5py.File(tmp_path / "r" / "reduction.h5") as file:
+        assert file["rank"][()] == 6
+
+
+def test_samples_of_another_robot_with_a_config(invoke, brought, two_link_copy):
+    code, _, err = invoke("reduce", TWO_LINK, "--samples", brought, "--results", two_link_copy)
+    assert code == 2
+    assert "another robot" in err
+
+
+def test_named_base_columns_that_are_none(invoke, tmp_path):
+    for name in ("mz_upper", "Iyy_fore"):
+        code, _, err = invoke(
+            "build-model", TWO_LINK, "--results", tmp_path, "--set", f"model.base_columns=[{name}]"
+        )
+        assert code == 2
+        assert name in err
+
+
+def test_arms_of_one_joint_get_their_report(invoke, tmp_path, write_config):
+    """Nothing but an inertia about a vertical axis: its mass matrix costs no operation."""
+    path = write_config(
+        ("  gravity: [0, -9.81, 0]", "  gravity: [0, 0, -9.81]"),
+        ("      - {name: fore, a: 0.5}\n", ""),
+        (
+            "    fore: {m: 1.0, com: [0.2, 0.01, 0], inertia_com: [5e-4, 0, 0, 0.0135, 0, 0.0135]}\n",
+            "",
+        ),
+        ("nominal_torque: [20, 5]", "nominal_torque: 20"),
+        ("  n: 4", "  n: 1"),
+    )
+    code, _, err = invoke("run", path, "--results", tmp_path / "r", "--quiet")
+    assert code == 0, err
+
+
 def test_brought_coefficients_repeat_everything_after_the_optimiser(
     invoke, two_link_results, tmp_path
 ):
@@ -331,6 +408,40 @@ def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(tmp_path):
     assert done.stderr.count("kept from before") == len(kept)
     assert (tmp_path / "r" / "trajectories.h5").exists()
     assert not parts.exists()
+
+
+def test_a_polite_kill_leaves_no_process_behind(tmp_path):
+    command = [
+        sys.executable,
+        "-m",
+        "paramreduce_cli",
+        "run",
+        slow_config(tmp_path),
+        "--results",
+        tmp_path / "r",
+    ]
+    parts = tmp_path / "r" / "trajectories.h5.parts"
+    with subprocess.Popen(
+        command, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as process:
+        deadline = time.monotonic() + 60
+        while not list(parts.glob("*.h5")) and time.monotonic() < deadline:
+            time.sleep(0.05)
+        process.terminate()
+        _, err = process.communicate(timeout=30)
+    assert process.returncode == 130, err
+    deadline = time.monotonic() + 15
+    while _session_alive(process.pid) and time.monotonic() < deadline:
+        time.sleep(0.1)
+    assert not _session_alive(process.pid)
+
+
+def _session_alive(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return False
+    return True
 
 
 def test_killed_it_leaves_no_lock_behind(tmp_path):

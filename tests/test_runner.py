@@ -4,6 +4,7 @@ from conftest import CONFIGS
 
 from paramreduce_cli.artifacts.store import Store, file_of
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.runner import Runner
 
@@ -54,10 +55,8 @@ def test_a_lost_or_foreign_artifact_is_made_again(two_link_copy):
     assert current["optimize-trajectories"]
 
 
-@pytest.mark.parametrize(
-    ("attribute", "value"), [("schema", 0), ("paramreduce_version", "0.0.0"), ("robot", "x")]
-)
-def test_another_version_schema_or_robot_is_made_again_by_run(two_link_copy, attribute, value):
+@pytest.mark.parametrize(("attribute", "value"), [("schema", 0), ("paramreduce_version", "0.0.0")])
+def test_another_version_or_schema_is_made_again_by_run(two_link_copy, attribute, value):
     with h5py.File(two_link_copy / "model.h5", "a") as file:
         file.attrs[attribute] = value
     assert not states(two_link_copy)["build-model"]
@@ -73,3 +72,30 @@ def test_a_stage_that_fails_leaves_everything_as_it_was(two_link_copy):
         Runner(config, Store(two_link_copy)).run(validate)
     for record, content in before.items():
         assert (two_link_copy / file_of(record)).read_bytes() == content
+
+
+def test_what_is_not_this_robots_is_never_overwritten(two_link_copy):
+    config = load_config(CONFIGS / "puma560.yaml")
+    before = {p: p.read_bytes() for p in two_link_copy.glob("*.h5")}
+    with pytest.raises(ArtifactError, match="belongs to the robot two_link"):
+        Runner(config, Store(two_link_copy)).run(pipeline()[0])
+    own = two_link_copy / "samples.h5"
+    own.unlink()
+    with h5py.File(own, "w") as file:
+        file["estimation/W"] = [[1.0]]
+    sample = next(stage for stage in pipeline() if stage.name == "sample")
+    with pytest.raises(ArtifactError, match="was not made by paramreduce"):
+        Runner(load_config(CONFIGS / "two_link.yaml"), Store(two_link_copy)).run(sample)
+    assert all(p.read_bytes() == content for p, content in before.items() if p != own)
+
+
+def test_a_report_with_a_file_missing_is_made_again(two_link_copy):
+    (two_link_copy / "report" / "index.html").unlink()
+    assert not states(two_link_copy)["report"]
+    assert (two_link_copy / "report" / "index.html").exists()
+
+
+def test_files_of_a_former_report_are_removed(two_link_copy):
+    states(two_link_copy, "report.formats=[png]")
+    kinds = {p.suffix for p in (two_link_copy / "report" / "figures").iterdir()}
+    assert kinds == {".png"}

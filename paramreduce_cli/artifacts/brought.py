@@ -6,6 +6,7 @@ import csv
 import gzip
 import json
 import math
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -66,7 +67,9 @@ def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
         raise ArtifactError(f"{path}: there is no such file.") from error
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
         raise DataError(
-            f"{path}: holds no Fourier coefficients; bring a trajectories.h5 or a summary.json."
+            f"{path}: holds no Fourier coefficients ({type(error).__name__}: {error}). Bring a "
+            'trajectories.h5, or JSON such as {"trajectories": {"period": 6.28, "estimation": '
+            '[{"coefficients": [[q0, a1, b1], ...]}], "validation": [...]}}.'
         ) from error
 
 
@@ -87,14 +90,17 @@ def load_recording(path: Path, n_dof: int) -> Recording:
     else:
         arrays = _arrays_from_csv(path, n_dof)
     for key in ("z", "dz", "ddz"):
-        if arrays.get(key) is None:
-            raise DataError(f"{path}: {key} is missing; states are z, dz and ddz of every joint.")
+        if arrays.get(key) is None or arrays[key].ndim != 2:
+            raise DataError(
+                f"{path}: {key} is missing or no matrix; states are z, dz and ddz of every joint."
+            )
     rows = arrays["z"].shape[0]
     for key, value in arrays.items():
-        if key != "time" and value.shape != (rows, n_dof):
+        expected = (rows,) if key == "time" else (rows, n_dof)
+        if value.shape != expected:
             raise DataError(
                 f"{path}: {key} has shape {value.shape}, but the robot has {n_dof} joints and there "
-                f"are {rows} rows."
+                f"are {rows} rows: it must be {expected}."
             )
         if not np.isfinite(value).all():
             bad = int(np.argwhere(~np.isfinite(value))[0, 0])
@@ -117,19 +123,26 @@ def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
 def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
     try:
         opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="utf-8", newline="") as file:
+        with opener(path, "rt", encoding="utf-8-sig", newline="") as file:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
+            if len(header) == 1 and ";" in header[0]:
+                raise DataError(f"{path}, line 1: columns must be separated by commas, not by ;.")
+            if not header:
+                raise DataError(f"{path}, line 1: the file is empty.")
             table = [
                 [_number(path, k, cell) for cell in row] for k, row in enumerate(rows, 2) if row
             ]
     except FileNotFoundError as error:
         raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
     for k, row in enumerate(table, 2):
         if len(row) != len(header):
             raise DataError(f"{path}, line {k}: {len(row)} values under {len(header)} headings.")
+    twice = sorted({name for name in header if header.count(name) > 1})
+    if twice:
+        raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
     data = np.array(table, dtype=float).reshape(len(table), len(header))
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}

@@ -21,6 +21,9 @@ from paramreduce_cli.errors import ArtifactError
 SCHEMA = 1
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
+_CHUNK = 16384
+"""Numbers in a chunk of a dataset that grows: 128 KiB."""
+
 
 @dataclass(frozen=True)
 class Stamp:
@@ -59,6 +62,10 @@ class Writer:
         """Of everything written so far."""
         return self._hash.hexdigest()
 
+    def timing(self, name: str, value: Any) -> None:
+        """Write how long something took, which is no part of what the file holds."""
+        self._group.create_dataset(name, data=np.asarray(value))
+
     def dataset(self, name: str, value: Any) -> None:
         """Write an array, a number, a text or a list of texts."""
         array = np.asarray(value)
@@ -87,7 +94,7 @@ class Writer:
             A function that appends a block.
         """
         tail = () if columns is None else (columns,)
-        chunk = max(1, 65536 // max(1, columns or 1))
+        chunk = max(1, _CHUNK // max(1, columns or 1))
         data = self._group.create_dataset(
             name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8"
         )
@@ -157,7 +164,10 @@ class Reader:
 
     def texts(self, name: str) -> tuple[str, ...]:
         """A dataset of texts."""
-        values = np.atleast_1d(self._dataset(name)[()])
+        data = self._dataset(name)
+        if not h5py.check_string_dtype(data.dtype) and data.size:
+            raise ArtifactError(f"{self.path}: /{name} must hold text.")
+        values = np.atleast_1d(data[()])
         return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
     def text(self, name: str) -> str:
@@ -170,8 +180,11 @@ class Reader:
         return value.item() if isinstance(value, np.generic) else value
 
     def rows(self, name: str) -> h5py.Dataset:
-        """A dataset to be read in slices."""
-        return self._dataset(name)
+        """A numeric dataset to be read in slices."""
+        data = self._dataset(name)
+        if data.dtype.kind not in "fiu" or data.ndim == 0:
+            raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")
+        return data
 
     def _dataset(self, name: str) -> h5py.Dataset:
         found = self.file.get(name)
@@ -204,7 +217,7 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
     with file:
         try:
             yield Reader(path, file)
-        except (OSError, KeyError, RuntimeError) as error:
+        except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
             raise ArtifactError(f"{path}: is damaged: {error}.") from error
 
 

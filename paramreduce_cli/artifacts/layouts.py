@@ -105,8 +105,9 @@ def save_trajectory_set(writer: Writer, name: str, items: tuple[Trajectory, ...]
     for variant in items[0].kappa_variants:
         values = [t.kappa_variants[variant] for t in items]
         writer.dataset(f"{name}/condition_number_variants/{variant}", values)
-    for key in _PER_JOINT + _SCALARS:
+    for key in (*_PER_JOINT, "kappa_start", "iterations"):
         writer.dataset(f"{name}/{key}", np.array([getattr(t, key) for t in items]))
+    writer.timing(f"{name}/cpu_seconds", [t.cpu_seconds for t in items])
     writer.dataset(f"{name}/status", [t.status for t in items])
 
 
@@ -163,7 +164,7 @@ def save_reduction(writer: Writer, reduction: Reduction) -> None:
         for n, values in enumerate(ordering.parameters, start=1):
             writer.dataset(f"{name}/parameters/{n}", values)
             writer.dataset(f"{name}/beta/{n}", ordering.beta[n - 1])
-        writer.dataset(f"{name}/seconds", ordering.seconds)
+        writer.timing(f"{name}/seconds", ordering.seconds)
 
 
 def load_reduction(reader: Reader) -> Reduction:

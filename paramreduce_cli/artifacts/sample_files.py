@@ -51,12 +51,18 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
 class StoredSet:
     """A sample set in a file, read in slices.
 
+    Args:
+        path: The file.
+        name: Of its group.
+        n_parameters: Columns that W must have.
+        own: Whether the project wrote the file, so that its triangular factors can be trusted.
+
     Raises:
         ArtifactError: W and tau do not fit each other, or hold numbers that are not finite.
     """
 
-    def __init__(self, path: Path, name: str, n_parameters: int) -> None:
-        self._path, self._name = path, name
+    def __init__(self, path: Path, name: str, n_parameters: int, *, own: bool) -> None:
+        self._path, self._name, self._own = path, name, own
         with reading(path) as reader:
             W, tau = reader.rows(f"{name}/W"), reader.rows(f"{name}/tau")
             if W.ndim != 2 or tau.ndim != 2 or W.shape[0] != tau.shape[0] * tau.shape[1]:
@@ -64,12 +70,20 @@ class StoredSet:
                     f"{path}: /{name}/W has shape {W.shape} and /{name}/tau {tau.shape}; W needs "
                     "one row per sample and joint, (n_samples * n_dof, n_parameters)."
                 )
+            if 0 in W.shape:
+                raise ArtifactError(f"{path}: /{name}/W is empty.")
             if W.shape[1] != n_parameters:
                 raise ArtifactError(
                     f"{path}: /{name}/W has {W.shape[1]} columns for {n_parameters} parameters."
                 )
             self.n_samples, self.n_dof = tau.shape
-            self._has_states = all(f"{name}/{key}" in reader for key in ("z", "dz", "ddz"))
+            present = [key for key in ("z", "dz", "ddz") if f"{name}/{key}" in reader]
+            self._has_states = len(present) == 3
+            for key in present:
+                if reader.rows(f"{name}/{key}").shape != tau.shape:
+                    raise ArtifactError(f"{path}: /{name}/{key} must have the shape {tau.shape}.")
+            for key in ("time", "trajectory"):
+                self._column(reader, key)
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
@@ -96,12 +110,21 @@ class StoredSet:
 
     def _column(self, reader: Reader, key: str) -> FloatArray:
         name = f"{self._name}/{key}"
-        return reader.array(name, 1) if name in reader else np.zeros(self.n_samples)
+        if name not in reader:
+            return np.zeros(self.n_samples)
+        column = reader.array(name, 1).astype(float)
+        if column.size != self.n_samples or not np.isfinite(column).all():
+            raise ArtifactError(
+                f"{self._path}: /{name} must hold {self.n_samples} finite numbers, one per sample."
+            )
+        if key == "trajectory" and (column.min() < 0 or np.any(column != np.floor(column))):
+            raise ArtifactError(f"{self._path}: /{name} must hold the numbers 0, 1, 2, ...")
+        return column
 
     def factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint, stored or computed."""
-        with reading(self._path) as reader:
-            if f"{self._name}/factors" in reader:
+        if self._own:
+            with reading(self._path) as reader:
                 return reader.array(f"{self._name}/factors", 4)
         return joint_factors(self.blocks())
 
@@ -129,9 +152,13 @@ def load_samples(reader: Reader) -> Samples:
             )
     else:
         names = tuple(f"p{k + 1}" for k in range(n))
-    estimation = StoredSet(reader.path, "estimation", n)
-    has_validation = "validation/W" in reader
-    validation = StoredSet(reader.path, "validation", n) if has_validation else None
+    own = reader.attribute("stage") == "sample"
+    sets = [
+        StoredSet(reader.path, name, n, own=own) if f"{name}/W" in reader else None
+        for name in ("estimation", "validation")
+    ]
+    estimation, validation = sets
+    assert estimation is not None
     return Samples(
         names=names,
         values=_optional(reader, "parameters/values", n),

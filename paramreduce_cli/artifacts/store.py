@@ -86,6 +86,30 @@ class Store:
         except ArtifactError:
             return None
 
+    def refuse_to_replace(self, record: type, robot: str) -> None:
+        """Keep what is not this robot's from being overwritten.
+
+        A damaged artifact may be replaced; a file of another robot, or one that paramreduce did
+        not make, may not.
+
+        Raises:
+            ArtifactError: The record's file is such a file.
+        """
+        path = self.path(record)
+        if not path.exists():
+            return
+        stamp = self.stamp(record)
+        if stamp is not None and stamp.robot != robot:
+            raise ArtifactError(
+                f"{path}: belongs to the robot {stamp.robot} and would be overwritten by {robot}. "
+                "Choose another folder with --results."
+            )
+        if stamp is None and is_foreign(path):
+            raise ArtifactError(
+                f"{path}: was not made by paramreduce and would be overwritten. Move it away, or "
+                "choose another folder with --results."
+            )
+
     def load(self, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:
         """Read a record.
 
@@ -140,12 +164,8 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
     hint = f"Make it with `paramreduce {maker}`." if maker else ""
     with reading(path, hint) as reader:
         stamp = read_stamp(path)
-        if stamp is not None and stamp.schema != SCHEMA:
-            age = "an older" if stamp.schema < SCHEMA else "a newer"
-            raise ArtifactError(
-                f"{path}: was written in {age} layout (schema {stamp.schema}, this version reads "
-                f"{SCHEMA}). Rebuild it with `paramreduce run`."
-            )
+        if stamp is not None:
+            check_schema(path, stamp)
         if stamp is None and robot is not None:
             raise ArtifactError(f"{path}: was not made by paramreduce. {hint}".rstrip())
         if stamp is not None and robot is not None and stamp.robot != robot:
@@ -154,6 +174,20 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
                 "with --results."
             )
         return LAYOUTS[record].load(reader), stamp
+
+
+def check_schema(path: Path, stamp: Stamp) -> None:
+    """Refuse a file of another layout.
+
+    Raises:
+        ArtifactError: It is of an older or newer schema.
+    """
+    if stamp.schema != SCHEMA:
+        age = "an older" if stamp.schema < SCHEMA else "a newer"
+        raise ArtifactError(
+            f"{path}: was written in {age} layout (schema {stamp.schema}, this version reads "
+            f"{SCHEMA}). Rebuild it with `paramreduce run`."
+        )
 
 
 class Parts(MutableMapping[str, Trajectory]):
@@ -237,18 +271,42 @@ def _save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
         with atomically(folder / name) as path:
             path.write_bytes(content)
     done = dataclasses.replace(stamp, digest=digest.hexdigest())
-    summary = {**report.summary, "provenance": done.__dict__}
+    _remove_what_a_former_report_left(folder, set(report.files))
+    summary = {**report.summary, "files": sorted(report.files), "provenance": done.__dict__}
     with atomically(folder / Path(SUMMARY).name) as path:
         path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
     return done
 
 
+def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
+    try:
+        former = load_json(folder / Path(SUMMARY).name).get("files", [])
+    except (ArtifactError, AttributeError):
+        return
+    for name in set(former) - files:
+        if not Path(name).is_absolute() and ".." not in Path(name).parts:
+            (folder / name).unlink(missing_ok=True)
+
+
 def _summary_stamp(path: Path) -> Stamp | None:
     summary = load_json(path)
     try:
+        if not all((path.parent / name).exists() for name in summary["files"]):
+            return dataclasses.replace(Stamp(**summary["provenance"]), digest="", stage="")
         return Stamp(**summary["provenance"])
     except (KeyError, TypeError):
         return None
+
+
+def is_foreign(path: Path) -> bool:
+    """Whether a file without provenance is whole, so that it must be somebody's."""
+    try:
+        if path.suffix == ".json":
+            return load_json(path) is not None
+        with reading(path):
+            return True
+    except ArtifactError:
+        return False
 
 
 def load_json(path: Path) -> Any:

@@ -18,6 +18,7 @@ from paramreduce_cli.pipeline import pipeline
 WRONG = 2
 INTERNAL = 70
 INTERRUPTED = 130
+PIPE_CLOSED = 141
 
 
 def main() -> None:
@@ -41,7 +42,10 @@ def main() -> None:
         code = INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = 0
+        code = PIPE_CLOSED
+    except OSError as error:
+        show_errors(f"cannot go on: {error.strerror or error}.")
+        code = WRONG
     except Exception as error:
         if os.environ.get("PARAMREDUCE_DEBUG"):
             raise

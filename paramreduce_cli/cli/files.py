@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +15,7 @@ from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.store import Store, load_file, load_json
 from paramreduce_cli.cli.terminal import out, say
 from paramreduce_cli.config import config_schema
+from paramreduce_cli.config.schema import NAME
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.multibody.relations import approximate_expressions
@@ -50,8 +52,10 @@ def init(name: str, dh: bool, joints: int, output: Path | None) -> None:
     Example: paramreduce init --dh my_arm --joints 6
     """
     path = output or Path("configs") / f"{name}.yaml"
-    if not name.replace("_", "").replace("-", "").isalnum():
-        raise ConfigError(f"NAME: {name!r} may hold letters, digits, - and _ only.")
+    if not re.fullmatch(NAME, name, re.ASCII):
+        raise ConfigError(
+            f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
+        )
     if path.exists():
         raise ConfigError(f"{path}: exists already; choose another with --output.")
     try:
@@ -72,6 +76,11 @@ def inspect(file: Path, chosen: str | None) -> None:
     """
     if chosen is not None:
         _say_model(file, chosen)
+        return
+    if file.suffix == ".json":
+        loaded = _load_summary(file)
+        for key, value in {**loaded.get("provenance", {}), **loaded.get("selected", {})}.items():
+            say(f"{key}: {value}")
         return
     attributes, datasets = contents(file)
     for name, value in attributes.items():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import statistics
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from paramreduce_cli.records import Report, Run, Validation
 from paramreduce_cli.runner import Outcome, Runner
 
 NOT_ACCEPTED = 1
+_TABLE_WIDTH = 84
 
 CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
 RESULTS = click.option(
@@ -67,6 +69,8 @@ def stage_command(stage: Stage) -> click.Command:
     ) -> int:
         if config is None and samples is None:
             raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
+        if config is None and overrides:
+            raise click.UsageError("--set changes keys of a CONFIG; give one.")
         loaded = load_config(config, overrides) if config is not None else None
         store = _store(loaded, results)
         with store.locked(), progress_bars(quiet) as progress:
@@ -171,6 +175,10 @@ def run(
         _say_summary(summary)
         say(f"Report: {store.path(Report).with_name('index.html')}")
     selected = summary["selected"]
+    if not quiet:
+        for text in summary["remarks"]:
+            if text.startswith("The selected model"):
+                remark(text.rstrip("."))
     return _say_verdict(selected["accepted"], selected["verdict"], quiet)
 
 
@@ -182,10 +190,10 @@ def _say_summary(summary: dict[str, Any]) -> None:
     )
     trajectories = summary["trajectories"]
     if trajectories is not None:
-        kappas = sorted(t["kappa"] for t in trajectories["estimation"])
+        kappas = [t["kappa"] for t in trajectories["estimation"]]
         say(
-            f"{len(kappas)} trajectories, {trajectories['scaling']} kappa: best {kappas[0]:.4g}, "
-            f"median {kappas[len(kappas) // 2]:.4g}, worst {kappas[-1]:.4g}"
+            f"{len(kappas)} trajectories, {trajectories['scaling']} kappa: best {min(kappas):.4g}, "
+            f"median {statistics.median(kappas):.4g}, worst {max(kappas):.4g}"
         )
     table = rich.table.Table(title=f"Reduced models with {n} parameters", box=rich.box.SIMPLE)
     headings = ("heuristic", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "d", "M|δ")
@@ -197,7 +205,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
     full = summary["full"]
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
     table.add_row("full model", "", "", "", "", *operations)
-    out.print(table)
+    out.print(table, width=max(out.width, _TABLE_WIDTH))
 
 
 def _summary_cells(row: dict[str, Any]) -> list[str]:
@@ -212,4 +220,6 @@ def _summary_cells(row: dict[str, Any]) -> list[str]:
 def _percent(share: float | None) -> str:
     if share is None:
         return "infinite"
+    if share < 1e-6:
+        return "0 %"
     return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"

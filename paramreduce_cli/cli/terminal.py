@@ -14,8 +14,17 @@ import rich.progress
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.records import Progress
 
-out = rich.console.Console(highlight=False, soft_wrap=True)
-err = rich.console.Console(stderr=True, highlight=False, soft_wrap=True)
+
+class _Console(rich.console.Console):
+    """A console that leaves a reader gone away to :func:`main`."""
+
+    def on_broken_pipe(self) -> None:
+        """Raise instead of leaving with an exit code of its own."""
+        raise BrokenPipeError
+
+
+out = _Console(highlight=False, soft_wrap=True)
+err = _Console(stderr=True, highlight=False, soft_wrap=True)
 
 
 def say(message: str) -> None:
@@ -39,7 +48,7 @@ def remark(message: str) -> None:
 
 
 class Interruption:
-    """Ctrl-C that cannot get lost.
+    """Ctrl-C, or a polite kill, that cannot get lost.
 
     A KeyboardInterrupt raised while a library calls back into Python may be swallowed there;
     it is remembered and raised again at the next step of the work.
@@ -49,8 +58,9 @@ class Interruption:
         self._met = False
 
     def install(self) -> None:
-        """Take over the signal."""
-        signal.signal(signal.SIGINT, self._note)
+        """Take over the signals that ask for an end."""
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._note)
 
     def _note(self, *_: object) -> None:
         self._met = True

@@ -50,6 +50,12 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
         for body in bodies:
             if body not in names:
                 yield ("parameter_sets", label, body), unknown("body", body, names)
+        for name in names:
+            if name not in bodies:
+                yield (
+                    ("parameter_sets", label),
+                    f"has no body {name}; write `{name}: {{}}` if it has no mass",
+                )
     if config.parameters is not None and config.parameters not in config.parameter_sets:
         yield ("parameters",), unknown("parameter set", config.parameters, config.parameter_sets)
 
@@ -137,6 +143,12 @@ def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
     ):
         if n is not None and n > total:
             yield path, f"is {n}, but {config.robot} has {total} parameters"
+    most, wanted = config.reduction.stop.parameters, config.selected.n
+    if most is not None and wanted is not None and wanted > most:
+        yield (
+            ("selected", "n"),
+            f"is {wanted}, but reduction.stop.parameters stops at {most}; raise that, or lower this",
+        )
 
 
 _CHECKS: tuple[Check, ...] = (
@@ -168,8 +180,8 @@ def _remark_on_physics(config: Config) -> None:
         eigenvalues = np.linalg.eigvalsh(pseudo)
         if eigenvalues[0] < -1e-9 * max(abs(eigenvalues[-1]), 1e-300):
             _remark(
-                f"no body has the inertia given for body {name} (its pseudo-inertia matrix has the "
-                f"eigenvalue {eigenvalues[0]:.3g})"
+                f"the inertia of body {name} is not physical: no distribution of mass has it (its "
+                f"pseudo-inertia matrix has the eigenvalue {eigenvalues[0]:.3g})"
             )
 
 

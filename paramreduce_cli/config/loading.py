@@ -89,7 +89,7 @@ def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
         config = Config.model_validate(data)
         return config, check(config)
     except ValidationError as error:
-        problems = [_describe(entry, data) for entry in error.errors()]
+        problems = _one_per_key([_describe(entry, data) for entry in error.errors()])
     remainder = copy.deepcopy(data)
     for path, _ in sorted(problems, key=lambda p: len(p[0]), reverse=True):
         _cut(remainder, path)
@@ -99,6 +99,17 @@ def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
         rest = []
     wrong = [path for path, _ in problems]
     return None, problems + [p for p in rest if not any(_touches(p[0], w) for w in wrong)]
+
+
+def _one_per_key(problems: list[Problem]) -> list[Problem]:
+    """A value that fits no member of a union is one problem, not one per member."""
+    found: dict[reading.Path, list[str]] = {}
+    for path, message in problems:
+        found.setdefault(path, []).append(message)
+    return [
+        (path, messages[0] if len(messages) == 1 else " Or: ".join(dict.fromkeys(messages)))
+        for path, messages in found.items()
+    ]
 
 
 def _touches(a: reading.Path, b: reading.Path) -> bool:
@@ -126,11 +137,15 @@ def _describe(entry: Any, data: Any) -> Problem:
         meaning = owner.model_fields[key].description or ""
     if entry["type"] == "missing":
         return path, f"is missing. It says: {meaning}"
-    message = entry["msg"].removeprefix("Value error, ")
+    message = entry["msg"].removeprefix("Value error, ").replace(" after validation", "")
+    if entry["type"] == "string_pattern_mismatch":
+        message = "a name starts with a letter or digit and goes on with those, _, - or dots"
     given = entry["input"]
     if not isinstance(given, dict | list) and entry["type"] != "value_error":
         message = f"{message[0].lower()}{message[1:]}, not {given!r}"
-    return path, f"{message}." + (f" It says: {meaning}" if meaning else "")
+    if message.endswith("?"):
+        return path, message
+    return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
 def _real_path(location: Iterable[str | int], data: Any) -> reading.Path:

@@ -70,9 +70,29 @@ def _evaluate(node: ast.expr) -> float:
     raise ValueError("not arithmetic")
 
 
-Number = Annotated[
-    float,
-    BeforeValidator(parse_number),
-    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]}),
-]
-"""A float that may be written as arithmetic, such as ``pi/2``."""
+_LARGEST = 1e12
+
+
+def _ordinary(value: Any) -> float:
+    """A number of a size that a machine can have and arithmetic can bear."""
+    result = parse_number(value)
+    if abs(result) > _LARGEST:
+        raise ValueError(f"{result:g} is too large; numbers go up to {_LARGEST:g}")
+    return result
+
+
+def _whole(value: Any) -> int:
+    result = _ordinary(value)
+    if result != int(result):
+        raise ValueError(f"{value!r} is not a whole number")
+    return int(result)
+
+
+_TEXT_OR_NUMBER = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
+
+Number = Annotated[float, BeforeValidator(_ordinary), _TEXT_OR_NUMBER]
+"""A finite float that may be written as arithmetic, such as ``pi/2``."""
+Limit = Annotated[float, BeforeValidator(parse_number), _TEXT_OR_NUMBER]
+"""The same, or ``inf`` for no limit."""
+Whole = Annotated[int, BeforeValidator(_whole), _TEXT_OR_NUMBER]
+"""A whole number that may be written as arithmetic, such as ``1e3``."""

@@ -8,6 +8,7 @@ from typing import Any
 import yaml
 
 Path = tuple[str | int, ...]
+_DEEPEST = 50
 
 
 @dataclass
@@ -54,6 +55,8 @@ def read_yaml(text: str, source: str) -> Document:
 
 
 def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Path, document: Document) -> Any:
+    if len(path) > _DEEPEST:
+        raise yaml.YAMLError("it refers to itself, or is nested too deep")
     document.lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         own = {id(key) for key, _ in node.value}
@@ -72,7 +75,12 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Path, document: Docum
         return result
     if isinstance(node, yaml.SequenceNode):
         return [_build(loader, item, (*path, k), document) for k, item in enumerate(node.value)]
-    return loader.construct_object(node, deep=True)
+    try:
+        return loader.construct_object(node, deep=True)
+    except ValueError as error:
+        line = node.start_mark.line + 1
+        document.problems.append((line, f"{node.value!r} cannot be read: {error}"))
+        return None
 
 
 def apply_override(document: Document, text: str) -> None:

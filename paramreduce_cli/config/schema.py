@@ -6,11 +6,18 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    WithJsonSchema,
+    model_validator,
+)
 
 from paramreduce_cli import registry
 from paramreduce_cli.config.names import registered
-from paramreduce_cli.config.numbers import Number
+from paramreduce_cli.config.numbers import Limit, Number, Whole
 from paramreduce_cli.records import PARAMETER_KINDS
 
 Heuristic = Annotated[str, registered(registry.heuristic)]
@@ -19,10 +26,14 @@ Scaling = Annotated[str, registered(registry.scaling)]
 
 NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 Positive = Annotated[Number, Field(gt=0)]
+Span = Annotated[Number, Field(ge=1e-6, le=1e6)]
+Count = Annotated[Whole, Field(ge=1, le=100_000)]
+Seed = Annotated[Whole, Field(ge=0)]
 Name = Annotated[
     str,
-    BeforeValidator(lambda value: str(value) if isinstance(value, int) else value),
+    BeforeValidator(lambda value: str(value) if type(value) is int else value),
     Field(pattern=NAME),
+    WithJsonSchema({"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}),
 ]
 
 
@@ -36,11 +47,24 @@ def _as_pairs(value: Any) -> Any:
     return value
 
 
-PerJoint = Annotated[list[Number], BeforeValidator(_as_list)]
+_SCALAR = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+_VECTOR = {"type": "array", "items": _SCALAR, "minItems": 1}
+_ONE_OR_EACH = WithJsonSchema({"anyOf": [*_SCALAR["anyOf"], _VECTOR]})
+_PAIR_OR_EACH = WithJsonSchema({"anyOf": [_VECTOR, {"type": "array", "items": _VECTOR}]})
+
+PerJoint = Annotated[list[Number], BeforeValidator(_as_list), Field(min_length=1), _ONE_OR_EACH]
 """One number for all joints or one for each."""
-PositivePerJoint = Annotated[list[Positive], BeforeValidator(_as_list)]
+PositivePerJoint = Annotated[
+    list[Positive], BeforeValidator(_as_list), Field(min_length=1), _ONE_OR_EACH
+]
+LimitPerJoint = Annotated[
+    list[Annotated[Limit, Field(ge=1e-6)]],
+    BeforeValidator(_as_list),
+    Field(min_length=1),
+    _ONE_OR_EACH,
+]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-PairPerJoint = Annotated[list[Pair], BeforeValidator(_as_pairs)]
+PairPerJoint = Annotated[list[Pair], BeforeValidator(_as_pairs), Field(min_length=1), _PAIR_OR_EACH]
 """One [lower, upper] for all joints or one for each."""
 
 
@@ -115,7 +139,7 @@ class BodyParameters(Section):
     Izz: Number = 0.0
     """Inertia about the frame's origin, kg m^2."""
     com: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None
-    """Centre of mass in the body's frame, m; instead of mx, my, mz."""
+    """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
     inertia_com: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
     """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
 
@@ -136,10 +160,10 @@ class BodyParameters(Section):
         if self.com is not None:
             c = np.array(self.com)
             values[1:4] = (self.m * c).tolist()
-            if self.inertia_com is not None:
+            if not self.model_fields_set & set(PARAMETER_KINDS[4:]):
                 shift = self.m * (c @ c * np.eye(3) - np.outer(c, c))
                 upper = shift[np.triu_indices(3)]
-                values[4:] = (np.array(self.inertia_com) + upper).tolist()
+                values[4:] = (np.array(self.inertia_com or [0.0] * 6) + upper).tolist()
         return values
 
 
@@ -150,28 +174,28 @@ class ModelSection(Section):
     """Names of the independent parameters; if left out they are taken in the order Izz Ixx Ixy Ixz Iyz mx my Iyy mz m."""
     rank_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
     """Singular values below this share of the largest one count as zero."""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     """Of the random states on which the rank is decided."""
 
 
 class Trajectories(Section):
     """How exciting trajectories are made."""
 
-    count: Annotated[int, Field(ge=1)] = 10
+    count: Count = 10
     """Trajectories of the estimation set."""
-    validation_count: Annotated[int, Field(ge=1)] = 1
+    validation_count: Count = 1
     """Trajectories of the validation set."""
-    harmonics: Annotated[int, Field(ge=1)] = 4
+    harmonics: Annotated[Whole, Field(ge=1, le=100)] = 4
     """Harmonics of the Fourier series."""
-    period: Positive = 2 * np.pi
+    period: Span = 2 * np.pi
     """s"""
-    points: Annotated[int, Field(ge=4)] = 100
+    points: Annotated[Whole, Field(ge=4, le=10_000_000)] = 100
     """Grid points over a period on which criterion and limits are evaluated."""
     position_limits: PairPerJoint
     """[lower, upper] for all joints, or a list of one pair per joint; rad (m if prismatic)."""
-    velocity_limits: PositivePerJoint
+    velocity_limits: LimitPerJoint
     """Largest speed, one for all joints or a list; rad/s (m/s if prismatic)."""
-    acceleration_limits: PositivePerJoint | None = None
+    acceleration_limits: LimitPerJoint | None = None
     """Largest acceleration, one for all joints or a list; rad/s^2 (m/s^2 if prismatic)."""
     use_full_range: bool = True
     """Whether every joint must reach one of its limits."""
@@ -179,13 +203,13 @@ class Trajectories(Section):
     """What is minimised."""
     scaling: Scaling = "column-normalised"
     """Scaling of the base columns of W in which the criterion is measured."""
-    starts: Annotated[int, Field(ge=1)] = 10
+    starts: Count = 10
     """Random starts per trajectory."""
-    polished: Annotated[int, Field(ge=1)] = 2
+    polished: Count = 2
     """How many of the most promising starts are optimised to the end."""
-    max_iterations: Annotated[int, Field(ge=1)] = 250
+    max_iterations: Count = 250
     """Of IPOPT, for each level of sharpness."""
-    seed: Annotated[int, Field(ge=0)] = 0
+    seed: Seed = 0
     """Of the random starts."""
     file: Path | None = None
     """Fourier coefficients to use instead of optimising: a trajectories.h5, or a summary.json; relative to this file."""
@@ -194,9 +218,9 @@ class Trajectories(Section):
 class Sampling(Section):
     """The estimation and validation sets."""
 
-    points: Annotated[int, Field(ge=2)] | None = None
+    points: Annotated[Whole, Field(ge=2, le=10_000_000)] | None = None
     """Samples per estimation trajectory; as many as trajectories.points if left out."""
-    validation_points: Annotated[int, Field(ge=2)] | None = None
+    validation_points: Annotated[Whole, Field(ge=2, le=10_000_000)] | None = None
     """Samples per validation trajectory; as many as trajectories.points if left out."""
     estimation_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
@@ -211,7 +235,7 @@ class Stop(Section):
 
     torque_error: Positive | None = None
     """Smallest subset whose torque error is at most this."""
-    parameters: Annotated[int, Field(ge=1)] | None = None
+    parameters: Count | None = None
     """Number of parameters."""
 
 
@@ -235,7 +259,7 @@ class SelectedSection(Section):
 
     heuristic: Heuristic = "forward-selection"
     """Whose subset."""
-    n: Annotated[int, Field(ge=1)] | None = None
+    n: Count | None = None
     """Number of parameters; or give torque_error."""
     torque_error: Positive | None = None
     """Take the smallest subset whose torque error on the estimation set is at most this."""
@@ -284,7 +308,7 @@ class ReportSection(Section):
         "png",
     ]
     """File formats of the figures."""
-    poses: list[PerJoint] | None = None
+    poses: Annotated[list[PerJoint], Field(min_length=1)] | None = None
     """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
 
 
@@ -320,6 +344,11 @@ class Config(Section):
     def n_dof(self) -> int:
         """Number of joints."""
         return len(self.description.dh.joints)
+
+    def per_joint(self, values: object) -> np.ndarray:
+        """An entry that is one number for all joints or one for each, (n_dof,)."""
+        result = np.array(values, dtype=float)
+        return np.full(self.n_dof, result[0]) if result.size == 1 else result
 
     def body_names(self) -> list[str]:
         """Names of the bodies in the order of the table."""

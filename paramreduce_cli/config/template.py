@@ -5,7 +5,7 @@ from __future__ import annotations
 _HEAD = """\
 # {name}: fill in what is marked TODO. Units are SI; numbers may be written as 1e-3 or pi/2.
 # `paramreduce schema` lists every key with its meaning, unit and default.
-robot: {name}
+robot: "{name}"
 
 description:
   gravity: [0, 0, -9.81]        # acceleration of gravity in the base frame, m/s^2

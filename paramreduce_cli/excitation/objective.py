@@ -101,7 +101,7 @@ class FreeObjective:
         self._limits = limits
         self._sharpness = sharpness
         self._norm = norm
-        self._shape = (limits.middle.size, basis.position.shape[1])
+        self._shape = (limits.n_dof, limits.n_columns)
 
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient at ``x``, the free series stacked joint by joint."""

@@ -143,7 +143,7 @@ def describe(
     limits = settings.limits
     z, dz, ddz = states
     shares = [
-        np.abs(z - limits.middle) / limits.reach,
+        np.abs(z - coefficients[:, 0]) / limits.reach,
         np.abs(dz) / limits.velocity,
         np.abs(ddz) / limits.acceleration,
     ]
@@ -170,8 +170,8 @@ def _start(
 ) -> _Candidate:
     """A normal random series, scaled to its limits: on a scale of its own for every joint."""
     rng = np.random.default_rng(seed)
-    free = rng.normal(size=(limits.middle.size, 1 + 2 * settings.harmonics))
-    free /= limits.shares(free)[:, None]
+    free = rng.normal(size=(limits.n_dof, limits.n_columns))
+    free[:, 1:] /= limits.shares(free)[:, None]
     kappa = excitation.condition_numbers(basis.states(limits.scaled(free)))[settings.scaling]
     return _Candidate(free, kappa, np.inf, None)
 

@@ -21,7 +21,7 @@ Scaling = Callable[[FloatArray, FloatArray], tuple[FloatArray, Pullback]]
 @scaling("column-normalised")
 def column_normalised(W: FloatArray, beta: FloatArray) -> tuple[FloatArray, Pullback]:
     """Columns divided by their 2-norms."""
-    norms = np.linalg.norm(W, axis=0)
+    norms = np.maximum(np.linalg.norm(W, axis=0), np.finfo(float).tiny)
     scaled = W / norms
 
     def pull(bar: FloatArray) -> FloatArray:

@@ -8,9 +8,11 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
+import os
 import queue
 import signal
 import threading
+import time
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -86,7 +88,8 @@ def optimise_all(task: Task, keys: list[str], run: Run) -> dict[str, Trajectory]
         return found
     _excitation(task)  # compile once, before the workers all ask for it
     with _pool(task, min(run.jobs, len(missing)), run) as pool:
-        futures = {pool.submit(_optimise, key): key for key in missing}
+        with _interruption_held():  # so that new processes are born without it
+            futures = {pool.submit(_optimise, key): key for key in missing}
         try:
             for future in as_completed(futures):
                 key = futures[future]
@@ -120,6 +123,16 @@ def _pool(task: Task, jobs: int, run: Run) -> Iterator[ProcessPoolExecutor]:
         listener.join(timeout=5)
 
 
+@contextlib.contextmanager
+def _interruption_held() -> Iterator[None]:
+    """Keep Ctrl-C waiting; processes started meanwhile never get it."""
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def _listen(news: Queue[Progress | None], run: Run) -> None:
     while True:
         try:
@@ -141,10 +154,19 @@ class _Worker:
 
 def _start_worker(task: Task, news: Queue[Progress | None]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     threadpoolctl.threadpool_limits(1)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
     _Worker.task, _Worker.news = task, news
     _Worker.excitation = _excitation(task)
+
+
+def _end_with(parent: int) -> None:
+    """End this process when its parent is gone, however that ended."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)
 
 
 def _excitation(task: Task) -> Excitation:

@@ -11,6 +11,7 @@ from __future__ import annotations
 import ctypes
 import hashlib
 import os
+import shlex
 import shutil
 import subprocess
 import tempfile
@@ -100,10 +101,12 @@ def _pointers(arrays: list[FloatArray]) -> ctypes.Array:
 
 
 @cache
-def compiler() -> str | None:
-    """Path of the C compiler: ``$CC`` if set, else gcc or cc; None if there is none."""
-    names = [os.environ["CC"]] if os.environ.get("CC") else ["gcc", "cc"]
-    found = next((path for name in names if (path := shutil.which(name))), None)
+def compiler() -> tuple[str, ...] | None:
+    """The C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none."""
+    wanted = shlex.split(os.environ.get("CC", ""))
+    names = [wanted[0]] if wanted else ["gcc", "cc"]
+    path = next((path for name in names if (path := shutil.which(name))), None)
+    found = (path, *wanted[1:]) if path is not None else None
     if found is None:
         warnings.warn(
             "no C compiler found (gcc, cc or $CC): the model runs in CasADi's virtual machine, "
@@ -122,28 +125,42 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
 
 
+@cache
+def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="paramreduce-")
+
+
+def _folder_of_this_process() -> Path:
+    """Where compiled models go if the user's cache cannot be written; removed at the end."""
+    return Path(_temporary_folder().name)
+
+
 def _load(function: ca.Function) -> ctypes.CDLL | None:
     cc = compiler()
     if cc is None:
         return None
     text = _c_text(function)
     digest = hashlib.sha256(
-        "\n".join([text, cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
+        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
     ).hexdigest()
     try:
         folder = cache_folder()
         folder.mkdir(parents=True, exist_ok=True)
     except OSError:
-        folder = Path(tempfile.mkdtemp(prefix="paramreduce-"))
+        folder = _folder_of_this_process()
     library = folder / f"{digest[:32]}.so"
     try:
-        if not library.exists():
-            _compile(cc, text, library)
+        if library.exists():
+            try:
+                return ctypes.CDLL(str(library))
+            except OSError:
+                library.unlink(missing_ok=True)  # damaged: compile it again
+        _compile(cc, text, library)
         return ctypes.CDLL(str(library))
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)
         warnings.warn(
-            f"the C compiler {cc} failed ({str(detail).strip().splitlines()[-1]}): the model runs "
+            f"the C compiler {cc[0]} failed ({str(detail).strip().splitlines()[-1]}): the model runs "
             "in CasADi's virtual machine, with the same results but several times slower",
             ParamreduceWarning,
             stacklevel=2,
@@ -163,14 +180,14 @@ def _c_text(function: ca.Function) -> str:
     return generator.dump() + loop
 
 
-def _compile(cc: str, text: str, library: Path) -> None:
+def _compile(cc: tuple[str, ...], text: str, library: Path) -> None:
     """Compile beside the target and rename, so that parallel runs never load half a file."""
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         source = Path(folder, "kernel.c")
         source.write_text(text)
         built = Path(folder, "kernel.so")
         subprocess.run(
-            [cc, *_FLAGS, str(source), "-o", str(built), "-lm"],
+            [*cc, *_FLAGS, str(source), "-o", str(built), "-lm"],
             check=True,
             capture_output=True,
             text=True,

@@ -24,6 +24,9 @@ _AFFECTING_TOLERANCE = 1e-11
 
 _NUMERICALLY_ZERO = 1e-10
 
+DEPENDENT = 1e-9
+"""A column is dependent on others when no more than this share of its length is left of it."""
+
 
 def preference_order(names: tuple[str, ...]) -> IntArray:
     """Parameter indices from the most to the least preferred.
@@ -66,15 +69,15 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
     rank = int(np.sum(singular > tolerance * singular[0])) if singular.size else 0
     gap = float(singular[rank - 1] / singular[rank]) if 0 < rank < singular.size else np.inf
 
-    positions = {int(column): k for k, column in enumerate(affecting)}
-    wanted = [positions[int(c)] for c in preference if int(c) in positions]
-    taken = independent_columns(scaled, wanted, rank)
-    if len(taken) < rank:
+    compressed: FloatArray = np.linalg.qr(W, mode="r")  # type: ignore[assignment]
+    wanted = preference[np.isin(preference, affecting)]
+    taken = independent_columns(compressed, wanted, tolerance)
+    if len(taken) != rank:
         raise RankError(
             f"the rank is not clear: {rank} by singular values, {len(taken)} by columns; the gap "
             f"at {rank} is {gap:.3g}. Raise or lower model.rank_tolerance (now {tolerance:g})."
         )
-    columns = affecting[taken]
+    columns = np.array(taken, dtype=np.int64)
     return BaseParameters(columns, regrouping(W, columns), singular, gap)
 
 
@@ -102,22 +105,24 @@ def regrouping(W: FloatArray, columns: IntArray) -> FloatArray:
     return beta
 
 
-def independent_columns(scaled: FloatArray, wanted: list[int], rank: int) -> list[int]:
-    """Take columns of unit length in the order wanted while they are independent of those taken.
+def independent_columns(W: FloatArray, wanted: IntArray, tolerance: float = DEPENDENT) -> list[int]:
+    """Take columns in the order wanted, leaving out those that depend on columns taken before.
 
-    A column is dependent when no more of it is left than the square root of the rounding unit.
+    Args:
+        W: (k, n)
+        wanted: Column indices.
+        tolerance: A column depends on others when no more than this share of its length is
+            left of it.
     """
-    residual: FloatArray = np.linalg.qr(scaled, mode="r")  # type: ignore[assignment]
-    basis = np.empty((residual.shape[0], 0))
+    basis = np.empty((W.shape[0], 0))
     taken: list[int] = []
-    for k in wanted:
-        if len(taken) == rank:
-            break
-        column = residual[:, k]
+    for column in wanted:
+        vector = W[:, column]
+        length = np.linalg.norm(vector)
         for _ in range(2):
-            column = column - basis @ (basis.T @ column)
-        length = np.linalg.norm(column)
-        if length > np.sqrt(np.finfo(float).eps):
-            taken.append(k)
-            basis = np.column_stack([basis, column / length])
+            vector = vector - basis @ (basis.T @ vector)
+        rest = np.linalg.norm(vector)
+        if rest > tolerance * length and length > 0:
+            taken.append(int(column))
+            basis = np.column_stack([basis, vector / rest])
     return taken

@@ -48,14 +48,14 @@ class ObservedSet:
         dynamics: Dynamics,
         phi: FloatArray,
     ) -> None:
-        self._states = states
+        self.states = states
         self.n_samples = n_samples
         self._dynamics = dynamics
         self._phi = phi
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        for s in self._states():
+        for s in self.states():
             K = self._dynamics.regressor(s.z, s.dz, s.ddz)
             tau = K @ self._phi if s.tau is None else s.tau
             W = K.reshape(-1, K.shape[2])

@@ -112,7 +112,9 @@ def approximate_expressions(
 
 
 def signed_number(value: float) -> str:
-    """Such as ``- 0.4318``."""
+    """Such as ``- 0.4318``; one is left out."""
+    if abs(abs(value) - 1.0) <= _MATCH:
+        return "-" if value < 0 else "+"
     return f"{'-' if value < 0 else '+'} {abs(value):.6g}"
 
 

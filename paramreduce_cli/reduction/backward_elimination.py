@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
+from paramreduce_cli.multibody.base_parameters import independent_columns
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.problem import (
     FULL_PRECISION,
     SelectionProblem,
     first_of_the_best,
-    independent_subset,
 )
 from paramreduce_cli.registry import heuristic
 
@@ -28,7 +28,7 @@ def backward_elimination(problem: SelectionProblem) -> IntArray:
         All candidates, the last removed first, (n_candidates,).
     """
     wanted = problem.candidates_by_preference
-    left = independent_subset(problem.W, wanted)
+    left = independent_columns(problem.W, wanted)
     tail = [int(column) for column in wanted if int(column) not in set(left)]
     while left:
         costs = _removal_costs(problem.W[:, left], problem.chi)

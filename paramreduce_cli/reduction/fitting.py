@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.multibody.base_parameters import DEPENDENT, independent_columns
 from paramreduce_cli.records import Block, FloatArray, IntArray
-from paramreduce_cli.reduction.problem import DEPENDENT, SelectionProblem
+from paramreduce_cli.reduction.problem import SelectionProblem
 
 
 @dataclass(frozen=True)
@@ -34,13 +35,15 @@ def fit(problem: SelectionProblem, subset: IntArray) -> Fit:
     lengths = np.linalg.norm(problem.W[:, subset], axis=0)
     lengths = np.where(lengths > 0, lengths, 1.0)
     right = np.column_stack([problem.W[:, others], problem.chi])
-    solution, _, rank, _ = np.linalg.lstsq(problem.W[:, subset] / lengths, right, rcond=DEPENDENT)
+    dependent = len(independent_columns(problem.W, subset)) < subset.size
+    cut = DEPENDENT if dependent else None
+    solution, *_ = np.linalg.lstsq(problem.W[:, subset] / lengths, right, rcond=cut)
     solution = solution / lengths[:, None]
     parameters = solution[:, -1]
     left = problem.chi - problem.W[:, subset] @ parameters
     total = np.linalg.norm(problem.chi)
     error = float(np.linalg.norm(left) / total) if total > 0 else 0.0
-    return Fit(parameters, solution[:, :-1], error, bool(rank < subset.size))
+    return Fit(parameters, solution[:, :-1], error, dependent)
 
 
 @dataclass(frozen=True)
@@ -86,3 +89,10 @@ def torque_errors(
         infinity=largest / max(chi_largest, tiny),
         joints=np.sqrt(squares / np.maximum(chi_square, tiny)),
     )
+
+
+def model_column(subset: IntArray, parameters: FloatArray, n: int) -> FloatArray:
+    """All parameters of a reduced model, zero where one is not kept, (n,)."""
+    result = np.zeros(n)
+    result[subset] = parameters
+    return result

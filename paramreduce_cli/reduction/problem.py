@@ -9,8 +9,6 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 
-DEPENDENT = 1e-9
-"""A column is dependent on others when less than this share of its length is left of it."""
 FULL_PRECISION = 1e-13
 """Share of the torques below which what is left to explain is round-off."""
 TIE = 1e-9
@@ -50,24 +48,3 @@ def first_of_the_best(scores: FloatArray) -> int:
     """
     best = float(np.max(scores))
     return int(np.argmax(scores >= best - TIE * abs(best)))
-
-
-def independent_subset(W: FloatArray, wanted: IntArray) -> list[int]:
-    """Columns taken in the order wanted, leaving out those that depend on columns taken before.
-
-    Args:
-        W: (k, n)
-        wanted: Column indices.
-    """
-    basis = np.empty((W.shape[0], 0))
-    taken: list[int] = []
-    for column in wanted:
-        vector = W[:, column]
-        length = np.linalg.norm(vector)
-        for _ in range(2):
-            vector = vector - basis @ (basis.T @ vector)
-        rest = np.linalg.norm(vector)
-        if rest > DEPENDENT * length and length > 0:
-            taken.append(int(column))
-            basis = np.column_stack([basis, vector / rest])
-    return taken

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from paramreduce_cli.multibody.base_parameters import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.reduction.problem import DEPENDENT, SelectionProblem
+from paramreduce_cli.reduction.problem import SelectionProblem
 
 
 class Remainder:

@@ -27,6 +27,8 @@ TOLERANCES: dict[str, Tolerance] = {
     "torque_error": Tolerance(1e-4, 1e-9),
     "acceleration_error": Tolerance(1e-3, 1e-6),
     "operations": Tolerance(0.0),
+    "mass_matrix": Tolerance(1e-4, 1e-9),
+    "parameters": Tolerance(1e-5, 1e-9),
 }
 _TIE = Tolerance(1e-7, 1e-9)
 
@@ -80,9 +82,14 @@ def _kappa(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
         return
     limit = 1 + tolerances["kappa"].relative
     for label, pick in (("best", min), ("median", _median)):
-        x, y = (pick([t["kappa"] for t in s["trajectories"]["estimation"]]) for s in (a, b))
+        x, y = (pick(_kappas(s)) for s in (a, b))
         if x != y:
             yield Difference(f"kappa, {label}", f"{x:.5g}", f"{y:.5g}", tolerated=y <= x * limit)
+
+
+def _kappas(summary: Summary) -> list[float]:
+    found = [t["kappa"] for t in summary["trajectories"]["estimation"]]
+    return [math.inf if kappa is None else kappa for kappa in found] or [math.inf]
 
 
 def _median(values: list[float]) -> float:
@@ -91,25 +98,31 @@ def _median(values: list[float]) -> float:
     return (ordered[middle] + ordered[~middle]) / 2
 
 
-def _rows(a: Summary, b: Summary, part: str) -> Iterator[tuple[str, Any, Any]]:
-    """Rows of a part of the validation that both summaries have, by label."""
-    for name, rows in a["validation"].items():
-        for x, y in zip(rows, b["validation"].get(name, []), strict=False):
-            for key in x[part]:
-                yield f"{part}.{key}, {name}, n = {x['n']}", x[part][key], y[part].get(key)
-
-
 def _numbers(part: str) -> Quantity:
     def quantity(
         a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
     ) -> Iterator[Difference]:
-        for what, x, y in _rows(a, b, part):
-            for k, (p, q) in enumerate(zip(_listed(x), _listed(y), strict=False)):
-                if p != q:
-                    label = f"{what}, joint {k + 1}" if isinstance(x, list) else what
-                    yield Difference(label, _text(p), _text(q), tolerances[part].holds(p, q))
+        for name, rows in a["validation"].items():
+            others = b["validation"].get(name, [])
+            yield from _exact(f"rows of {part}, {name}", len(rows), len(others))
+            for x, y in zip(rows, others, strict=False):
+                yield from _row(f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part])
 
     return quantity
+
+
+def _row(
+    where: str, part: str, x: Mapping[str, Any], y: Mapping[str, Any], tolerance: Tolerance
+) -> Iterator[Difference]:
+    yield from _exact(f"{part}, {where}", sorted(x), sorted(y))
+    for key in x.keys() & y.keys():
+        one, two = _listed(x[key]), _listed(y[key])
+        yield from _exact(f"entries of {part}.{key}, {where}", len(one), len(two))
+        for k, (p, q) in enumerate(zip(one, two, strict=False)):
+            if p != q:
+                joint = f", joint {k + 1}" if isinstance(x[key], list) else ""
+                what = f"{part}.{key}, {where}{joint}"
+                yield Difference(what, _text(p), _text(q), tolerance.holds(p, q))
 
 
 def _listed(value: Any) -> list[Any]:
@@ -124,7 +137,7 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
     """Orders are the same up to ties: another subset with the same error is no difference."""
     yield from _exact("heuristics", sorted(a["reduction"]), sorted(b["reduction"]))
     for name in a["reduction"]:
-        if name not in b["reduction"]:
+        if name not in b["reduction"] or name not in b["validation"]:
             continue
         x, y = a["reduction"][name]["order"], b["reduction"][name]["order"]
         yield from _exact(f"parameters ordered, {name}", len(x), len(y))
@@ -143,6 +156,12 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
 def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
     for key in ("heuristic", "n", "accepted"):
         yield from _exact(f"selected.{key}", a["selected"][key], b["selected"][key])
+    x, y = a["selected"]["parameters"], b["selected"]["parameters"]
+    yield from _exact("selected.parameters", sorted(x), sorted(y))
+    for name in x.keys() & y.keys():
+        if x[name] != y[name]:
+            holds = tolerances["parameters"].holds(x[name], y[name])
+            yield Difference(f"selected.parameters.{name}", _text(x[name]), _text(y[name]), holds)
 
 
 QUANTITIES: dict[str, Quantity] = {
@@ -152,5 +171,6 @@ QUANTITIES: dict[str, Quantity] = {
     "torque_error": _numbers("torque_error"),
     "acceleration_error": _numbers("acceleration_error"),
     "operations": _numbers("operations"),
+    "mass_matrix": _numbers("mass_matrix"),
     "selected": _selected,
 }

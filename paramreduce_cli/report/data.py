@@ -48,6 +48,8 @@ class Skeleton:
     """Frames of the bodies, (n_bodies, 4, 4)."""
     joints: FloatArray
     """Frames of the joints, before their motion, (n_bodies, 4, 4)."""
+    masses: FloatArray
+    """Centres of mass, NaN for bodies without mass, (n_bodies, 3), m."""
     parents: tuple[int, ...]
     kinds: tuple[str, ...]
 

@@ -9,6 +9,7 @@ import matplotlib as mpl
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import figure
@@ -36,6 +37,7 @@ _STYLE = {
 }
 _JOINT_COLOURS = ("#0b6e99", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f", "#7a6a53", "#4d7c8a")
 _HEURISTIC_COLOURS = ("#7d8590", "#0b62c4", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f")
+_LINES = ("-", "--", ":", "-.")
 _MARKERS = ("s", "o", "^", "D", "v", "P")
 _WIDE = (7.2, 3.6)
 _FLOOR = 1e-16
@@ -91,8 +93,10 @@ def poses(data: ReportData) -> Figure:
 
 def _extent(skeleton: Skeleton) -> FloatArray:
     """Corners of the box around a pose and the base, (2, 3), m."""
-    points = np.vstack([np.zeros(3), skeleton.poses[:, :3, 3], skeleton.joints[:, :3, 3]])
-    return np.array([points.min(axis=0), points.max(axis=0)])
+    points = np.vstack(
+        [np.zeros(3), skeleton.poses[:, :3, 3], skeleton.joints[:, :3, 3], skeleton.masses]
+    )
+    return np.array([np.nanmin(points, axis=0), np.nanmax(points, axis=0)])
 
 
 def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
@@ -105,10 +109,13 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
         ends = np.array([middle - axis, middle + axis]).T
         colour = "#d9730d" if skeleton.kinds[i] == "revolute" else "#2f8f5b"
         axes.plot(*ends, color=colour, linewidth=2.4, solid_capstyle="butt")
-    tip = skeleton.poses[-1]
-    for column, colour in zip(range(3), ("#c2384f", "#2f8f5b", "#0b62c4"), strict=True):
-        arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.25 * half * tip[:3, column]]).T
-        axes.plot(*arrow, color=colour, linewidth=1.4)
+    for i in set(range(len(skeleton.parents))) - set(skeleton.parents):
+        tip = skeleton.poses[i]
+        to_mass = np.array([tip[:3, 3], skeleton.masses[i]]).T
+        axes.plot(*to_mass, color="#44607a", linewidth=2.5, solid_capstyle="round", alpha=0.6)
+        for column, colour in zip(range(3), ("#c2384f", "#2f8f5b", "#0b62c4"), strict=True):
+            arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.25 * half * tip[:3, column]]).T
+            axes.plot(*arrow, color=colour, linewidth=1.4)
     axes.scatter(0, 0, 0, marker="s", s=40, color="#30363d")
     axes.set_box_aspect((1, 1, 1), zoom=1.15)
     axes.view_init(elev=22, azim=-60)
@@ -137,18 +144,18 @@ def trajectory(data: ReportData) -> Figure:
         _joint_lines(axes, data, values)
         axes.set_ylabel(label)
     all_axes[0].legend(
-        ncols=values.shape[1], fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+        ncols=min(values.shape[1], 7), fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0)
     )
     all_axes[-1].set_xlabel("t (s)")
     return drawn
 
 
-def _joint_lines(axes: Axes, data: ReportData, values: FloatArray, **style: object) -> None:
+def _joint_lines(axes: Axes, data: ReportData, values: FloatArray) -> None:
     for j in range(values.shape[1]):
         colour = _JOINT_COLOURS[j % len(_JOINT_COLOURS)]
-        axes.plot(
-            data.motion.time, values[:, j], color=colour, label=_joint_label(data, j), **style
-        )
+        line = _LINES[j // len(_JOINT_COLOURS) % len(_LINES)]
+        label = _joint_label(data, j)
+        axes.plot(data.motion.time, values[:, j], color=colour, linestyle=line, label=label)
 
 
 @figure("torque-error")
@@ -201,6 +208,7 @@ def _visible(values: FloatArray) -> FloatArray:
 
 
 def _mark_selected(axes: Axes, data: ReportData) -> None:
+    axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.axvline(data.validation.selected.n, color="#0b62c4", linewidth=0.8, alpha=0.5)
 
 

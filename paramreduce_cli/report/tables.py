@@ -56,20 +56,31 @@ _SYMBOLS = {
     "φ'": r"$\varphi'$",
     "²": r"$^2$",
 }
-_SPECIAL = str.maketrans({"%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$"})
+_ESCAPES = {
+    "\\": r"\textbackslash{}", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{",
+    "}": r"\}", "~": r"\textasciitilde{}", "^": r"\^{}", "_": r"\_",
+}  # fmt: skip
+_NAME = re.compile(r"(?<![\w.-])(m[xyz]?|I[xyz]{2}|z|a|d|b)_([\w.-]*\w)(\^\d)?")
 
 
 def _latex(text: str) -> str:
-    escaped = text.translate(_SPECIAL)
-    marks = {chr(0xE000 + k): latex for k, latex in enumerate(_SYMBOLS.values())}
-    for mark, symbol in zip(marks, _SYMBOLS, strict=True):
-        escaped = escaped.replace(symbol, mark)
-    escaped = re.sub(r"\b(m[xyz]?|I[xyz]{2}|z|a|d|b)_(\w+)", r"$\1_{\2}$", escaped)
-    escaped = re.sub(r"(?<![\w}$])_|(?<=[A-Za-z0-9])_(?!\{)", r"\\_", escaped)
-    escaped = escaped.replace("^", r"\^{}")
-    for mark, latex in marks.items():
-        escaped = escaped.replace(mark, latex)
-    return escaped
+    """Escape text; names of parameters and lengths become formulas."""
+    pieces = []
+    last = 0
+    for match in _NAME.finditer(text):
+        pieces.append(_escape(text[last : match.start()]))
+        symbol, subscript, power = match.groups()
+        pieces.append(f"${symbol}_{{\\mathrm{{{_escape(subscript)}}}}}{power or ''}$")
+        last = match.end()
+    return "".join([*pieces, _escape(text[last:])])
+
+
+def _escape(text: str) -> str:
+    for symbol, latex in _SYMBOLS.items():
+        if symbol in text:
+            before, _, after = text.partition(symbol)
+            return _escape(before) + latex + _escape(after)
+    return "".join(_ESCAPES.get(character, character) for character in text)
 
 
 def percent(value: float) -> str:
@@ -175,8 +186,8 @@ def summary(data: ReportData) -> Table:
     n = data.validation.selected.n
     full = data.validation.full
     header = (
-        "heuristic", "parameters", "base r", "n", "d full", "d reduced", "saved", "ε_τ E", "ε_τ V",
-        "[M, δ] full", "[M, δ] reduced", "saved", "ε_z̈ E", "ε_z̈ V",
+        "heuristic", "n_φ", "r", "n", "d", "d, n", "saved", "ε_τ E", "ε_τ V",
+        "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V",
     )  # fmt: skip
     rows = []
     for name, r in data.validation.heuristics.items():
@@ -187,7 +198,11 @@ def summary(data: ReportData) -> Table:
         for key, error in (("inverse", "torque"), ("direct", "acceleration")):
             whole = int(full[f"operations_{key}"])
             reduced = int(getattr(r, f"operations_{key}")[k])
-            cells += [str(whole), str(reduced), f"{100 * (1 - reduced / whole):.0f} %"]
+            cells += [
+                str(whole),
+                str(reduced),
+                f"{100 * (1 - reduced / whole):.0f} %" if whole else "-",
+            ]
             cells += [
                 percent(float(getattr(r, f"{error}_error_{which}")[k]))
                 for which in ("estimation", "validation")

@@ -39,9 +39,7 @@ def build_model(config: Config) -> Model:
     W = K.reshape(-1, K.shape[2])
     values = config.standard_parameters()
     given = config.nominal_torque != "standard-deviation"
-    nominal = (
-        per_joint(config.nominal_torque, config.n_dof) if given else np.std(K @ values, axis=0)
-    )
+    nominal = config.per_joint(config.nominal_torque) if given else np.std(K @ values, axis=0)
     if not np.all(nominal > 0):
         joint = mechanism.coordinate_names[int(np.argmin(nominal))]
         raise ConfigError(
@@ -49,6 +47,7 @@ def build_model(config: Config) -> Model:
             "scale. Give nominal_torque in the config, in N m (N for a prismatic joint)."
         )
     base = base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance)
+    _check_named(config, mechanism, base)
     texts = _expressions(config, mechanism, base, states, rng)
     return Model(
         mechanism=mechanism,
@@ -60,10 +59,15 @@ def build_model(config: Config) -> Model:
     )
 
 
-def per_joint(values: object, n_dof: int) -> FloatArray:
-    """A config entry that is one number for all joints or one for each, (n_dof,)."""
-    result = np.array(values, dtype=float)
-    return np.full(n_dof, result[0]) if result.size == 1 else result
+def _check_named(config: Config, mechanism: Mechanism, base: BaseParameters) -> None:
+    """Refuse named base columns that are no base parameters, instead of replacing them."""
+    names = mechanism.parameter_names
+    for name in config.model.base_columns or []:
+        if names.index(name) not in base.columns:
+            raise ConfigError(
+                f"model.base_columns: {name} has no effect on the torques, or depends on those "
+                "named before it. Leave it out."
+            )
 
 
 def _expressions(

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from paramreduce_cli.config import Config
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.optimiser import Settings, describe
 from paramreduce_cli.excitation.workers import Task, excitation_of, optimise_all
 from paramreduce_cli.records import Coefficients, FloatArray, Model, Run, Trajectories, Trajectory
 from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.build_model import per_joint
 
 _SETS = ("estimation", "validation")
+_ROUNDING = 1e-9
 
 
 @stage
@@ -52,8 +54,8 @@ def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
     limits = JointLimits(
         lower=pairs[:, 0],
         upper=pairs[:, 1],
-        velocity=per_joint(wanted.velocity_limits, n),
-        acceleration=per_joint(wanted.acceleration_limits or [np.inf], n),
+        velocity=config.per_joint(wanted.velocity_limits),
+        acceleration=config.per_joint(wanted.acceleration_limits or [np.inf]),
     )
     return Settings(
         period=period,
@@ -96,6 +98,33 @@ def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectori
                 f"{config.robot} has {n}."
             )
         sets[name] = tuple(measure(entry) for entry in values)
+        _check_motion(brought.source, name, sets[name], joint_settings(config, brought.period, 1))
     return Trajectories(
         brought.period, "brought", wanted.scaling, sets["estimation"], sets["validation"]
     )
+
+
+def _check_motion(
+    source: str, name: str, trajectories: tuple[Trajectory, ...], settings: Settings
+) -> None:
+    """Refuse trajectories in which nothing moves; remark on joints that rest or go too far."""
+    limits = settings.limits
+    moving = np.array([t.reach > 0 for t in trajectories])
+    if not moving.any(axis=1).all():
+        raise DataError(f"{source}: nothing moves in one of the {name} trajectories.")
+    worst = max(
+        float(
+            max((t.peak_position / limits.reach).max(), (t.peak_velocity / limits.velocity).max())
+        )
+        for t in trajectories
+    )
+    for wrong, what in (
+        (worst > 1 + _ROUNDING, f"goes to {worst:.3g} times a joint's limit"),
+        (not moving.all(), "leaves a joint at rest"),
+    ):
+        if wrong:
+            warnings.warn(
+                f"{source}: a trajectory of the {name} set {what}",
+                ParamreduceWarning,
+                stacklevel=2,
+            )

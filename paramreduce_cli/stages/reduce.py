@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import time
+import warnings
 
 import numpy as np
 
 from paramreduce_cli import registry
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import ReductionSection, Stop
-from paramreduce_cli.errors import DataError
-from paramreduce_cli.multibody.base_parameters import affecting_columns, preference_order
+from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.multibody.base_parameters import (
+    affecting_columns,
+    independent_columns,
+    preference_order,
+)
 from paramreduce_cli.multibody.observation import combined_factor, standard_deviation
 from paramreduce_cli.records import (
     FloatArray,
@@ -20,8 +25,8 @@ from paramreduce_cli.records import (
     Reduction,
     Samples,
 )
-from paramreduce_cli.reduction.fitting import Fit, NormErrors, fit, torque_errors
-from paramreduce_cli.reduction.problem import SelectionProblem, independent_subset
+from paramreduce_cli.reduction.fitting import Fit, NormErrors, fit, model_column, torque_errors
+from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.registry import stage
 
 
@@ -33,22 +38,28 @@ def reduce(config: Config | None, model: Model | None, samples: Samples) -> Redu
     are not zero take part.
     """
     wanted = config.reduction if config is not None else ReductionSection()
+    if model is not None and model.mechanism.parameter_names != tuple(samples.names):
+        raise DataError(
+            "the samples have other parameters than the model: they are of another robot. Bring "
+            "samples of this one, or give no CONFIG."
+        )
     weights = _weights(wanted, samples)
     factor = combined_factor(samples.estimation.factors(), weights)
-    problem = _problem(factor, model, samples)
-    rank = len(independent_subset(problem.W, problem.candidates_by_preference))
+    problem = _problem(factor, samples.estimation.n_samples * weights.size, model, samples)
+    rank = len(independent_columns(problem.W, problem.candidates_by_preference))
+    _remark_on_rank(rank, model)
     found = {name: _ordered(problem, name, wanted.stop) for name in wanted.heuristics}
     orderings = _with_norms(found, samples, weights)
     return Reduction(samples.names, weights, rank, factor, orderings)
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
-    if samples.nominal_torque is not None and wanted.weighting == "nominal-torque":
+    if wanted.weighting == "none":
+        return np.ones(next(iter(samples.estimation.blocks())).tau.shape[1])
+    if samples.nominal_torque is not None:
         weights = samples.nominal_torque
     else:
         weights = standard_deviation(block.tau for block in samples.estimation.blocks())
-        if wanted.weighting == "none":
-            return np.ones_like(weights)
     if not np.all(weights > 0):
         raise DataError(
             f"joint {int(np.argmin(weights)) + 1} has no torque to weigh its errors by. Give "
@@ -57,13 +68,33 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
     return weights
 
 
-def _problem(factor: FloatArray, model: Model | None, samples: Samples) -> SelectionProblem:
+def _problem(
+    factor: FloatArray, rows: int, model: Model | None, samples: Samples
+) -> SelectionProblem:
     W, chi = factor[:, :-1], factor[:, -1]
+    if not np.isfinite(factor).all():
+        raise DataError("the observation matrix holds numbers too large to calculate with.")
     if not np.any(chi):
         raise DataError("the torques of the estimation set are all zero: nothing to explain.")
     affecting = affecting_columns(W) if model is None else model.affecting
     candidates = np.flatnonzero(affecting)
+    if candidates.size == 0:
+        raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
+    if rows < candidates.size:
+        raise DataError(
+            f"{rows} rows are too few for {candidates.size} parameters; bring more samples."
+        )
     return SelectionProblem(W, chi, candidates, preference_order(samples.names))
+
+
+def _remark_on_rank(rank: int, model: Model | None) -> None:
+    if model is not None and rank < model.base.columns.size:
+        warnings.warn(
+            f"the estimation set excites only {rank} of the {model.base.columns.size} base "
+            "parameters; the others cannot be told apart on it",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
 
 
 def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> tuple[IntArray, list[Fit], float]:
@@ -119,10 +150,3 @@ def _ordering(
         minimum_norm=np.array([f.minimum_norm for f in fits]),
         seconds=seconds,
     )
-
-
-def model_column(subset: IntArray, parameters: FloatArray, n: int) -> FloatArray:
-    """All parameters of a reduced model, zero where one is not kept, (n,)."""
-    result = np.zeros(n)
-    result[subset] = parameters
-    return result

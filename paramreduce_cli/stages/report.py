@@ -20,6 +20,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
+from paramreduce_cli.reduction.fitting import model_column
 from paramreduce_cli.registry import stage
 from paramreduce_cli.report.data import (
     Motion,
@@ -31,8 +32,6 @@ from paramreduce_cli.report.data import (
 from paramreduce_cli.report.figures import render
 from paramreduce_cli.report.page import render_page
 from paramreduce_cli.report.summary import summary_of
-from paramreduce_cli.stages.build_model import per_joint
-from paramreduce_cli.stages.reduce import model_column
 
 _POSES = 3
 
@@ -94,7 +93,7 @@ def _gather(
 
 def _shown_poses(config: Config, motion: Motion) -> list[FloatArray]:
     if config.report.poses is not None:
-        return [per_joint(pose, config.n_dof) for pose in config.report.poses]
+        return [config.per_joint(pose) for pose in config.report.poses]
     picks = np.linspace(0, motion.time.size, _POSES, endpoint=False).astype(int)
     return [motion.z[k] for k in picks]
 
@@ -106,9 +105,13 @@ def _skeleton(model: Model, z: FloatArray) -> Skeleton:
         body.before if body.parent == BASE else poses[body.parent] @ body.before
         for body in mechanism.bodies
     ]
+    standard = model.values.reshape(len(mechanism.bodies), -1)
+    m = np.where(standard[:, :1] > 0, standard[:, :1], np.nan)
+    centres = np.einsum("kij,kj->ki", poses[:, :3, :3], standard[:, 1:4] / m) + poses[:, :3, 3]
     return Skeleton(
         z=z,
         poses=poses,
+        masses=centres,
         joints=np.array(joints),
         parents=tuple(body.parent for body in mechanism.bodies),
         kinds=tuple(body.joint for body in mechanism.bodies),

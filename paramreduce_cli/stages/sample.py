@@ -27,7 +27,6 @@ from paramreduce_cli.records import (
     Trajectory,
 )
 from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.build_model import per_joint
 
 
 @stage
@@ -126,9 +125,9 @@ def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
 def _nominal_acceleration(config: Config, model: Model, estimation: ObservedSet) -> FloatArray:
     given = config.sampling.nominal_acceleration
     if given != "standard-deviation":
-        return per_joint(given, config.n_dof)
+        return config.per_joint(given)
     return _scale(
-        standard_deviation(block.ddz for block in estimation.blocks()),
+        standard_deviation(block.ddz for block in estimation.states()),
         model,
         "sampling.nominal_acceleration",
         "acceleration",

@@ -21,9 +21,8 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.acceleration import AccelerationErrors, acceleration_errors
-from paramreduce_cli.reduction.fitting import NormErrors, torque_errors
+from paramreduce_cli.reduction.fitting import NormErrors, model_column, torque_errors
 from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.reduce import model_column
 
 _DEFAULT_TORQUE_ERROR = 0.01
 
@@ -204,7 +203,7 @@ def _verdict(config: Config, selected: Selected, result: HeuristicValidation) ->
         return False, f"{who} is not accepted: {', '.join(missed)}."
     if met:
         return True, f"{who} is accepted: {', '.join(met)}."
-    return True, f"{who} is accepted: validation.accept sets no limits."
+    return True, f"{who} is not judged: validation.accept sets no limits."
 
 
 def _shown(value: float, share: bool) -> str:

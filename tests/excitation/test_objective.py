@@ -54,7 +54,7 @@ def test_gradients_against_finite_differences(parts, criterion, scaling, mapping
     _, gradient = objective(x)
     for _ in range(4):
         direction = rng.normal(size=54)
-        step = 1e-4
+        step = 1e-6 if scaling == "equilibrated" else 1e-4  # kinks against round-off
         slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
             2 * step
         )
@@ -110,5 +110,14 @@ def test_the_ball_leaves_small_series_alone():
     _, limits, _ = basis_and_limits("ball")
     small = np.random.default_rng(5).normal(size=(6, 9)) * 1e-3
     coefficients, _ = limits.admissible(small, 30)
-    coefficients[:, 0] -= 0.2  # the middle of the range
-    assert np.allclose(coefficients, small, rtol=1e-12)
+    assert np.allclose(coefficients[:, 1:], small[:, 1:], rtol=1e-12)
+
+
+def test_a_joint_cannot_meet_its_limit_by_being_parked_there():
+    basis, limits, given = basis_and_limits()
+    free = np.random.default_rng(6).normal(size=(6, 9)) * 1e-3
+    free[:, 0] = 1e6
+    z, dz, _ = basis.states(limits.scaled(free))
+    moved = np.maximum(np.ptp(z, axis=0) / (2 * given.reach), np.abs(dz).max(axis=0) / 1.45)
+    assert (moved > 0.9).all()
+    assert (z <= given.upper).all()

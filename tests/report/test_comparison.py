@@ -88,3 +88,19 @@ def test_orders_are_compared_up_to_ties(summary):
 def test_only_what_is_asked(summary):
     other = changed(summary, ["model", "n_base"], lambda v: v + 1)
     assert bad(summary, other, only=("kappa", "order")) == []
+
+
+@pytest.mark.parametrize(
+    ("path", "change"),
+    [
+        (["reduction"], lambda v: {k: e for k, e in v.items() if k != "qr"}),
+        (["validation"], lambda v: {k: e for k, e in v.items() if k != "qr"}),
+        (["validation", FS], lambda v: v[:2]),
+        (["validation", FS, 1, "torque_error", "joints_estimation"], lambda v: []),
+        (["validation", FS, 1, "mass_matrix", "condition"], lambda v: v * 2),
+        (["selected", "parameters"], lambda v: {}),
+        (["trajectories", "estimation", 0, "kappa"], lambda v: None),
+    ],
+)
+def test_what_is_missing_is_a_difference(summary, path, change):
+    assert bad(summary, changed(summary, path, change))

@@ -109,5 +109,12 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
 def test_latex_escapes_what_latex_would_trip_over():
     table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
     text = table.to_latex()
-    for piece in (r"$\kappa$ \& 5 \%", r"$m_{3}$", r"50 \%", r"$\varepsilon_\tau$", r"x\^{}2"):
+    for piece in (
+        r"$\kappa$ \& 5 \%",
+        r"$m_{\mathrm{3}}$",
+        r"$a_{\mathrm{b}}$",
+        r"50 \%",
+        r"$\varepsilon_\tau$",
+        r"x\^{}2",
+    ):
         assert piece in text
