@@ -31,7 +31,15 @@ from paramreduce_cli.artifacts.store import (
     load_file,
 )
 from paramreduce_cli.config import Config, section_digest
-from paramreduce_cli.pipeline import ARTIFACTS, Stage, StageInput, brought_files, maker_of, pipeline
+from paramreduce_cli.pipeline import (
+    ARTIFACTS,
+    Stage,
+    StageInput,
+    brought_files,
+    maker_of,
+    pipeline,
+    stages_to_run,
+)
 from paramreduce_cli.records import (
     Coefficients,
     Progress,
@@ -201,12 +209,18 @@ class Runner:
     def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:
         brought = self.samples if entry.type is Samples else None
         path = brought or self.store.path(entry.type)
-        if entry.optional and (not path.exists() or self.config is None):
+        if entry.optional and not self._expected(entry.type, path):
             return None
         robot = self.config.robot if self.config is not None and brought is None else None
         record, stamp = load_file(path, entry.type, robot, "" if brought else maker_of(entry.type))
         inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
         return record
+
+    def _expected(self, record: type, path: Path) -> bool:
+        """Whether an optional input must be there: a full run of this config would make it."""
+        if self.config is None:
+            return False
+        return path.exists() or record in [s.output for s in stages_to_run(self.config)]
 
     @property
     def _robot(self) -> str:

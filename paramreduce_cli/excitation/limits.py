@@ -130,7 +130,8 @@ class LimitMap:
         return self._with_offset(offset, harmonics / divisor[:, None], room), pull
 
     def _used(self, harmonics: FloatArray) -> FloatArray:
-        return np.einsum("jpc,jc->jp", self._shares, harmonics)
+        used: FloatArray = (self._shares @ harmonics[:, :, None])[:, :, 0]
+        return used
 
     def _with_offset(
         self, offset: FloatArray, harmonics: FloatArray, room: FloatArray
@@ -150,6 +151,8 @@ def _smooth_maximum(
     """The norm of each row, (n_dof,), and its derivative by the harmonics."""
     largest = np.maximum(np.abs(used).max(axis=1, keepdims=True), np.finfo(float).tiny)
     ratio = np.abs(used) / largest
-    total = np.sum(ratio**norm, axis=1, keepdims=True)
-    weight = np.sign(used) * ratio ** (norm - 1) * total ** (1 / norm - 1)
-    return (largest * total ** (1 / norm))[:, 0], np.einsum("jp,jpc->jc", weight, shares)
+    power = ratio ** (norm - 1)
+    total = np.sum(power * ratio, axis=1, keepdims=True)
+    weight = np.copysign(power, used) * total ** (1 / norm - 1)
+    slope = (weight[:, None, :] @ shares)[:, 0, :]
+    return (largest * total ** (1 / norm))[:, 0], slope
