@@ -203,7 +203,7 @@ class Trajectories(Section):
     """What is minimised."""
     scaling: Scaling = "column-normalised"
     """Scaling of the base columns of W in which the criterion is measured."""
-    starts: Count = 12
+    starts: Count = 10
     """Random starts per trajectory."""
     polished: Count = 2
     """How many of the most promising starts are optimised to the end."""

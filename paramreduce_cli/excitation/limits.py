@@ -65,25 +65,22 @@ class LimitMap:
         points, columns = basis.position.shape
         self.n_dof = limits.middle.size
         self.n_columns = columns
-        self._points = points
         self._margin = grid_margin((columns - 1) // 2, points)
         self._mapping = mapping
         self._middle, self._reach = limits.middle, limits.reach
-        sizes = (limits.reach, limits.velocity, limits.acceleration)
-        motions = (basis.position, basis.velocity, basis.acceleration)
-        self._shares = np.stack(
+        self._positions = _harmonic_shares(basis.position, limits.reach * self._margin)
+        self._rates = np.concatenate(
             [
-                np.vstack(
-                    [m[:, 1:] / (s[j] * self._margin) for m, s in zip(motions, sizes, strict=True)]
-                )
-                for j in range(self.n_dof)
-            ]
+                _harmonic_shares(basis.velocity, limits.velocity * self._margin),
+                _harmonic_shares(basis.acceleration, limits.acceleration * self._margin),
+            ],
+            axis=1,
         )
-        """Harmonics to shares of the limits, positions first, (n_dof, 3 n_points, 2 harmonics)."""
 
     def shares(self, free: FloatArray) -> FloatArray:
         """Largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
-        return np.abs(self._used(free[:, 1:])).max(axis=1)
+        up, down, rate = self._extremes(free[:, 1:])
+        return np.maximum((up + down) / 2, rate)
 
     def scaled(self, free: FloatArray) -> FloatArray:
         """Series whose motion reaches a limit exactly, or stays inside for the ball."""
@@ -91,53 +88,81 @@ class LimitMap:
         if self._mapping == "ball":
             share = np.maximum(share, 1.0)
         harmonics = free[:, 1:] / share[:, None]
-        excursion = np.abs(self._used(harmonics)[:, : self._points]).max(axis=1)
-        return self._with_offset(free[:, 0], harmonics, 1 - excursion)
+        up, down, _ = self._extremes(harmonics)
+        return self._with_offset(free[:, 0], harmonics, up, down)
 
     def admissible(self, free: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
         """Admissible coefficients, and how a derivative by them is pulled back.
 
         Args:
             free: Offset and harmonics of each joint, (n_dof, 1 + 2 harmonics).
-            norm: Exponent of the smooth maximum; it is never below the true maximum.
+            norm: Exponent of the smooth maxima; they are never below the true ones.
         """
         offset, harmonics = free[:, 0], free[:, 1:]
-        used = self._used(harmonics)
-        g, g_slope = _smooth_maximum(used, self._shares, norm)
-        positions = slice(0, self._points)
-        e, e_slope = _smooth_maximum(used[:, positions], self._shares[:, positions], norm)
+        position = _apply(self._positions, harmonics)
+        rates = _apply(self._rates, harmonics)
+        up, up_slope = _smooth_maximum(np.maximum(position, 0.0), self._positions, norm)
+        down, down_slope = _smooth_maximum(np.maximum(-position, 0.0), -self._positions, norm)
+        rate, rate_slope = _smooth_maximum(np.abs(rates), self._rates, norm, np.sign(rates))
+        span, span_slope = (up + down) / 2, (up_slope + down_slope) / 2
+        g = np.maximum(span, rate) * (
+            (span / np.maximum(span, rate)) ** norm + (rate / np.maximum(span, rate)) ** norm
+        ) ** (1 / norm)
+        g_slope = _times((span / g) ** (norm - 1), span_slope)
+        g_slope += _times((rate / g) ** (norm - 1), rate_slope)
         divisor, slope = g, np.ones_like(g)
         if self._mapping == "ball":
             divisor = (1 + g**_BALL_POWER) ** (1 / _BALL_POWER)
             slope = (g / divisor) ** (_BALL_POWER - 1)
-        room = 1 - e / divisor
-        half = self._reach * self._margin
+        room = 1 - span / divisor
 
         def pull(bar: FloatArray) -> FloatArray:
-            offset_bar = bar[:, 0] * half
-            room_bar = offset_bar * _squashed(offset)
-            # Both the scaled harmonics and the room divide by the same number.
-            along = np.sum(bar[:, 1:] * harmonics, axis=1) - room_bar * e
+            centre_bar = bar[:, 0] * self._reach * self._margin
+            room_bar = centre_bar * _squashed(offset)
+            # Harmonics, centre and room all divide by the same number.
+            along = np.sum(bar[:, 1:] * harmonics, axis=1)
+            along = along + centre_bar * (down - up) / 2 - room_bar * span
             result = np.empty_like(free)
-            result[:, 0] = offset_bar * room * (1 + offset**2) ** -1.5
-            result[:, 1:] = (
-                bar[:, 1:] / divisor[:, None]
-                - (along * slope / divisor**2)[:, None] * g_slope
-                - (room_bar / divisor)[:, None] * e_slope
-            )
+            result[:, 0] = centre_bar * room * (1 + offset**2) ** -1.5
+            result[:, 1:] = _times(1 / divisor, bar[:, 1:])
+            result[:, 1:] -= _times(along * slope / divisor**2, g_slope)
+            result[:, 1:] += _times(centre_bar / (2 * divisor), down_slope - up_slope)
+            result[:, 1:] -= _times(room_bar / divisor, span_slope)
             return result
 
-        return self._with_offset(offset, harmonics / divisor[:, None], room), pull
+        harmonics_in = harmonics / divisor[:, None]
+        return self._with_offset(offset, harmonics_in, up / divisor, down / divisor), pull
 
-    def _used(self, harmonics: FloatArray) -> FloatArray:
-        used: FloatArray = (self._shares @ harmonics[:, :, None])[:, :, 0]
-        return used
+    def _extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Shares of half the position range up and down, and of the rates; each (n_dof,)."""
+        position = _apply(self._positions, harmonics)
+        rate = np.abs(_apply(self._rates, harmonics)).max(axis=1)
+        up, down = position.max(axis=1), -position.min(axis=1)
+        return np.maximum(up, 0.0), np.maximum(down, 0.0), rate
 
     def _with_offset(
-        self, offset: FloatArray, harmonics: FloatArray, room: FloatArray
+        self, offset: FloatArray, harmonics: FloatArray, up: FloatArray, down: FloatArray
     ) -> FloatArray:
-        moved = self._middle + self._reach * self._margin * room * _squashed(offset)
-        return np.column_stack([moved, harmonics])
+        """Put the offset where the motion stays in its range, whatever the free offset is."""
+        centre, room = (down - up) / 2, 1 - (up + down) / 2
+        share = centre + room * _squashed(offset)
+        return np.column_stack([self._middle + self._reach * self._margin * share, harmonics])
+
+
+def _harmonic_shares(motion: FloatArray, limits: FloatArray) -> FloatArray:
+    """Harmonics to shares of each joint's limit, (n_dof, n_points, 2 harmonics)."""
+    shares: FloatArray = motion[None, :, 1:] / limits[:, None, None]
+    return shares
+
+
+def _apply(shares: FloatArray, harmonics: FloatArray) -> FloatArray:
+    used: FloatArray = (shares @ harmonics[:, :, None])[:, :, 0]
+    return used
+
+
+def _times(factors: FloatArray, rows: FloatArray) -> FloatArray:
+    """Each row multiplied by its joint's factor."""
+    return factors[:, None] * rows
 
 
 def _squashed(offset: FloatArray) -> FloatArray:
@@ -146,13 +171,19 @@ def _squashed(offset: FloatArray) -> FloatArray:
 
 
 def _smooth_maximum(
-    used: FloatArray, shares: FloatArray, norm: float
+    used: FloatArray, shares: FloatArray, norm: float, signs: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """The norm of each row, (n_dof,), and its derivative by the harmonics."""
-    largest = np.maximum(np.abs(used).max(axis=1, keepdims=True), np.finfo(float).tiny)
-    ratio = np.abs(used) / largest
+    """The norm of each row of ``used``, (n_dof,), and its derivative by the harmonics.
+
+    Args:
+        used: Magnitudes, (n_dof, n_points).
+        shares: Harmonics to what ``used`` is the magnitude of, (n_dof, n_points, 2 harmonics).
+        norm: The exponent.
+        signs: Of what ``used`` is the magnitude of.
+    """
+    largest = np.maximum(used.max(axis=1, keepdims=True), np.finfo(float).tiny)
+    ratio = used / largest
     power = ratio ** (norm - 1)
     total = np.sum(power * ratio, axis=1, keepdims=True)
-    weight = np.copysign(power, used) * total ** (1 / norm - 1)
-    slope = (weight[:, None, :] @ shares)[:, 0, :]
-    return (largest * total ** (1 / norm))[:, 0], slope
+    weight = signs * power * total ** (1 / norm - 1)
+    return (largest * total ** (1 / norm))[:, 0], (weight[:, None, :] @ shares)[:, 0, :]

@@ -143,7 +143,7 @@ def describe(
     limits = settings.limits
     z, dz, ddz = states
     shares = [
-        np.abs(z - coefficients[:, 0]) / limits.reach,
+        np.abs(z - (z.max(axis=0) + z.min(axis=0)) / 2) / limits.reach,
         np.abs(dz) / limits.velocity,
         np.abs(ddz) / limits.acceleration,
     ]

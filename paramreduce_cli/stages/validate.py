@@ -232,7 +232,7 @@ def _remarks(
             )
         if name == selected.heuristic and unsafe[selected.n - 1]:
             remarks.append(
-                f"The selected model ({name}, n = {selected.n}) is among them: use its inverse "
-                "dynamics only."
+                f"The selected model ({name}, n = {selected.n}) is not safe for direct dynamics: use "
+                "its inverse dynamics only."
             )
     return remarks
