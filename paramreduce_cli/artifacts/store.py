@@ -291,7 +291,7 @@ def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
 def _summary_stamp(path: Path) -> Stamp | None:
     summary = load_json(path)
     try:
-        if not all((path.parent / name).exists() for name in summary["files"]):
+        if not all((path.parent / name).exists() for name in summary.get("files", ())):
             return dataclasses.replace(Stamp(**summary["provenance"]), digest="", stage="")
         return Stamp(**summary["provenance"])
     except (KeyError, TypeError):

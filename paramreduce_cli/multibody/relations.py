@@ -15,6 +15,8 @@ from paramreduce_cli.records import FloatArray, IntArray
 
 _MATCH = 1e-8
 _IGNORED = 1e-10
+_PRINTED = 1e-6
+"""Share of a sum below which a term does not change its printed digits."""
 
 Lengths = Mapping[str, float]
 
@@ -102,12 +104,14 @@ def approximate_expressions(
         names: Of all parameters, (n,).
         kept: Columns of the approximate base parameters, (n_kept,).
         beta: Coefficients of the others in ascending order, (n_kept, n - n_kept).
-        known: Values of all parameters; those that are zero are left out of the sums.
+        known: Values of all parameters; terms that do not show in six digits are left out.
     """
     shown = beta
     if known is not None:
         others = np.setdiff1d(np.arange(len(names)), kept)
-        shown = np.where(known[others] != 0, beta, 0.0)
+        parts = np.abs(beta * known[others])
+        whole = np.abs(known[kept]) + parts.sum(axis=1)
+        shown = np.where(parts > _PRINTED * whole[:, None], beta, 0.0)
     return _expressions(names, kept, shown, lambda i, j: signed_number(float(shown[i, j])))
 
 

@@ -83,11 +83,16 @@ def _escape(text: str) -> str:
     return "".join(_ESCAPES.get(character, character) for character in text)
 
 
+_FAR_OFF = 10.0
+
+
 def percent(value: float) -> str:
     """A share as text."""
     if not np.isfinite(value):
         return "∞"
-    return f"{100 * value:.2f} %" if value < 1 else f"{100 * value:.3g} %"
+    if value >= _FAR_OFF:
+        return "> 1000 %"
+    return f"{100 * value:.2f} %" if value < 1 else f"{100 * value:.0f} %"
 
 
 @table("kinematics")
