@@ -54,8 +54,9 @@ regression-%: $(VENV)/.installed
 	$(PARAMREDUCE) run configs/$*.yaml --results results/regression/$* --quiet --force \
 	  --set trajectories.file=$(CURDIR)/results/reference/$*.json
 	$(PARAMREDUCE) compare results/reference/$*.json results/regression/$*
-	$(PARAMREDUCE) run configs/$*.yaml --quiet --jobs $(JOBS)
-	$(PARAMREDUCE) compare results/reference/$*.json results/$* --only kappa
+	$(PARAMREDUCE) run configs/$*.yaml --results results/regression/$*-optimised --quiet --force \
+	  --jobs $(JOBS)
+	$(PARAMREDUCE) compare results/reference/$*.json results/regression/$*-optimised --only kappa
 
 reference: puma560 two_link
 	cp results/puma560/report/summary.json results/reference/puma560.json

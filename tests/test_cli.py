@@ -82,7 +82,9 @@ def test_not_accepted_is_exit_code_1_with_the_sentence(invoke, two_link_copy, wr
 def test_stages_without_their_inputs_say_what_to_run(invoke, tmp_path):
     code, _, err = invoke("reduce", TWO_LINK, "--results", tmp_path)
     assert code == 2
-    assert "paramreduce sample" in err
+    assert "paramreduce build-model" in err
+    invoke("build-model", TWO_LINK, "--results", tmp_path)
+    assert "paramreduce sample" in invoke("reduce", TWO_LINK, "--results", tmp_path)[2]
 
 
 def test_an_older_schema_is_refused_by_stages_and_rebuilt_by_run(invoke, two_link_copy):

@@ -23,6 +23,8 @@ SCHEMA = 1
 
 _CHUNK = 16384
 """Numbers in a chunk of a dataset that grows: 128 KiB."""
+_CHUNK_CACHE = 1 << 20
+"""Bytes that HDF5 keeps of each dataset; all are read and written in order."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,7 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
     """
     started = time.perf_counter()
     with atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
-        with h5py.File(disk, "w") as file:
+        with h5py.File(disk, "w", rdcc_nbytes=_CHUNK_CACHE) as file:
             writer = Writer(file, disk.check)
             fill(writer)
             seconds = stamp.seconds + time.perf_counter() - started
@@ -209,7 +211,7 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
     if not path.exists():
         raise ArtifactError(f"{path}: there is no such file.{' ' + hint if hint else ''}")
     try:
-        file = h5py.File(path, "r")
+        file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)
     except OSError as error:
         raise ArtifactError(
             f"{path}: is not a readable HDF5 file (truncated, or of another kind).{' ' + hint if hint else ''}"

@@ -1,6 +1,6 @@
 """Peak memory of sample and reduce as the rows of W grow from 1e4 to 2e6.
 
-W grows from 5 MB to 960 MB; what grows with it are HDF5's caches, which are bounded.
+W grows from 5 MB to 960 MB.
 """
 
 import subprocess
