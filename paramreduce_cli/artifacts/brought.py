@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import array
 import csv
 import gzip
 import json
@@ -121,29 +122,10 @@ def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
 
 
 def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
-    try:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
-            header = [name.strip() for name in next(rows, [])]
-            if len(header) == 1 and ";" in header[0]:
-                raise DataError(f"{path}, line 1: columns must be separated by commas, not by ;.")
-            if not header:
-                raise DataError(f"{path}, line 1: the file is empty.")
-            table = [
-                [_number(path, k, cell) for cell in row] for k, row in enumerate(rows, 2) if row
-            ]
-    except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
-        raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
-    for k, row in enumerate(table, 2):
-        if len(row) != len(header):
-            raise DataError(f"{path}, line {k}: {len(row)} values under {len(header)} headings.")
+    header, data = _table(path)
     twice = sorted({name for name in header if header.count(name) > 1})
     if twice:
         raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
-    data = np.array(table, dtype=float).reshape(len(table), len(header))
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}
     for key in ("z", "dz", "ddz", "tau"):
@@ -160,6 +142,32 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
         if name in columns:
             arrays["time"] = columns[name]
     return arrays
+
+
+def _table(path: Path) -> tuple[list[str], FloatArray]:
+    """Headings and numbers of a CSV, (n_rows, n_columns); held as numbers from the start."""
+    numbers = array.array("d")
+    try:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(path, "rt", encoding="utf-8-sig", newline="") as file:
+            rows = csv.reader(file)
+            header = [name.strip() for name in next(rows, [])]
+            if len(header) == 1 and ";" in header[0]:
+                raise DataError(f"{path}, line 1: columns must be separated by commas, not by ;.")
+            if not header:
+                raise DataError(f"{path}, line 1: the file is empty.")
+            for row in rows:
+                if row and len(row) != len(header):
+                    raise DataError(
+                        f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
+                        "headings."
+                    )
+                numbers.extend(_number(path, rows.line_num, cell) for cell in row)
+    except FileNotFoundError as error:
+        raise ArtifactError(f"{path}: there is no such file.") from error
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
+        raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
+    return header, np.frombuffer(numbers, dtype=float).reshape(-1, len(header))
 
 
 def _number(path: Path, line: int, cell: str) -> float:

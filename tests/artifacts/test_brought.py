@@ -82,6 +82,39 @@ def test_files_that_are_not_there(tmp_path, name):
         load_recording(tmp_path / name, 2)
 
 
+def test_tables_as_spreadsheets_write_them(tmp_path):
+    path = write_csv(tmp_path / "x.csv")
+    text = path.read_text()
+    path.write_text("\ufeff" + text)
+    assert np.array_equal(load_recording(path, 2).time, table()[:, 0])
+    path.write_text(text.replace(",", ";"))
+    with pytest.raises(DataError, match="separated by commas"):
+        load_recording(path, 2)
+    path.write_text(text.replace("dz2", "z2", 1))
+    with pytest.raises(DataError, match="z2 stands there twice"):
+        load_recording(path, 2)
+
+
+def test_a_compressed_file_that_is_cut_off(tmp_path):
+    path = write_csv(tmp_path / "x.csv.gz")
+    path.write_bytes(path.read_bytes()[:-40])
+    with pytest.raises(ArtifactError, match="cannot be read"):
+        load_recording(path, 2)
+
+
+@pytest.mark.parametrize(("key", "shape"), [("time", (14,)), ("time", (15, 3)), ("z", ())])
+def test_datasets_of_another_shape_are_refused(tmp_path, key, shape):
+    path = tmp_path / "x.h5"
+    with h5py.File(path, "w") as file:
+        for name in ("z", "dz", "ddz"):
+            file[name] = table(15, 3)
+        if key in file:
+            del file[key]
+        file[key] = np.zeros(shape)
+    with pytest.raises(DataError, match=key):
+        load_recording(path, 3)
+
+
 def test_empty_and_binary_files(tmp_path):
     (tmp_path / "x.csv").write_text("")
     with pytest.raises(DataError, match="line 1"):
