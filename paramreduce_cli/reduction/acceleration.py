@@ -12,7 +12,9 @@ from paramreduce_cli.records import Block, FloatArray
 DirectRegressor = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 """States to the linear maps of [M | delta] by the parameters."""
 
-_SINGULAR = 1e-14
+_SINGULAR = 1e-10
+"""Ratio of eigenvalues at which a mass matrix counts as singular: beyond it, accelerations are
+round-off."""
 _VALUES_AT_ONCE = 4_000_000
 """Mass-matrix elements held in memory at a time."""
 
