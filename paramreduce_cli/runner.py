@@ -22,15 +22,15 @@ import scipy
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
+from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.store import (
-    Parts,
     Store,
     check_schema,
     file_digest,
     file_of,
     load_file,
 )
-from paramreduce_cli.config import Config, section_digest
+from paramreduce_cli.config import Config, section_text
 from paramreduce_cli.pipeline import (
     ARTIFACTS,
     Stage,
@@ -71,7 +71,7 @@ class _Watched:
 
     def digests(self) -> dict[str, str]:
         """Of the sections that were read."""
-        return {name: _digest(section_digest(self._config, name)) for name in sorted(self._seen)}
+        return {name: _digest(section_text(self._config, name)) for name in sorted(self._seen)}
 
 
 def _digest(text: str) -> str:
@@ -178,8 +178,7 @@ class Runner:
         return [
             name
             for name, digest in stamp.sections.items()
-            if name not in Config.model_fields
-            or _digest(section_digest(self.config, name)) != digest
+            if name not in Config.model_fields or _digest(section_text(self.config, name)) != digest
         ]
 
     def _input_digests(self, stage: Stage) -> dict[str, str]:

@@ -374,6 +374,12 @@ def slow_config(tmp_path):
     return path
 
 
+def slow_run(tmp_path):
+    """A run that takes a while, as a command line of its own."""
+    command = [sys.executable, "-m", "paramreduce_cli", "run", slow_config(tmp_path)]
+    return [*command, "--results", tmp_path / "r"]
+
+
 def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(tmp_path):
     config = slow_config(tmp_path)
     command = [
@@ -413,15 +419,7 @@ def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(tmp_path):
 
 
 def test_a_polite_kill_leaves_no_process_behind(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "paramreduce_cli",
-        "run",
-        slow_config(tmp_path),
-        "--results",
-        tmp_path / "r",
-    ]
+    command = slow_run(tmp_path)
     parts = tmp_path / "r" / "trajectories.h5.parts"
     with subprocess.Popen(
         command, stderr=subprocess.PIPE, text=True, start_new_session=True
@@ -447,15 +445,7 @@ def _session_alive(group):
 
 
 def test_killed_it_leaves_no_lock_behind(tmp_path):
-    command = [
-        sys.executable,
-        "-m",
-        "paramreduce_cli",
-        "run",
-        slow_config(tmp_path),
-        "--results",
-        tmp_path / "r",
-    ]
+    command = slow_run(tmp_path)
     with subprocess.Popen(
         command, stderr=subprocess.DEVNULL, stdout=subprocess.DEVNULL, start_new_session=True
     ) as process:

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import contextlib
-import dataclasses
 import hashlib
-import json
 import os
-from collections.abc import Callable, Iterator, MutableMapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,6 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.hdf5 import (
     SCHEMA,
     Reader,
@@ -25,6 +22,12 @@ from paramreduce_cli.artifacts.hdf5 import (
     reading,
     write,
 )
+from paramreduce_cli.artifacts.report_files import (
+    SUMMARY,
+    load_json,
+    save_report,
+    summary_stamp,
+)
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import (
@@ -33,7 +36,6 @@ from paramreduce_cli.records import (
     Report,
     Samples,
     Trajectories,
-    Trajectory,
     Validation,
 )
 
@@ -54,7 +56,6 @@ LAYOUTS: dict[type, Layout] = {
     Reduction: Layout("reduction.h5", layouts.save_reduction, layouts.load_reduction),
     Validation: Layout("validation.h5", layouts.save_validation, layouts.load_validation),
 }
-SUMMARY = "report/summary.json"
 
 
 def file_of(record: type) -> str:
@@ -82,7 +83,7 @@ class Store:
         if not path.exists():
             return None
         try:
-            return _summary_stamp(path) if record is Report else read_stamp(path)
+            return summary_stamp(path) if record is Report else read_stamp(path)
         except ArtifactError:
             return None
 
@@ -110,24 +111,10 @@ class Store:
                 "choose another folder with --results."
             )
 
-    def load(self, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:
-        """Read a record.
-
-        Args:
-            record: Its type.
-            robot: Name of the robot it must belong to; None to accept any file of the right
-                layout, also one that a user brings.
-            maker: Command that makes it, for messages.
-
-        Raises:
-            ArtifactError: It is missing, damaged, of another robot or of an older schema.
-        """
-        return load_file(self.path(record), record, robot, maker)
-
     def save(self, record: Any, stamp: Stamp) -> Stamp:
         """Write a record to its file, whole or not at all."""
         if isinstance(record, Report):
-            return _save_report(self.folder / "report", record, stamp)
+            return save_report(self.folder / "report", record, stamp)
         layout = LAYOUTS[type(record)]
         return write(self.folder / layout.file, stamp, lambda w: layout.save(w, record))
 
@@ -160,7 +147,18 @@ class Store:
 
 
 def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:
-    """Read a record from any file; see :meth:`Store.load`."""
+    """Read a record.
+
+    Args:
+        path: The file.
+        record: Its type.
+        robot: Name of the robot it must belong to; None to accept any file of the right
+            layout, also one that a user brings.
+        maker: Command that makes it, for messages.
+
+    Raises:
+        ArtifactError: It is missing, damaged, of another robot or of another schema.
+    """
     hint = f"Make it with `paramreduce {maker}`." if maker else ""
     with reading(path, hint) as reader:
         stamp = read_stamp(path)
@@ -190,65 +188,6 @@ def check_schema(path: Path, stamp: Stamp) -> None:
         )
 
 
-class Parts(MutableMapping[str, Trajectory]):
-    """Finished trajectories of an artifact that is not whole yet, a file each.
-
-    Parts carry the digest of what they were made from; parts made from anything else are
-    ignored and overwritten.
-
-    Args:
-        folder: Where they are kept.
-        stamp: Provenance of the artifact they will be part of.
-    """
-
-    def __init__(self, folder: Path, stamp: Stamp) -> None:
-        self._folder = folder
-        self._stamp = stamp
-
-    def _path(self, key: str) -> Path:
-        return self._folder / f"{key}.h5"
-
-    def __getitem__(self, key: str) -> Trajectory:
-        path = self._path(key)
-        if not path.exists():
-            raise KeyError(key)
-        try:
-            stamp = read_stamp(path)
-            if stamp is None or _origin(stamp) != _origin(self._stamp):
-                raise KeyError(key)
-            with reading(path) as reader:
-                return layouts.load_trajectory_set(reader, "part")[0]
-        except ArtifactError as error:
-            raise KeyError(key) from error
-
-    def __setitem__(self, key: str, value: Trajectory) -> None:
-        write(
-            self._path(key),
-            self._stamp,
-            lambda w: layouts.save_trajectory_set(w, "part", (value,)),
-        )
-
-    def __delitem__(self, key: str) -> None:
-        self._path(key).unlink()
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(sorted(path.stem for path in self._folder.glob("*.h5")))
-
-    def __len__(self) -> int:
-        return sum(1 for _ in self)
-
-    def clear(self) -> None:
-        """Remove all parts and their folder."""
-        for key in list(self):
-            del self[key]
-        with contextlib.suppress(OSError):
-            self._folder.rmdir()
-
-
-def _origin(stamp: Stamp) -> tuple[Any, ...]:
-    return (stamp.schema, stamp.robot, stamp.versions, stamp.sections, stamp.inputs)
-
-
 def file_digest(path: Path) -> str:
     """SHA-256 of a file's bytes.
 
@@ -264,40 +203,6 @@ def file_digest(path: Path) -> str:
         raise ArtifactError(f"{path}: cannot be read: {error.strerror}.") from error
 
 
-def _save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
-    digest = hashlib.sha256()
-    for name, content in report.files.items():
-        digest.update(name.encode() + content)
-        with atomically(folder / name) as path:
-            path.write_bytes(content)
-    done = dataclasses.replace(stamp, digest=digest.hexdigest())
-    _remove_what_a_former_report_left(folder, set(report.files))
-    summary = {**report.summary, "files": sorted(report.files), "provenance": done.__dict__}
-    with atomically(folder / Path(SUMMARY).name) as path:
-        path.write_text(json.dumps(summary, indent=1) + "\n", encoding="utf-8")
-    return done
-
-
-def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
-    try:
-        former = load_json(folder / Path(SUMMARY).name).get("files", [])
-    except (ArtifactError, AttributeError):
-        return
-    for name in set(former) - files:
-        if not Path(name).is_absolute() and ".." not in Path(name).parts:
-            (folder / name).unlink(missing_ok=True)
-
-
-def _summary_stamp(path: Path) -> Stamp | None:
-    summary = load_json(path)
-    try:
-        if not all((path.parent / name).exists() for name in summary.get("files", ())):
-            return dataclasses.replace(Stamp(**summary["provenance"]), digest="", stage="")
-        return Stamp(**summary["provenance"])
-    except (KeyError, TypeError):
-        return None
-
-
 def is_foreign(path: Path) -> bool:
     """Whether a file without provenance is whole, so that it must be somebody's."""
     try:
@@ -307,17 +212,3 @@ def is_foreign(path: Path) -> bool:
             return True
     except ArtifactError:
         return False
-
-
-def load_json(path: Path) -> Any:
-    """Read a JSON file.
-
-    Raises:
-        ArtifactError: It is missing or not JSON.
-    """
-    try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, ValueError) as error:
-        raise ArtifactError(f"{path}: is not JSON: {error}.") from error

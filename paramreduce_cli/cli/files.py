@@ -12,7 +12,8 @@ import rich.markup
 import rich.table
 
 from paramreduce_cli.artifacts.inspection import contents
-from paramreduce_cli.artifacts.store import Store, load_file, load_json
+from paramreduce_cli.artifacts.report_files import load_json
+from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.cli.terminal import out, say
 from paramreduce_cli.config import config_schema
 from paramreduce_cli.config.schema import NAME

@@ -12,7 +12,8 @@ import click
 import rich.box
 import rich.table
 
-from paramreduce_cli.artifacts.store import Store, file_of, load_file, load_json
+from paramreduce_cli.artifacts.report_files import load_json
+from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.cli.terminal import err, out, progress_bars, remark, say
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ConfigError

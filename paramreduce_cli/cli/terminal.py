@@ -33,18 +33,20 @@ def say(message: str) -> None:
 
 
 def show_errors(text: str) -> None:
+    """Print each line of an error's message."""
     for line in text.splitlines():
         err.print(f"Error: {line}", markup=False)
-
-
-def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
-    if issubclass(category, ParamreduceWarning):
-        err.print(f"Warning: {message}.", markup=False)
 
 
 def remark(message: str) -> None:
     """Tell the user something that does not stop the work."""
     err.print(f"Warning: {message}.", markup=False)
+
+
+def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+    """Show this project's warnings and no others; takes the place of warnings.showwarning."""
+    if issubclass(category, ParamreduceWarning):
+        remark(str(message))
 
 
 class Interruption:

@@ -1,6 +1,6 @@
 """The robot's YAML: schema, defaults, and errors with line numbers. Only here is YAML read."""
 
-from paramreduce_cli.config.loading import config_schema, load_config, section_digest
+from paramreduce_cli.config.loading import config_schema, load_config, section_text
 from paramreduce_cli.config.schema import Config
 
-__all__ = ["Config", "config_schema", "load_config", "section_digest"]
+__all__ = ["Config", "config_schema", "load_config", "section_text"]

@@ -54,7 +54,7 @@ def config_schema() -> dict[str, Any]:
     return Config.model_json_schema()
 
 
-def section_digest(config: Config, section: str) -> str:
+def section_text(config: Config, section: str) -> str:
     """Canonical text of one section, to tell whether it changed."""
     value = config.model_dump(mode="json")[section]
     return json.dumps(value, sort_keys=True)

@@ -12,7 +12,6 @@ from paramreduce_cli.records import (
     FloatArray,
     Model,
     Reduction,
-    Samples,
     Trajectories,
     Validation,
 )
@@ -62,7 +61,6 @@ class ReportData:
     model: Model
     trajectories: Trajectories | None
     setup: TrajectorySetup
-    samples: Samples
     reduction: Reduction
     validation: Validation
     motion: Motion

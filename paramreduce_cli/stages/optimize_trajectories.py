@@ -46,22 +46,27 @@ def optimize_trajectories(
     )
 
 
-def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
-    """What the config asks of every trajectory."""
+def joint_limits(config: Config) -> JointLimits:
+    """The limits of every joint."""
     wanted, n = config.trajectories, config.n_dof
     pairs = np.array(wanted.position_limits, dtype=float)
     pairs = np.broadcast_to(pairs, (n, 2)) if len(pairs) == 1 else pairs
-    limits = JointLimits(
+    return JointLimits(
         lower=pairs[:, 0],
         upper=pairs[:, 1],
         velocity=config.per_joint(wanted.velocity_limits),
         acceleration=config.per_joint(wanted.acceleration_limits or [np.inf]),
     )
+
+
+def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
+    """What the config asks of every trajectory."""
+    wanted = config.trajectories
     return Settings(
         period=period,
         harmonics=harmonics,
         points=max(wanted.points, 2 * harmonics + 1),
-        limits=limits,
+        limits=joint_limits(config),
         mapping="gauge" if wanted.use_full_range else "ball",
         starts=wanted.starts,
         polished=wanted.polished,
@@ -98,17 +103,16 @@ def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectori
                 f"{config.robot} has {n}."
             )
         sets[name] = tuple(measure(entry) for entry in values)
-        _check_motion(brought.source, name, sets[name], joint_settings(config, brought.period, 1))
+        _check_motion(brought.source, name, sets[name], joint_limits(config))
     return Trajectories(
         brought.period, "brought", wanted.scaling, sets["estimation"], sets["validation"]
     )
 
 
 def _check_motion(
-    source: str, name: str, trajectories: tuple[Trajectory, ...], settings: Settings
+    source: str, name: str, trajectories: tuple[Trajectory, ...], limits: JointLimits
 ) -> None:
     """Refuse trajectories in which nothing moves; remark on joints that rest or go too far."""
-    limits = settings.limits
     moving = np.array([t.reach > 0 for t in trajectories])
     if not moving.any(axis=1).all():
         raise DataError(f"{source}: nothing moves in one of the {name} trajectories.")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import json
-
 import numpy as np
 
 from paramreduce_cli import registry
@@ -61,7 +59,6 @@ def report(
         files[f"tables/{name}.csv"] = made.to_csv().encode()
         files[f"tables/{name}.tex"] = made.to_latex().encode()
     files["index.html"] = render_page(data, summary, images, tables).encode()
-    json.dumps(summary, allow_nan=False)
     return Report(summary, files)
 
 
@@ -83,7 +80,6 @@ def _gather(
         model=model,
         trajectories=trajectories,
         setup=_setup(config),
-        samples=samples,
         reduction=reduction,
         validation=validation,
         motion=motion,

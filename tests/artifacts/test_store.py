@@ -9,7 +9,8 @@ import pytest
 
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
 from paramreduce_cli.artifacts.layouts import mechanism_from_json, mechanism_to_json
-from paramreduce_cli.artifacts.store import LAYOUTS, Parts, Store, load_file
+from paramreduce_cli.artifacts.parts import Parts
+from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Model, Reduction, Samples, Trajectories, Validation
 
@@ -35,9 +36,9 @@ def same(a, b):
 @pytest.mark.parametrize("record", [Model, Trajectories, Reduction, Validation])
 def test_records_survive_being_written_and_read(record, two_link_copy):
     store = Store(two_link_copy)
-    first, made = store.load(record, "two_link", "")
+    first, made = load_file(store.path(record), record, "two_link", "")
     store.save(first, made)
-    second, again = store.load(record, "two_link", "")
+    second, again = load_file(store.path(record), record, "two_link", "")
     assert same(first, second)
     assert again.digest == made.digest
 
@@ -144,7 +145,7 @@ def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy):
     else:
         path.write_bytes(b"")
     with pytest.raises(ArtifactError, match=path.name):
-        store.load(record, "two_link", "make-it")
+        load_file(store.path(record), record, "two_link", "make-it")
 
 
 @pytest.mark.parametrize("record", list(LAYOUTS))
@@ -161,11 +162,11 @@ def test_a_file_without_one_of_its_datasets_is_refused(record, two_link_copy):
 def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
     store = Store(two_link_copy)
     with pytest.raises(ArtifactError, match="belongs to the robot two_link, not to other"):
-        store.load(Model, "other", "")
+        load_file(store.path(Model), Model, "other", "")
     with h5py.File(store.path(Model), "a") as file:
         file.attrs["schema"] = SCHEMA - 1
     with pytest.raises(ArtifactError, match=r"older layout.*paramreduce run"):
-        store.load(Model, "two_link", "")
+        load_file(store.path(Model), Model, "two_link", "")
 
 
 def test_one_run_at_a_time(tmp_path):
@@ -177,7 +178,9 @@ def test_one_run_at_a_time(tmp_path):
 
 
 def test_parts_belong_to_one_origin(two_link_results, tmp_path):
-    trajectories, _ = Store(two_link_results).load(Trajectories, "two_link", "")
+    trajectories, _ = load_file(
+        Store(two_link_results).path(Trajectories), Trajectories, "two_link", ""
+    )
     parts = Parts(tmp_path / "parts", stamp())
     parts["a"] = trajectories.estimation[0]
     assert same(parts["a"], trajectories.estimation[0])
