@@ -23,6 +23,12 @@ PARAMETER_KINDS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Iz
 BASE = -1
 """Index of the fixed base in :attr:`Body.parent`."""
 
+JOINT_COORDINATES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3, "free": 6}
+"""How many coordinates each kind of joint has."""
+
+JOINT_AXES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 0, "free": 0}
+"""How many axes each kind of joint can be given."""
+
 
 @dataclass(frozen=True)
 class Body:
@@ -40,13 +46,50 @@ class Body:
     """Homogeneous transform from the parent's frame to the joint, (4, 4), m."""
     after: FloatArray
     """Homogeneous transform from the moved joint to the body's frame, (4, 4), m."""
+    coordinate: str
+    """Name of the joint's coordinate."""
     offset: float = 0.0
     """Added to the coordinate, rad or m."""
+    massless: bool = False
+    """Whether it has no parameters: a frame between the axes of one joint, or a body without mass."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """What holds two bodies of the tree together and makes a loop of it.
+
+    With A and B the frames on the two bodies:
+
+    * ``point``: their origins coincide, three equations;
+    * ``planar``: the origin of B is on the z axis of A, two equations;
+    * ``revolute``: their origins and z axes coincide, five equations;
+    * ``distance``: their origins are ``length`` apart, one equation.
+    """
+
+    name: str
+    kind: Literal["point", "planar", "revolute", "distance"]
+    bodies: tuple[int, int]
+    """Indices of the two bodies, :data:`BASE` for the base."""
+    frames: tuple[FloatArray, FloatArray]
+    """Homogeneous transforms of A and B in the frames of their bodies, (4, 4), m."""
+    length: float = 0.0
+    """Of a ``distance``, m."""
+
+
+@dataclass(frozen=True)
+class Loops:
+    """How the loops of a mechanism are closed, and in which coordinates it is described."""
+
+    closures: tuple[Closure, ...]
+    independent: tuple[int, ...]
+    """Indices of the bodies whose coordinates are independent; these are actuated."""
+    assembly: FloatArray
+    """Generalised coordinates near which, or in which, the loops are closed, (n_q,)."""
 
 
 @dataclass(frozen=True)
 class Mechanism:
-    """A tree of bodies on a fixed base; parents come before their children."""
+    """A tree of bodies on a fixed base, perhaps with loops; parents come before their children."""
 
     robot: str
     bodies: tuple[Body, ...]
@@ -56,21 +99,72 @@ class Mechanism:
     """Named lengths of the geometry, m; relations between parameters are printed in them."""
     table: tuple[tuple[str, ...], ...]
     """The geometry as the user wrote it, a header row first; for people."""
+    loops: Loops | None = None
+    """None for an open tree, all of whose coordinates are independent."""
+
+    @property
+    def n_q(self) -> int:
+        """Number of generalised coordinates, one for every body."""
+        return len(self.bodies)
+
+    @property
+    def independent(self) -> tuple[int, ...]:
+        """Indices of the independent ones among the generalised coordinates."""
+        return self.loops.independent if self.loops is not None else tuple(range(self.n_q))
+
+    @property
+    def dependent(self) -> tuple[int, ...]:
+        """Indices of the generalised coordinates that the loops determine."""
+        return tuple(k for k in range(self.n_q) if k not in self.independent)
 
     @property
     def n_dof(self) -> int:
         """Number of independent coordinates."""
-        return len(self.bodies)
+        return len(self.independent)
+
+    @property
+    def inertial(self) -> tuple[int, ...]:
+        """Indices of the bodies that have parameters."""
+        return tuple(k for k, body in enumerate(self.bodies) if not body.massless)
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
         """Names of the standard parameters, body by body."""
-        return tuple(f"{kind}_{body.name}" for body in self.bodies for kind in PARAMETER_KINDS)
+        names = (self.bodies[k].name for k in self.inertial)
+        return tuple(f"{kind}_{name}" for name in names for kind in PARAMETER_KINDS)
+
+    @property
+    def generalised_names(self) -> tuple[str, ...]:
+        """Names of the generalised coordinates."""
+        return tuple(body.coordinate for body in self.bodies)
 
     @property
     def coordinate_names(self) -> tuple[str, ...]:
         """Names of the independent coordinates."""
-        return tuple(f"z_{body.name}" for body in self.bodies)
+        return tuple(self.bodies[k].coordinate for k in self.independent)
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """Bounds on a quantity of the mechanism along a trajectory.
+
+    What ``bodies`` and ``vectors`` mean depends on the kind:
+
+    * ``coordinate``: the body whose coordinate is bounded, rad or m;
+    * ``angle``: two bodies and a direction in the frame of each, rad;
+    * ``distance``: two bodies and a point in the frame of each, m;
+    * ``distance-from-axis``: a body and the body that carries the axis; a point in the frame of
+      the first, a point and the direction of the axis in the frame of the second, m;
+    * ``singularity``: none; distance to singularity of the loops, 0 to 1.
+    """
+
+    name: str
+    kind: Literal["coordinate", "angle", "distance", "distance-from-axis", "singularity"]
+    bodies: tuple[int, ...]
+    vectors: tuple[FloatArray, ...]
+    lower: float
+    """Minus infinity where there is none."""
+    upper: float
 
 
 @dataclass(frozen=True)
@@ -123,6 +217,8 @@ class Trajectory:
     reach: FloatArray
     """Largest share of half the position range, or of the velocity or acceleration limit, that the
     motion about its offset uses, (n_dof,)."""
+    extremes: FloatArray
+    """Smallest and largest value of every bounded quantity, (n_constraints, 2), in its unit."""
     cpu_seconds: float
     iterations: int
     status: str
@@ -135,6 +231,8 @@ class Trajectories:
     period: float
     criterion: str
     scaling: str
+    constraints: tuple[Constraint, ...]
+    """What the trajectories had to keep to, besides the limits of the independent coordinates."""
     estimation: tuple[Trajectory, ...]
     validation: tuple[Trajectory, ...]
 
@@ -181,6 +279,10 @@ class Block:
     ddz: FloatArray
     tau: FloatArray
     """Torques of the full model, or measured ones; like the states (n_samples, n_dof)."""
+    q: FloatArray
+    """Generalised coordinates, (n_samples, n_q); the independent ones where there are no loops."""
+    dq: FloatArray
+    ddq: FloatArray
     W: FloatArray
     """(n_samples * n_dof, n_parameters), sample-major."""
 
@@ -223,17 +325,19 @@ class Ordering:
 
     heuristic: str
     order: IntArray
-    """Column indices, the first n of which are the subset of size n, (m,)."""
+    """Column indices, the first n of which are the subset of size n."""
+    n: IntArray
+    """Sizes of the subsets: 1, 2, ... unless columns are chosen in groups, (m,)."""
     torque_error: FloatArray
-    """Weighted Euclidean error on the estimation set at n = 1...m, (m,)."""
+    """Weighted Euclidean error on the estimation set of each subset, (m,)."""
     torque_error_1: FloatArray
     """The same in the 1-norm, (m,)."""
     torque_error_inf: FloatArray
     """The same in the infinity norm, (m,)."""
     parameters: tuple[FloatArray, ...]
-    """Approximate base parameters of each subset, in its order; entry n - 1 is (n,)."""
+    """Approximate base parameters of each subset, in its order; (n,) each."""
     beta: tuple[FloatArray, ...]
-    """W_E ~ W_R beta, the other columns in ascending order; entry n - 1 is (n, n_all - n)."""
+    """W_E ~ W_R beta, the other columns in ascending order; (n, n_all - n) each."""
     minimum_norm: BoolArray
     """Where the subset is beyond the rank and the fit is the minimum-norm one, (m,)."""
     seconds: float
@@ -242,22 +346,35 @@ class Ordering:
         """The columns of the subset of size n, (n,)."""
         return self.order[:n]
 
+    def row(self, n: int) -> int | None:
+        """Where the subset of size n stands in the arrays; None if there is none."""
+        rows = np.flatnonzero(self.n == n)
+        return int(rows[0]) if rows.size else None
+
 
 @dataclass(frozen=True)
 class Reduction:
     """The orderings of all heuristics on one estimation set."""
 
     names: tuple[str, ...]
+    """Of the columns: the standard parameters, a tied group being one column."""
+    expansion: FloatArray
+    """Standard parameters from values of the columns, (n_standard, n)."""
     nominal_torque: FloatArray
     rank: int
     factor: FloatArray
     """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
     orderings: Mapping[str, Ordering]
 
+    def standard(self, subset: IntArray, values: FloatArray) -> FloatArray:
+        """Standard parameters of a reduced model, zero where one is not kept, (n_standard,)."""
+        result: FloatArray = self.expansion[:, subset] @ values
+        return result
+
 
 @dataclass(frozen=True)
 class HeuristicValidation:
-    """Errors and costs of one heuristic's subsets; every array has one row per n."""
+    """Errors and costs of one heuristic's subsets; every array has one row per subset."""
 
     n: IntArray
     torque_error_estimation: FloatArray
@@ -277,6 +394,11 @@ class HeuristicValidation:
     operations_direct: IntArray
     operations_inverse_paper_rule: IntArray
     operations_direct_paper_rule: IntArray
+
+    def row(self, n: int) -> int | None:
+        """Where the subset of size n stands in the arrays; None if there is none."""
+        rows = np.flatnonzero(self.n == n)
+        return int(rows[0]) if rows.size else None
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,10 @@ from paramreduce_cli.artifacts.hdf5 import Reader, Writer
 from paramreduce_cli.records import (
     BaseParameters,
     Body,
+    Closure,
+    Constraint,
     HeuristicValidation,
+    Loops,
     Mechanism,
     Model,
     Ordering,
@@ -45,7 +48,42 @@ def mechanism_from_json(text: str) -> Mechanism:
     )
     data["gravity"] = np.array(data["gravity"])
     data["table"] = tuple(tuple(row) for row in data["table"])
-    return Mechanism(bodies=bodies, **data)
+    loops = data.pop("loops")
+    return Mechanism(bodies=bodies, loops=loops and _loops_from_json(loops), **data)
+
+
+def _loops_from_json(data: dict[str, Any]) -> Loops:
+    closures = tuple(
+        Closure(
+            **{
+                **entry,
+                "bodies": tuple(entry["bodies"]),
+                "frames": tuple(np.array(frame) for frame in entry["frames"]),
+            }
+        )
+        for entry in data["closures"]
+    )
+    return Loops(closures, tuple(data["independent"]), np.array(data["assembly"]))
+
+
+def _constraints_to_json(constraints: tuple[Constraint, ...]) -> str:
+    def plain(value: Any) -> Any:
+        return value.tolist()
+
+    return json.dumps([dataclasses.asdict(c) for c in constraints], default=plain)
+
+
+def _constraints_from_json(text: str) -> tuple[Constraint, ...]:
+    return tuple(
+        Constraint(
+            **{
+                **entry,
+                "bodies": tuple(entry["bodies"]),
+                "vectors": tuple(np.array(vector) for vector in entry["vectors"]),
+            }
+        )
+        for entry in json.loads(text)
+    )
 
 
 def save_model(writer: Writer, model: Model) -> None:
@@ -61,6 +99,7 @@ def save_model(writer: Writer, model: Model) -> None:
     writer.dataset("base/rank_gap", base.rank_gap)
     writer.dataset("base/expressions", list(base.expressions))
     writer.dataset("coordinates/names", mechanism.coordinate_names)
+    writer.dataset("coordinates/generalised", mechanism.generalised_names)
     writer.dataset("nominal_torque", model.nominal_torque)
     writer.dataset("nominal_torque_given", model.nominal_torque_given)
     writer.dataset("mechanism", mechanism_to_json(mechanism))
@@ -84,7 +123,7 @@ def load_model(reader: Reader) -> Model:
     )
 
 
-_PER_JOINT = ("peak_position", "peak_velocity", "reach")
+_ARRAYS = ("peak_position", "peak_velocity", "reach", "extremes")
 _SCALARS = ("kappa_start", "cpu_seconds", "iterations")
 
 
@@ -93,6 +132,7 @@ def save_trajectories(writer: Writer, trajectories: Trajectories) -> None:
     writer.attribute("period", trajectories.period)
     writer.attribute("criterion", trajectories.criterion)
     writer.attribute("scaling", trajectories.scaling)
+    writer.dataset("constraints", _constraints_to_json(trajectories.constraints))
     save_trajectory_set(writer, "estimation", trajectories.estimation)
     save_trajectory_set(writer, "validation", trajectories.validation)
 
@@ -105,7 +145,7 @@ def save_trajectory_set(writer: Writer, name: str, items: tuple[Trajectory, ...]
     for variant in items[0].kappa_variants:
         values = [t.kappa_variants[variant] for t in items]
         writer.dataset(f"{name}/condition_number_variants/{variant}", values)
-    for key in (*_PER_JOINT, "kappa_start", "iterations"):
+    for key in (*_ARRAYS, "kappa_start", "iterations"):
         writer.dataset(f"{name}/{key}", np.array([getattr(t, key) for t in items]))
     writer.timing(f"{name}/cpu_seconds", [t.cpu_seconds for t in items])
     writer.dataset(f"{name}/status", [t.status for t in items])
@@ -117,6 +157,7 @@ def load_trajectories(reader: Reader) -> Trajectories:
         period=float(reader.attribute("period")),
         criterion=str(reader.attribute("criterion")),
         scaling=str(reader.attribute("scaling")),
+        constraints=_constraints_from_json(reader.text("constraints")),
         estimation=load_trajectory_set(reader, "estimation"),
         validation=load_trajectory_set(reader, "validation"),
     )
@@ -130,14 +171,14 @@ def load_trajectory_set(reader: Reader, name: str) -> tuple[Trajectory, ...]:
         key: reader.array(f"{name}/condition_number_variants/{key}", 1)
         for key in reader.texts(f"{name}/scalings")
     }
-    columns = {key: reader.array(f"{name}/{key}") for key in _PER_JOINT + _SCALARS}
+    columns = {key: reader.array(f"{name}/{key}") for key in _ARRAYS + _SCALARS}
     status = reader.texts(f"{name}/status")
     return tuple(
         Trajectory(
             coefficients=coefficients[k],
             kappa=float(kappa[k]),
             kappa_variants={key: float(values[k]) for key, values in variants.items()},
-            **{key: columns[key][k] for key in _PER_JOINT},
+            **{key: columns[key][k] for key in _ARRAYS},
             kappa_start=float(columns["kappa_start"][k]),
             cpu_seconds=float(columns["cpu_seconds"][k]),
             iterations=int(columns["iterations"][k]),
@@ -153,17 +194,19 @@ _ERRORS = ("torque_error", "torque_error_1", "torque_error_inf", "minimum_norm")
 def save_reduction(writer: Writer, reduction: Reduction) -> None:
     """reduction.h5"""
     writer.dataset("parameters/names", reduction.names)
+    writer.dataset("parameters/expansion", reduction.expansion)
     writer.dataset("nominal_torque", reduction.nominal_torque)
     writer.dataset("rank", reduction.rank)
     writer.dataset("factor", reduction.factor)
     writer.dataset("heuristics", list(reduction.orderings))
     for name, ordering in reduction.orderings.items():
         writer.dataset(f"{name}/order", ordering.order)
+        writer.dataset(f"{name}/n", ordering.n)
         for key in _ERRORS:
             writer.dataset(f"{name}/{key}", getattr(ordering, key))
-        for n, values in enumerate(ordering.parameters, start=1):
+        for n, values, beta in zip(ordering.n, ordering.parameters, ordering.beta, strict=True):
             writer.dataset(f"{name}/parameters/{n}", values)
-            writer.dataset(f"{name}/beta/{n}", ordering.beta[n - 1])
+            writer.dataset(f"{name}/beta/{n}", beta)
         writer.timing(f"{name}/seconds", ordering.seconds)
 
 
@@ -171,22 +214,22 @@ def load_reduction(reader: Reader) -> Reduction:
     """reduction.h5"""
     orderings = {}
     for name in reader.texts("heuristics"):
-        order = reader.array(f"{name}/order", 1)
+        sizes = reader.array(f"{name}/n", 1)
         orderings[name] = Ordering(
             heuristic=name,
-            order=order,
+            order=reader.array(f"{name}/order", 1),
+            n=sizes,
             torque_error=reader.array(f"{name}/torque_error", 1),
             torque_error_1=reader.array(f"{name}/torque_error_1", 1),
             torque_error_inf=reader.array(f"{name}/torque_error_inf", 1),
-            parameters=tuple(
-                reader.array(f"{name}/parameters/{n}", 1) for n in range(1, order.size + 1)
-            ),
-            beta=tuple(reader.array(f"{name}/beta/{n}", 2) for n in range(1, order.size + 1)),
+            parameters=tuple(reader.array(f"{name}/parameters/{n}", 1) for n in sizes),
+            beta=tuple(reader.array(f"{name}/beta/{n}", 2) for n in sizes),
             minimum_norm=reader.array(f"{name}/minimum_norm", 1).astype(bool),
             seconds=float(reader.array(f"{name}/seconds")),
         )
     return Reduction(
         names=reader.texts("parameters/names"),
+        expansion=reader.array("parameters/expansion", 2),
         nominal_torque=reader.array("nominal_torque", 1),
         rank=int(reader.array("rank")),
         factor=reader.array("factor", 2),

@@ -28,6 +28,7 @@ def save_samples(writer: Writer, samples: Samples) -> None:
 
 
 _STATES = ("z", "dz", "ddz", "tau")
+_GENERALISED = ("q", "dq", "ddq")
 
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
@@ -41,7 +42,10 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
             appenders["time"] = writer.rows(f"{name}/time", None)
             appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
             appenders["W"] = writer.rows(f"{name}/W", block.W.shape[1])
-        for key in (*_STATES, "time", "W"):
+            n_q = block.q.shape[1]
+            if n_q != n_dof:  # loops: the independent coordinates are not all there is
+                appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
+        for key in appenders.keys() - {"trajectory"}:
             appenders[key](getattr(block, key))
         appenders["trajectory"](np.full(block.time.size, float(block.trajectory)))
         accumulator.add(block)
@@ -82,6 +86,13 @@ class StoredSet:
             for key in present:
                 if reader.rows(f"{name}/{key}").shape != tau.shape:
                     raise ArtifactError(f"{path}: /{name}/{key} must have the shape {tau.shape}.")
+            self._has_generalised = all(f"{name}/{key}" in reader for key in _GENERALISED)
+            if self._has_generalised:
+                shapes = {reader.rows(f"{name}/{key}").shape for key in _GENERALISED}
+                if len(shapes) > 1 or next(iter(shapes))[0] != self.n_samples:
+                    raise ArtifactError(
+                        f"{path}: /{name}/q, dq and ddq must have one shape, (n_samples, n_q)."
+                    )
             for key in ("time", "trajectory"):
                 self._column(reader, key)
 
@@ -100,13 +111,30 @@ class StoredSet:
                         f"{self._path}: /{base} holds numbers that are not finite between samples "
                         f"{start} and {stop}. Remove those samples."
                     )
-                z, dz, ddz = self._states(reader, start, stop)
-                yield Block(int(owner[start]), time[start:stop], z, dz, ddz, tau_block, W_block)
+                states = self._states(reader, start, stop, _STATES[:3])
+                whole = states
+                if self._has_generalised:
+                    whole = self._states(reader, start, stop, _GENERALISED)
+                (z, dz, ddz), (q, dq, ddq) = states, whole
+                yield Block(
+                    int(owner[start]),
+                    time[start:stop],
+                    z,
+                    dz,
+                    ddz,
+                    tau_block,
+                    q,
+                    dq,
+                    ddq,
+                    W_block,
+                )
 
-    def _states(self, reader: Reader, start: int, stop: int) -> list[FloatArray]:
+    def _states(
+        self, reader: Reader, start: int, stop: int, keys: tuple[str, ...]
+    ) -> list[FloatArray]:
         if not self._has_states:
             return [np.full((stop - start, self.n_dof), np.nan)] * 3
-        return [reader.rows(f"{self._name}/{key}")[start:stop] for key in ("z", "dz", "ddz")]
+        return [reader.rows(f"{self._name}/{key}")[start:stop] for key in keys]
 
     def _column(self, reader: Reader, key: str) -> FloatArray:
         name = f"{self._name}/{key}"

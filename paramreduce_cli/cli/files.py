@@ -98,15 +98,16 @@ def _say_model(file: Path, chosen: str) -> None:
     reduction, _ = load_file(file, Reduction, None, "reduce")
     name, _, number = chosen.partition(":")
     ordering = reduction.orderings.get(name)
-    if ordering is None or not number.isdigit() or not 1 <= int(number) <= ordering.order.size:
-        known = ", ".join(f"{k}:1...{o.order.size}" for k, o in reduction.orderings.items())
+    row = ordering.row(int(number)) if ordering is not None and number.isdigit() else None
+    if ordering is None or row is None:
+        known = ", ".join(f"{k}:1...{o.n[-1]}" for k, o in reduction.orderings.items())
         raise ConfigError(f"--model {chosen}: there is {known}.")
     n = int(number)
     kept = ordering.subset(n)
-    texts = approximate_expressions(reduction.names, kept, ordering.beta[n - 1])
-    flag = ", minimum-norm fit beyond the rank" if ordering.minimum_norm[n - 1] else ""
-    say(f"{name}, n = {n}, torque error {ordering.torque_error[n - 1]:.6g}{flag}")
-    for value, text in zip(ordering.parameters[n - 1], texts, strict=True):
+    texts = approximate_expressions(reduction.names, kept, ordering.beta[row])
+    flag = ", minimum-norm fit beyond the rank" if ordering.minimum_norm[row] else ""
+    say(f"{name}, n = {n}, torque error {ordering.torque_error[row]:.6g}{flag}")
+    for value, text in zip(ordering.parameters[row], texts, strict=True):
         say(f"{value: .9e}  =  {text}")
 
 

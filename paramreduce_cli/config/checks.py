@@ -29,19 +29,108 @@ def check(config: Config) -> list[Problem]:
 
 
 def _bodies(config: Config) -> Iterator[Problem]:
+    dh, tree = config.description.dh, config.description.tree
+    path: Path = ("description", "tree", "bodies")
+    rows: list[tuple[str, str | None]] = []
+    if dh is not None:
+        path = ("description", "dh", "joints")
+        rows = list(zip(config.body_names(), (j.parent for j in dh.joints), strict=True))
+    elif tree is not None:
+        rows = [(body.name, body.parent) for body in tree.bodies]
+    names = [name for name, _ in rows]
     seen: set[str] = set()
-    names = config.body_names()
-    for k, (name, joint) in enumerate(zip(names, config.description.dh.joints, strict=True)):
-        path = ("description", "dh", "joints", k)
+    for k, (name, parent) in enumerate(rows):
         if name in seen or name == "base":
-            yield (*path, "name"), f"{name!r} is taken; every body needs a name of its own"
-        if joint.parent is not None and joint.parent not in {"base", *seen}:
-            if joint.parent in names:
-                message = f"{joint.parent!r} is not above {name!r}; put parents above children"
+            yield (*path, k, "name"), f"{name!r} is taken; every body needs a name of its own"
+        if parent is not None and parent not in {"base", *seen}:
+            if parent in names:
+                message = f"{parent!r} is not above {name!r}; put parents above children"
             else:
-                message = unknown("body", joint.parent, ["base", *seen])
-            yield (*path, "parent"), message
+                message = unknown("body", parent, ["base", *seen])
+            yield (*path, k, "parent"), message
         seen.add(name)
+
+
+def _loops(config: Config) -> Iterator[Problem]:
+    tree = config.description.tree
+    if tree is None:
+        return
+    path: Path = ("description", "tree")
+    bodies = ["base", *(body.name for body in tree.bodies)]
+    coordinates = tree.coordinate_names()
+    for k, body in enumerate(tree.bodies):
+        for name in body.coordinate_names():
+            if coordinates.count(name) > 1:
+                yield (*path, "bodies", k), f"coordinate {name!r} belongs to several joints"
+    for k, closure in enumerate(tree.closures):
+        for j, name in enumerate(closure.bodies):
+            if name not in bodies:
+                yield (*path, "closures", k, "bodies", j), unknown("body", name, bodies)
+        if closure.bodies[0] == closure.bodies[1]:
+            yield (*path, "closures", k, "bodies"), f"ties {closure.bodies[0]!r} to itself"
+    for k, name in enumerate(tree.independent):
+        if name not in coordinates:
+            yield (*path, "independent", k), unknown("coordinate", name, coordinates)
+        elif name in tree.independent[:k]:
+            yield (*path, "independent", k), f"{name} stands there twice"
+    for name in tree.guess:
+        if name not in coordinates:
+            yield (*path, "guess", name), unknown("coordinate", name, coordinates)
+
+
+def _constraints(config: Config) -> Iterator[Problem]:
+    description = config.description
+    bodies = ["base", *config.body_names()]
+    if description.tree is not None:
+        bodies = ["base", *(body.name for body in description.tree.bodies)]
+    coordinates = description.generalised_names()
+    seen: set[str] = set()
+    for k, entry in enumerate(config.trajectories.constraints):
+        path: Path = ("trajectories", "constraints", k)
+        if entry.name in seen:
+            yield (*path, "name"), f"{entry.name!r} is taken; every constraint needs its own name"
+        seen.add(entry.name)
+        if entry.coordinate is not None and entry.coordinate not in coordinates:
+            yield (*path, "coordinate"), unknown("coordinate", entry.coordinate, coordinates)
+        for key in ("body", "axis_body"):
+            name = getattr(entry, key)
+            if name is not None and name not in bodies:
+                yield (*path, key), unknown("body", name, bodies)
+        for j, name in enumerate(entry.bodies or []):
+            if name not in bodies:
+                yield (*path, "bodies", j), unknown("body", name, bodies)
+        if entry.quantity == "singularity" and not (description.tree and description.tree.closures):
+            yield (*path, "quantity"), "singularity is of loops, but there is no closure"
+
+
+def _groups(config: Config) -> Iterator[Problem]:
+    known = [f"{kind}_{body}" for body in config.body_names() for kind in PARAMETER_KINDS]
+    owner: dict[str, str] = {}
+    for k, entry in enumerate(config.reduction.groups):
+        path: Path = ("reduction", "groups", k)
+        for j, body in enumerate(entry.bodies or []):
+            if body not in config.body_names():
+                yield (*path, "bodies", j), unknown("body", body, config.body_names())
+        for j, name in enumerate(entry.parameters or []):
+            if name not in known:
+                yield (*path, "parameters", j), unknown("parameter", name, known)
+        for group, members in entry.groups().items():
+            if group in known or group in owner.values():
+                yield (*path, "name"), f"the name {group!r} is taken"
+            for name in members:
+                if name in owner:
+                    yield path, f"{name} is in the group {owner[name]} already"
+            owner |= dict.fromkeys(members, group)
+
+
+def _symmetries(config: Config) -> Iterator[Problem]:
+    names = config.description.coordinate_names()
+    for k, images in enumerate(config.sampling.symmetries):
+        if sorted(name.removeprefix("-") for name in images) != sorted(names):
+            yield (
+                ("sampling", "symmetries", k),
+                f"must name each independent coordinate once: {', '.join(names)}",
+            )
 
 
 def _parameter_sets(config: Config) -> Iterator[Problem]:
@@ -130,7 +219,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
 
 
 def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
-    total = config.n_dof * len(PARAMETER_KINDS)
+    total = len(config.body_names()) * len(PARAMETER_KINDS)
     if config.selected.heuristic not in config.reduction.heuristics:
         yield (
             ("selected", "heuristic"),
@@ -152,6 +241,10 @@ def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
 
 
 _CHECKS: tuple[Check, ...] = (
+    _loops,
+    _constraints,
+    _groups,
+    _symmetries,
     _parameter_sets,
     _per_joint,
     _limits,

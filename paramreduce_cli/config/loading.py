@@ -15,6 +15,7 @@ from pydantic import BaseModel, ValidationError
 from paramreduce_cli.config import reading
 from paramreduce_cli.config.checks import check
 from paramreduce_cli.config.names import unknown
+from paramreduce_cli.config.numbers import read_constants
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import ConfigError
@@ -86,7 +87,7 @@ def _similar(path: Path) -> str:
 def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
     """Structural errors first; then, with those cut out, whatever the rest still reveals."""
     try:
-        config = Config.model_validate(data)
+        config = _parse(data)
         return config, check(config)
     except ValidationError as error:
         problems = _one_per_key([_describe(entry, data) for entry in error.errors()])
@@ -94,11 +95,16 @@ def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
     for path, _ in sorted(problems, key=lambda p: len(p[0]), reverse=True):
         _cut(remainder, path)
     try:
-        rest = check(Config.model_validate(remainder))
+        rest = check(_parse(remainder))
     except ValidationError:
         rest = []
     wrong = [path for path, _ in problems]
     return None, problems + [p for p in rest if not any(_touches(p[0], w) for w in wrong)]
+
+
+def _parse(data: dict[str, Any]) -> Config:
+    constants = read_constants(data.get("constants"))
+    return Config.model_validate(data, context={"constants": constants})
 
 
 def _one_per_key(problems: list[Problem]) -> list[Problem]:

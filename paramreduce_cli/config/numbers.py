@@ -1,14 +1,17 @@
-"""Numbers as people write them in YAML: 1e-3, pi/2, -2*pi/3, 1/3."""
+"""Numbers as people write them in YAML: 1e-3, pi/2, -2*pi/3, 1/3, or 0.9*(R - r) with constants.
+
+The constants of a config reach the numbers as pydantic's validation context.
+"""
 
 from __future__ import annotations
 
 import ast
 import math
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, WithJsonSchema
+from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
 _CONSTANTS = {"pi": math.pi, "inf": math.inf}
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -22,45 +25,49 @@ _LONGEST = 100
 _LARGEST_POWER = 64
 
 
-def parse_number(value: Any) -> float:
+def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> float:
     """Read a number or a small arithmetic expression.
 
     Args:
-        value: A number, or text made of numbers, ``pi``, ``inf``, + - * / ** and brackets.
+        value: A number, or text made of numbers, ``pi``, ``inf``, names of constants,
+            + - * / ** and brackets.
+        constants: By name.
 
     Raises:
         ValueError: It is neither.
     """
+    known = {**_CONSTANTS, **(constants or {})}
+    example = "write one such as 0.5, 1e-3 or pi/2"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{value!r} is not a number; write one such as 0.5, 1e-3 or pi/2")
+        raise ValueError(f"{value!r} is not a number; {example}")
     if isinstance(value, int | float):
         result = float(value)
     else:
         try:
             if len(value) > _LONGEST:
                 raise ValueError("too long")
-            result = _evaluate(ast.parse(value.strip(), mode="eval").body)
+            result = _evaluate(ast.parse(value.strip(), mode="eval").body, known)
         except (ValueError, SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
-            raise ValueError(
-                f"{value!r} is not a number; write one such as 0.5, 1e-3 or pi/2"
-            ) from error
+            if constants:
+                example += f", or with the constants {', '.join(constants)}"
+            raise ValueError(f"{value!r} is not a number; {example}") from error
     if math.isnan(result):
         raise ValueError("NaN is not a number that can be used here")
     return result
 
 
-def _evaluate(node: ast.expr) -> float:
+def _evaluate(node: ast.expr, known: Mapping[str, float]) -> float:
     if isinstance(node, ast.Constant) and not isinstance(node.value, bool):
         if isinstance(node.value, int | float):
             return float(node.value)
         raise ValueError("not a number")
-    if isinstance(node, ast.Name) and node.id in _CONSTANTS:
-        return _CONSTANTS[node.id]
+    if isinstance(node, ast.Name) and node.id in known:
+        return known[node.id]
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
-        operand = _evaluate(node.operand)
+        operand = _evaluate(node.operand, known)
         return -operand if isinstance(node.op, ast.USub) else operand
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        left, right = _evaluate(node.left), _evaluate(node.right)
+        left, right = _evaluate(node.left, known), _evaluate(node.right, known)
         if isinstance(node.op, ast.Pow) and abs(right) > _LARGEST_POWER:
             raise ValueError("power too large")
         result = _BINARY[type(node.op)](left, right)
@@ -73,26 +80,45 @@ def _evaluate(node: ast.expr) -> float:
 _LARGEST = 1e12
 
 
-def _ordinary(value: Any) -> float:
+def _limit(value: Any, info: ValidationInfo) -> float:
+    return parse_number(value, (info.context or {}).get("constants"))
+
+
+def _ordinary(value: Any, info: ValidationInfo) -> float:
     """A number of a size that a machine can have and arithmetic can bear."""
-    result = parse_number(value)
+    result = _limit(value, info)
     if abs(result) > _LARGEST:
         raise ValueError(f"{result:g} is too large; numbers go up to {_LARGEST:g}")
     return result
 
 
-def _whole(value: Any) -> int:
-    result = _ordinary(value)
+def _whole(value: Any, info: ValidationInfo) -> int:
+    result = _ordinary(value, info)
     if result != int(result):
         raise ValueError(f"{value!r} is not a whole number")
     return int(result)
+
+
+def read_constants(given: Any) -> dict[str, float]:
+    """Values of a config's ``constants``, each of which may use those above it.
+
+    What cannot be read counts as one here, so that only its own key is reported as wrong.
+    """
+    values: dict[str, float] = {}
+    if isinstance(given, dict):
+        for name, value in given.items():
+            try:
+                values[str(name)] = parse_number(value, values)
+            except ValueError:
+                values[str(name)] = 1.0
+    return values
 
 
 _TEXT_OR_NUMBER = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
 
 Number = Annotated[float, BeforeValidator(_ordinary), _TEXT_OR_NUMBER]
 """A finite float that may be written as arithmetic, such as ``pi/2``."""
-Limit = Annotated[float, BeforeValidator(parse_number), _TEXT_OR_NUMBER]
+Limit = Annotated[float, BeforeValidator(_limit), _TEXT_OR_NUMBER]
 """The same, or ``inf`` for no limit."""
 Whole = Annotated[int, BeforeValidator(_whole), _TEXT_OR_NUMBER]
 """A whole number that may be written as arithmetic, such as ``1e3``."""

@@ -3,116 +3,34 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Literal, get_args
 
 import numpy as np
-from pydantic import (
-    BaseModel,
-    BeforeValidator,
-    ConfigDict,
-    Field,
-    WithJsonSchema,
-    model_validator,
-)
+from pydantic import Field, model_validator
 
 from paramreduce_cli import registry
+from paramreduce_cli.config.description import Description, Direction, Vector
 from paramreduce_cli.config.names import registered
-from paramreduce_cli.config.numbers import Limit, Number, Whole
+from paramreduce_cli.config.numbers import Number, Whole
+from paramreduce_cli.config.section import (
+    NAME,
+    Count,
+    LimitPerJoint,
+    Name,
+    PairPerJoint,
+    PerJoint,
+    Positive,
+    PositivePerJoint,
+    Section,
+    Seed,
+    Span,
+)
 from paramreduce_cli.records import PARAMETER_KINDS
 
 Heuristic = Annotated[str, registered(registry.heuristic)]
 Criterion = Annotated[str, registered(registry.criterion)]
 Scaling = Annotated[str, registered(registry.scaling)]
-
-NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
-Positive = Annotated[Number, Field(gt=0)]
-Span = Annotated[Number, Field(ge=1e-6, le=1e6)]
-Count = Annotated[Whole, Field(ge=1, le=100_000)]
-Seed = Annotated[Whole, Field(ge=0)]
-Name = Annotated[
-    str,
-    BeforeValidator(lambda value: str(value) if type(value) is int else value),
-    Field(pattern=NAME),
-    WithJsonSchema({"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}),
-]
-
-
-def _as_list(value: Any) -> Any:
-    return value if isinstance(value, list) else [value]
-
-
-def _as_pairs(value: Any) -> Any:
-    if isinstance(value, list) and value and not isinstance(value[0], list):
-        return [value]
-    return value
-
-
-_SCALAR = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-_VECTOR = {"type": "array", "items": _SCALAR, "minItems": 1}
-_ONE_OR_EACH = WithJsonSchema({"anyOf": [*_SCALAR["anyOf"], _VECTOR]})
-_PAIR_OR_EACH = WithJsonSchema({"anyOf": [_VECTOR, {"type": "array", "items": _VECTOR}]})
-
-PerJoint = Annotated[list[Number], BeforeValidator(_as_list), Field(min_length=1), _ONE_OR_EACH]
-"""One number for all joints or one for each."""
-PositivePerJoint = Annotated[
-    list[Positive], BeforeValidator(_as_list), Field(min_length=1), _ONE_OR_EACH
-]
-LimitPerJoint = Annotated[
-    list[Annotated[Limit, Field(ge=1e-6)]],
-    BeforeValidator(_as_list),
-    Field(min_length=1),
-    _ONE_OR_EACH,
-]
-Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-PairPerJoint = Annotated[list[Pair], BeforeValidator(_as_pairs), Field(min_length=1), _PAIR_OR_EACH]
-"""One [lower, upper] for all joints or one for each."""
-
-
-class Section(BaseModel):
-    """A mapping in which unknown keys are errors."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)
-
-
-class DHJoint(Section):
-    """One row of a Denavit-Hartenberg table."""
-
-    name: Name | None = None
-    """Name of the body; its number in the table if left out. Parameters are called after it: m_3."""
-    parent: Name | None = None
-    """Body it is mounted on, `base` for the base; if left out the row above, or the base for the first."""
-    type: Literal["revolute", "prismatic"] = "revolute"
-    """Kind of joint: `revolute` turns about z, `prismatic` slides along z."""
-    a: Number = 0.0
-    """Length along x, m."""
-    alpha: Number = 0.0
-    """Angle about x, rad."""
-    d: Number = 0.0
-    """Length along z, m; the offset of the coordinate for a prismatic joint."""
-    theta: Number = 0.0
-    """Angle about z, rad; the offset of the coordinate for a revolute joint."""
-    gamma: Number = 0.0
-    """Angle about the parent's z that places a branch [Khalil2002], rad."""
-    b: Number = 0.0
-    """Length along the parent's z that places a branch [Khalil2002], m."""
-
-
-class DHDescription(Section):
-    """A tree of bodies in Denavit-Hartenberg parameters."""
-
-    convention: Literal["modified", "standard"] = "modified"
-    """`modified` as in Khalil and Craig: frame i on the axis of joint i; `standard`: on the axis of joint i + 1."""
-    joints: Annotated[list[DHJoint], Field(min_length=1)]
-    """One row per body, parents above their children."""
-
-
-class Description(Section):
-    """The mechanism: a tree of bodies on a fixed base."""
-
-    dh: DHDescription
-    """Denavit-Hartenberg table."""
-    gravity: Annotated[list[Number], Field(min_length=3, max_length=3)] = [0.0, 0.0, -9.81]
-    """Acceleration of gravity in the base frame, m/s^2."""
+ParameterKind = Literal["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
 
 
 class BodyParameters(Section):
@@ -178,6 +96,67 @@ class ModelSection(Section):
     """Of the random states on which the rank is decided."""
 
 
+_QUANTITY_KEYS = {
+    "coordinate": ({"coordinate"}, set()),
+    "angle": ({"bodies"}, {"axes"}),
+    "distance": ({"bodies"}, {"points"}),
+    "distance-from-axis": ({"body"}, {"point", "axis_body", "axis_point", "axis"}),
+    "singularity": (set(), set()),
+}
+"""Keys that each quantity needs, and those it may have besides."""
+
+
+class ConstraintSection(Section):
+    """Bounds on a quantity of the mechanism."""
+
+    name: Name
+    """Name for messages and tables."""
+    quantity: Literal["coordinate", "angle", "distance", "distance-from-axis", "singularity"]
+    """`coordinate`: any coordinate, rad or m; `angle` between two axes, rad; `distance` between two points, m; `distance-from-axis` of a point, m; `singularity`: distance of the loops to singularity, 0 to 1."""
+    min: Number | None = None
+    """Smallest value."""
+    max: Number | None = None
+    """Largest value."""
+    coordinate: Name | None = None
+    """Name of a coordinate, dependent ones too."""
+    bodies: Annotated[list[Name], Field(min_length=2, max_length=2)] | None = None
+    """The two bodies of an angle or a distance, `base` for the base."""
+    axes: Annotated[list[Direction], Field(min_length=2, max_length=2)] = [[0, 0, 1], [0, 0, 1]]
+    """Axes of an angle, each in its body's frame."""
+    points: Annotated[list[Vector], Field(min_length=2, max_length=2)] = [[0, 0, 0], [0, 0, 0]]
+    """Points of a distance, each in its body's frame, m."""
+    body: Name | None = None
+    """Body whose distance from an axis is meant."""
+    point: Vector = [0, 0, 0]
+    """Point in its frame, m."""
+    axis_body: Name = "base"
+    """Body that carries the axis."""
+    axis_point: Vector = [0, 0, 0]
+    """Point of the axis in that body's frame, m."""
+    axis: Direction = [0, 0, 1]
+    """Direction of the axis in that body's frame."""
+
+    @model_validator(mode="after")
+    def _complete(self) -> ConstraintSection:
+        needed, possible = _QUANTITY_KEYS[self.quantity]
+        given = self.model_fields_set - {"name", "quantity", "min", "max"}
+        if missing := needed - given:
+            raise ValueError(f"{self.quantity} needs {', '.join(sorted(missing))}")
+        if surplus := given - needed - possible:
+            raise ValueError(f"{self.quantity} takes no {', '.join(sorted(surplus))}")
+        if self.min is None and self.max is None:
+            raise ValueError("give min or max, or both")
+        if self.min is not None and self.max is not None and self.min >= self.max:
+            raise ValueError(f"the bounds cross: {self.min:g} is not below {self.max:g}")
+        if self.quantity.startswith("distance") and (self.max or 1.0) <= 0:
+            raise ValueError("a distance needs a max above zero")
+        if self.quantity == "angle" and not 0 <= (self.min or 0.0) <= (self.max or np.pi) <= np.pi:
+            raise ValueError("an angle between axes goes from 0 to pi")
+        if self.quantity == "singularity" and (self.max is not None or not 0 < (self.min or 0) < 1):
+            raise ValueError("distance to singularity takes a min between 0 and 1 and no max")
+        return self
+
+
 class Trajectories(Section):
     """How exciting trajectories are made."""
 
@@ -199,6 +178,8 @@ class Trajectories(Section):
     """Largest acceleration, one for all joints or a list; rad/s^2 (m/s^2 if prismatic)."""
     use_full_range: bool = True
     """Whether every joint must reach one of its limits."""
+    constraints: list[ConstraintSection] = []
+    """Bounds on quantities of the mechanism along the trajectories, besides the limits of the independent coordinates."""
     criterion: Criterion = "condition-number"
     """What is minimised."""
     scaling: Scaling = "column-normalised"
@@ -226,8 +207,40 @@ class Sampling(Section):
     """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
     validation_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
+    symmetries: list[Annotated[list[str], Field(min_length=1)]] = []
+    """Symmetries of the mechanism that complete the estimation set: each lists, for every independent coordinate in turn, the one that moves in its place, `-NAME` where it moves the other way."""
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic accelerations, one for all joints or a list, rad/s^2 (m/s^2 if prismatic); or their standard deviation over the estimation set."""
+
+
+class GroupSection(Section):
+    """Parameters that play the same role on several bodies: selected or dropped together."""
+
+    name: Name
+    """Of the group; with bodies the groups are called KIND_NAME."""
+    bodies: Annotated[list[Name], Field(min_length=2)] | None = None
+    """Bodies that play the same role: each kind of parameter makes a group of its own."""
+    kinds: Annotated[list[ParameterKind], Field(min_length=1)] = [*get_args(ParameterKind)]
+    """Which kinds of parameters of these bodies are grouped."""
+    parameters: Annotated[list[str], Field(min_length=2)] | None = None
+    """Names of the parameters of one group, instead of bodies."""
+    tied: bool = False
+    """Whether they share one value, which then counts as one parameter; otherwise each has its own."""
+
+    @model_validator(mode="after")
+    def _one_way_only(self) -> GroupSection:
+        if (self.bodies is None) == (self.parameters is None):
+            raise ValueError("give bodies or parameters, one of them")
+        return self
+
+    def groups(self) -> dict[str, list[str]]:
+        """Names of the parameters of every group, by its name."""
+        if self.parameters is not None:
+            return {self.name: list(self.parameters)}
+        return {
+            f"{kind}_{self.name}": [f"{kind}_{body}" for body in self.bodies or []]
+            for kind in self.kinds
+        }
 
 
 class Stop(Section):
@@ -250,6 +263,8 @@ class ReductionSection(Section):
     """Which heuristics run."""
     weighting: Literal["nominal-torque", "none"] = "nominal-torque"
     """Weight of each joint in fitting and scoring alike."""
+    groups: list[GroupSection] = []
+    """Parameters that are selected or dropped together."""
     stop: Stop = Stop()
     """When to stop."""
 
@@ -293,6 +308,8 @@ class ValidationSection(Section):
 
     accept: Acceptance = Acceptance()
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
+    operations: Literal["generalised", "independent"] = "generalised"
+    """Of closed loops: count d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b handed in."""
     condition_factor: Annotated[Number, Field(gt=1)] = 10.0
     """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than the full model's."""
 
@@ -317,6 +334,8 @@ class Config(Section):
 
     robot: Annotated[str, Field(pattern=NAME)]
     """Name of the robot; results go to results/ROBOT."""
+    constants: dict[str, Number] = {}
+    """Named numbers, such as lengths in m, that all other numbers may be written with; each may use those above it."""
     description: Description
     """The mechanism."""
     parameter_sets: Annotated[dict[str, dict[str, BodyParameters]], Field(min_length=1)]
@@ -342,8 +361,8 @@ class Config(Section):
 
     @property
     def n_dof(self) -> int:
-        """Number of joints."""
-        return len(self.description.dh.joints)
+        """Number of independent coordinates."""
+        return len(self.description.coordinate_names())
 
     def per_joint(self, values: object) -> np.ndarray:
         """An entry that is one number for all joints or one for each, (n_dof,)."""
@@ -351,9 +370,8 @@ class Config(Section):
         return np.full(self.n_dof, result[0]) if result.size == 1 else result
 
     def body_names(self) -> list[str]:
-        """Names of the bodies in the order of the table."""
-        joints = self.description.dh.joints
-        return [joint.name or str(k + 1) for k, joint in enumerate(joints)]
+        """Names of the bodies that have parameters, in order."""
+        return self.description.body_names()
 
     def standard_parameters(self) -> np.ndarray:
         """Values of the chosen set, (n_parameters,), kg, kg m, kg m^2."""

@@ -23,6 +23,8 @@ from paramreduce_cli.records import FloatArray
 Mapping = Literal["gauge", "ball"]
 Pullback = Callable[[FloatArray], FloatArray]
 _BALL_POWER = 20
+_FURTHEST = 0.999
+"""Share of the position range at which a joint may rest; at the limit itself nothing could move."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +134,12 @@ class LimitMap:
 
         harmonics_in = harmonics / divisor[:, None]
         return self._with_offset(offset, harmonics_in, up / divisor, down / divisor), pull
+
+    def resting_offset(self, z: FloatArray) -> FloatArray:
+        """Free offsets of joints that rest at ``z``, both (n_dof,)."""
+        share = (z - self._middle) / (self._reach * self._margin)
+        share = np.clip(share, -_FURTHEST, _FURTHEST)
+        return share / np.sqrt(1 - share**2)
 
     def _extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Shares of half the position range up and down, and of the rates; each (n_dof,)."""

@@ -13,27 +13,45 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg
 
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.criteria import condition_from_matrix
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.scaling import Scaling
+from paramreduce_cli.excitation.scaling import Pullback, Scaling
+from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.dynamics import ObservationFunction
+from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import scaling as scalings
 
-Forward = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
-Adjoint = Callable[
-    [FloatArray, FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray, FloatArray]
-]
 Criterion = Callable[[FloatArray, float], tuple[float, FloatArray]]
+States = tuple[FloatArray, FloatArray, FloatArray]
+
+
+@dataclass(frozen=True)
+class Level:
+    """One step of the continuation from a blunt to a sharp objective."""
+
+    sharpness: float
+    """Exponent of the smooth condition number."""
+    limits: float
+    """Exponent of the smooth maximum of the limits of independent coordinates."""
+    maxima: float
+    """Exponent of the smooth maxima of scalings; e to it times a bound's rows is summed over time."""
+    barrier: float = 0.0
+    """Weight of the logarithmic barrier that keeps bounds."""
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """What is measured along a trajectory: base columns of W, weighted and scaled."""
+    """What is measured along a trajectory: base columns of W, weighted and scaled, and bounds."""
 
-    forward: Forward
-    """States (n_points, n_dof) to W of the base columns, (n_points * n_dof, r)."""
-    adjoint: Adjoint
+    observation: ObservationFunction
+    """Base columns of W along a motion, (n_points * n_dof, r), and its adjoint."""
+    coordinates: Coordinates
+    """From the independent coordinates to all of them."""
+    quantities: Quantities
+    """Quantities of the mechanism that are bounded."""
     beta: FloatArray
     """The other columns in the base columns, (r, n - r)."""
     nominal_torque: FloatArray
@@ -41,51 +59,83 @@ class Excitation:
     criterion: Criterion
     scaling: Scaling
 
-    def weighted(self, states: tuple[FloatArray, FloatArray, FloatArray]) -> FloatArray:
+    def weighted(self, states: States, positions: Follower) -> FloatArray:
         """W with every row divided by its joint's nominal torque."""
-        return self.forward(*states) * self._row_weights(states[0].shape[0])
+        z, dz, ddz = states
+        return self.observation.forward(positions(z), dz, ddz) * self._row_weights(z.shape[0])
 
     def _row_weights(self, points: int) -> FloatArray:
         return np.tile(1 / self.nominal_torque, points)[:, None]
 
-    def condition_numbers(
-        self, states: tuple[FloatArray, FloatArray, FloatArray]
-    ) -> dict[str, float]:
+    def condition_numbers(self, states: States, positions: Follower) -> dict[str, float]:
         """The condition number in every scaling, by singular values."""
-        W = self.weighted(states)
+        W = self.weighted(states, positions)
         return {
-            name: condition_from_matrix(scaling(W, self.beta)[0])
+            name: condition_from_matrix(scaling(W, self.beta, np.inf)[0])
             for name, scaling in scalings.items()
         }
 
     def value_and_gradient(
-        self, basis: FourierBasis, coefficients: FloatArray, sharpness: float
+        self,
+        basis: FourierBasis,
+        coefficients: FloatArray,
+        level: Level,
+        positions: Follower,
     ) -> tuple[float, FloatArray]:
         """The criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics)."""
         states = basis.states(coefficients)
         weights = self._row_weights(states[0].shape[0])
-        scaled, pull = self.scaling(self.forward(*states) * weights, self.beta)
+        q, rates = positions(states[0]), states[1:]
+        W = self.observation.forward(q, *rates) * weights
+        scaled, pull = self.scaling(W, self.beta, level.maxima)
         eigenvalues, vectors = scipy.linalg.eigh(
             scaled.T @ scaled, driver="evd", check_finite=False, overwrite_a=True
         )
-        value, slope = self.criterion(eigenvalues, sharpness)
+        value, slope = self.criterion(eigenvalues, level.sharpness)
         bar = 2 * scaled @ ((vectors * slope) @ vectors.T)
-        z_bar, dz_bar, ddz_bar = self.adjoint(*states, pull(bar) * weights)
+        z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, pull(bar) * weights)
         gradient = (
             z_bar.T @ basis.position + dz_bar.T @ basis.velocity + ddz_bar.T @ basis.acceleration
         )
         return value, gradient
 
+    def barrier(
+        self,
+        basis: FourierBasis,
+        coefficients: FloatArray,
+        level: Level,
+        positions: Follower,
+    ) -> tuple[float, FloatArray]:
+        """Logarithmic barrier of the bounds and its derivative by the coefficients.
+
+        Each bound's row is replaced by its smooth maximum over time, which is never below the
+        true one. Infinite outside the bounds.
+        """
+        if not self.quantities.constraints:
+            return 0.0, np.zeros_like(coefficients)
+        q = positions(basis.states(coefficients)[0])
+        rows = self.quantities.rows(q)
+        largest = rows.max(axis=0)
+        terms = np.exp(level.maxima * (rows - largest))
+        total = terms.sum(axis=0)
+        room = -largest - np.log(total) / level.maxima
+        if (room <= 0).any():
+            return np.inf, np.full_like(coefficients, np.nan)
+        slopes = level.barrier * terms / total / room
+        z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.jacobian(q))
+        return -level.barrier * float(np.log(room).sum()), z_bar.T @ basis.position
+
 
 class FreeObjective:
-    """The criterion over free series, for a solver without constraints.
+    """The criterion over free series, with a barrier at their bounds, for a solver.
 
     Args:
         excitation: What is measured.
         basis: Grid on which it is measured.
         limits: Map from free to admissible series.
-        sharpness: Of the criterion.
-        norm: Exponent of the smooth maximum of the limits.
+        level: How sharp criterion and limits are.
+        positions: Where the mechanism is along the motion.
+        mixing: From the solver's series to those of the joints, (n_dof, n_dof).
     """
 
     def __init__(
@@ -93,18 +143,35 @@ class FreeObjective:
         excitation: Excitation,
         basis: FourierBasis,
         limits: LimitMap,
-        sharpness: float,
-        norm: float,
+        level: Level,
+        positions: Follower,
+        mixing: FloatArray,
     ) -> None:
         self._excitation = excitation
         self._basis = basis
         self._limits = limits
-        self._sharpness = sharpness
-        self._norm = norm
+        self._level = level
+        self._positions = positions
+        self._mixing = mixing
         self._shape = (limits.n_dof, limits.n_columns)
 
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
-        """Value and gradient at ``x``, the free series stacked joint by joint."""
-        coefficients, pull = self._limits.admissible(x.reshape(self._shape), self._norm)
-        value, bar = self._excitation.value_and_gradient(self._basis, coefficients, self._sharpness)
-        return value, pull(bar).ravel()
+        """Value and gradient at ``x``, the unmixed free series stacked joint by joint.
+
+        Not a number outside the bounds and where the loops cannot be closed.
+        """
+        coefficients, pull = self._admissible(x)
+        along = (self._basis, coefficients, self._level, self._positions)
+        try:
+            barrier, barrier_bar = self._excitation.barrier(*along)
+            if np.isfinite(barrier):
+                value, bar = self._excitation.value_and_gradient(*along)
+                return value + barrier, pull(bar + barrier_bar)
+        except DataError:
+            pass
+        return np.nan, np.full(x.size, np.nan)
+
+    def _admissible(self, x: FloatArray) -> tuple[FloatArray, Pullback]:
+        free = self._mixing @ x.reshape(self._shape)
+        coefficients, pull = self._limits.admissible(free, self._level.limits)
+        return coefficients, lambda bar: (self._mixing.T @ pull(bar)).ravel()

@@ -1,7 +1,12 @@
 """One exciting trajectory: random starts, a smooth objective that sharpens, the best kept.
 
 All starts go through the blunt levels; the most promising ones through the sharp levels,
-with IPOPT's stopping rules tightened. The numbers were chosen by measurement on serial arms.
+with IPOPT's stopping rules tightened. The numbers were chosen by measurement, on serial arms
+for motions that only keep joint limits, on the Hexaglide for those with bounds or loops.
+
+With loops, coordinates are mixed so that equal steps move the whole mechanism equally far:
+left to themselves, some combinations of slides of a parallel robot would turn its platform
+ten times as far as others, and neither random starts nor the solver would find their way.
 """
 
 from __future__ import annotations
@@ -12,25 +17,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.excitation.feasibility import (
+    drawn_inside,
+    feasible_start,
+    fine_basis,
+    resting_position,
+)
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
-from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, Minimum, minimise
+from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
 from paramreduce_cli.excitation.limits import JointLimits, LimitMap, Mapping
-from paramreduce_cli.excitation.objective import Excitation, FreeObjective
+from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
+from paramreduce_cli.multibody.coordinates import Follower
 from paramreduce_cli.records import FloatArray, Trajectory
 
 
 @dataclass(frozen=True)
-class Level:
-    """One step of the continuation from a blunt to a sharp objective."""
+class Plan:
+    """The levels that all starts go through, and those that the best ones go on to."""
 
-    sharpness: float
-    """Exponent of the smooth condition number."""
-    norm: float
-    """Exponent of the smooth maximum of the limits."""
+    screening: tuple[Level, ...]
+    polishing: tuple[Level, ...]
 
 
-SCREENING = (Level(4, 30), Level(16, 80))
-POLISHING = (Level(16, 80), Level(32, 150), Level(64, 300), Level(256, 1000))
+FREE = Plan(
+    (Level(4, 30, 30), Level(16, 80, 80)),
+    (Level(16, 80, 80), Level(32, 150, 150), Level(64, 300, 300), Level(256, 1000, 1000)),
+)
+BOUNDED = Plan(
+    # The limits stay as smooth as they are: sharper ones would change the series they map to.
+    (Level(1, 80, 100, 0.1),),
+    (Level(4, 80, 200, 0.01), Level(16, 80, 400, 0.001)),
+)
 
 
 @dataclass(frozen=True)
@@ -76,48 +93,118 @@ def optimise_trajectory(
         settings: What is asked.
         seed: Of the random starts; the result depends on nothing else.
         progress: Told the share of the work done, 0 to 1.
+
+    Raises:
+        DataError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
-    basis = settings_basis(settings)
-    limits = LimitMap(settings.limits, basis, settings.mapping)
-    steps = settings.starts * len(SCREENING) + settings.polished * len(POLISHING)
+    search = _Search(excitation, settings)
+    plan = search.plan
+    steps = settings.starts * len(plan.screening) + settings.polished * len(plan.polishing)
     done = 0
 
     def descend(candidate: _Candidate, levels: tuple[Level, ...], rule: dict) -> None:
         nonlocal done
         for level in levels:
-            objective = FreeObjective(excitation, basis, limits, level.sharpness, level.norm)
-            end = minimise(
-                objective,
-                candidate.free.ravel(),
-                settings.max_iterations,
-                candidate.curvature,
-                rule,
-            )
-            _advance(candidate, end)
+            search.descend(candidate, level, rule)
             done += 1
             progress(done / steps)
 
     candidates = []
     for start in range(settings.starts):
-        candidate = _start(excitation, settings, basis, limits, [*seed, start])
-        descend(candidate, SCREENING, LOOSE)
+        candidate = search.start([*seed, start])
+        descend(candidate, plan.screening, LOOSE)
         candidates.append(candidate)
     candidates.sort(key=lambda candidate: candidate.value)
     chosen = candidates[: settings.polished]
     for candidate in chosen:
-        descend(candidate, POLISHING, TIGHT)
-    best = min(chosen, key=lambda candidate: _exact_value(excitation, basis, limits, candidate))
+        descend(candidate, plan.polishing, TIGHT)
+    results = [search.result(candidate) for candidate in chosen]
+    best = min(range(len(chosen)), key=lambda k: search.kappa(results[k]))
     iterations = sum(candidate.iterations for candidate in candidates)
     return describe(
         excitation,
         settings,
-        limits.scaled(best.free),
-        kappa_start=best.kappa_start,
+        results[best],
+        kappa_start=chosen[best].kappa_start,
         cpu_seconds=time.process_time() - started,
         iterations=iterations,
-        status=best.status,
+        status=chosen[best].status,
     )
+
+
+class _Search:
+    """The search for one trajectory: the grid, the limits, and where the mechanism was last."""
+
+    def __init__(self, excitation: Excitation, settings: Settings) -> None:
+        self._excitation, self._settings = excitation, settings
+        self._basis = settings_basis(settings)
+        self._limits = LimitMap(settings.limits, self._basis, settings.mapping)
+        self._positions = Follower(excitation.coordinates)
+        mechanism = excitation.coordinates.mechanism
+        self._bounded = bool(excitation.quantities.constraints) or mechanism.loops is not None
+        self.plan = BOUNDED if self._bounded else FREE
+        self._rest = settings.limits.middle
+        self._mixing = np.eye(mechanism.n_dof)
+        if self._bounded:
+            self._rest = resting_position(excitation, settings.limits)
+            R = excitation.coordinates.tangent(self._positions(self._rest[None]))[0]
+            values, vectors = np.linalg.eigh(R.T @ R)
+            self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
+
+    def start(self, seed: list[int]) -> _Candidate:
+        """A normal random series, scaled to its limits and drawn together to keep its bounds."""
+        rng = np.random.default_rng(seed)
+        limits = self._limits
+        free = rng.normal(size=(limits.n_dof, limits.n_columns))
+        if not self._bounded:  # on a scale of its own for every joint
+            free[:, 1:] /= limits.shares(free)[:, None]
+            return _Candidate(free, self.kappa(limits.scaled(free)), np.inf, None)
+        free[:, 1:] /= limits.shares(self._mixing @ free).max()
+        still = np.zeros_like(free)
+        still[:, 0] = np.linalg.solve(self._mixing, limits.resting_offset(self._rest))
+        level = self.plan.screening[0]
+        free = feasible_start(free, still, self._objective(level))
+        series, _ = limits.admissible(self._mixing @ free, level.limits)
+        return _Candidate(free, self.kappa(series), np.inf, None)
+
+    def descend(self, candidate: _Candidate, level: Level, rule: dict) -> None:
+        """Take a candidate through one level."""
+        objective = self._objective(level)
+        end = minimise(
+            objective,
+            candidate.free.ravel(),
+            self._settings.max_iterations,
+            candidate.curvature,
+            rule,
+        )
+        candidate.free = end.x.reshape(candidate.free.shape)
+        candidate.value = end.value
+        candidate.curvature = end.curvature
+        candidate.iterations += end.iterations
+        candidate.status = end.status
+
+    def _objective(self, level: Level) -> FreeObjective:
+        return FreeObjective(
+            self._excitation, self._basis, self._limits, level, self._positions, self._mixing
+        )
+
+    def result(self, candidate: _Candidate) -> FloatArray:
+        """The candidate's series, exactly on its limits and inside its bounds."""
+        if not self._bounded:
+            return self._limits.scaled(candidate.free)
+        series, _ = self._limits.admissible(
+            self._mixing @ candidate.free, self.plan.polishing[-1].limits
+        )
+        settings = self._settings
+        return drawn_inside(
+            self._excitation, series, self._rest, settings.period, settings.points, self._positions
+        )
+
+    def kappa(self, series: FloatArray) -> float:
+        """The condition number that the settings ask for."""
+        states = self._basis.states(series)
+        return self._excitation.condition_numbers(states, self._positions)[self._settings.scaling]
 
 
 def settings_basis(settings: Settings) -> FourierBasis:
@@ -136,10 +223,21 @@ def describe(
     iterations: int,
     status: str,
 ) -> Trajectory:
-    """Measure a trajectory on the settings' grid: condition numbers, peaks, share of limits."""
+    """Measure a trajectory: condition numbers, peaks, share of limits, bounded quantities.
+
+    On the settings' grid, the bounded quantities on a finer one.
+
+    Raises:
+        DataError: The loops cannot be closed along it.
+    """
     basis = settings_basis(settings)
     states = basis.states(coefficients)
-    variants = excitation.condition_numbers(states)
+    positions = Follower(excitation.coordinates)
+    variants = excitation.condition_numbers(states, positions)
+    fine = fine_basis(settings.period, settings.harmonics, settings.points)
+    q = positions(fine.states(coefficients)[0])
+    excitation.coordinates.check_motion(fine.time, q)
+    quantities = excitation.quantities.values(q)
     limits = settings.limits
     z, dz, ddz = states
     shares = [
@@ -155,36 +253,8 @@ def describe(
         peak_position=np.abs(z - limits.middle).max(axis=0),
         peak_velocity=np.abs(dz).max(axis=0),
         reach=np.max([share.max(axis=0) for share in shares], axis=0),
+        extremes=np.column_stack([quantities.min(axis=0), quantities.max(axis=0)]),
         cpu_seconds=cpu_seconds,
         iterations=iterations,
         status=status,
     )
-
-
-def _start(
-    excitation: Excitation,
-    settings: Settings,
-    basis: FourierBasis,
-    limits: LimitMap,
-    seed: list[int],
-) -> _Candidate:
-    """A normal random series, scaled to its limits: on a scale of its own for every joint."""
-    rng = np.random.default_rng(seed)
-    free = rng.normal(size=(limits.n_dof, limits.n_columns))
-    free[:, 1:] /= limits.shares(free)[:, None]
-    kappa = excitation.condition_numbers(basis.states(limits.scaled(free)))[settings.scaling]
-    return _Candidate(free, kappa, np.inf, None)
-
-
-def _advance(candidate: _Candidate, end: Minimum) -> None:
-    candidate.free = end.x.reshape(candidate.free.shape)
-    candidate.value = end.value
-    candidate.curvature = end.curvature
-    candidate.iterations += end.iterations
-    candidate.status = end.status
-
-
-def _exact_value(
-    excitation: Excitation, basis: FourierBasis, limits: LimitMap, candidate: _Candidate
-) -> float:
-    return excitation.value_and_gradient(basis, limits.scaled(candidate.free), np.inf)[0]

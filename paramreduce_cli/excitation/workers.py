@@ -27,9 +27,12 @@ from paramreduce_cli import registry
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.objective import Excitation
 from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import (
     BaseParameters,
+    Constraint,
     FloatArray,
     Mechanism,
     Progress,
@@ -46,6 +49,7 @@ class Task:
     base: BaseParameters
     nominal_torque: FloatArray
     criterion: str
+    constraints: tuple[Constraint, ...]
     settings: Settings
     seed: int
 
@@ -56,12 +60,13 @@ def excitation_of(
     nominal_torque: FloatArray,
     criterion: str,
     scaling: str,
+    constraints: tuple[Constraint, ...] = (),
 ) -> Excitation:
     """The measurement of a mechanism's base columns; compiles its regressor."""
-    observation = Dynamics(mechanism).observation(base.columns)
     return Excitation(
-        forward=observation.forward,
-        adjoint=observation.adjoint,
+        observation=Dynamics(mechanism).observation(base.columns),
+        coordinates=Coordinates(mechanism),
+        quantities=Quantities(mechanism, constraints),
         beta=base.beta,
         nominal_torque=nominal_torque,
         criterion=registry.criterion[criterion],
@@ -171,7 +176,12 @@ def _end_with(parent: int) -> None:
 
 def _excitation(task: Task) -> Excitation:
     return excitation_of(
-        task.mechanism, task.base, task.nominal_torque, task.criterion, task.settings.scaling
+        task.mechanism,
+        task.base,
+        task.nominal_torque,
+        task.criterion,
+        task.settings.scaling,
+        task.constraints,
     )
 
 

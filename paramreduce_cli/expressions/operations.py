@@ -14,7 +14,8 @@ Inputs can be declared zero (dropped parameters); what they annihilate is not co
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import casadi as ca
@@ -69,11 +70,18 @@ class Program:
             _read_instruction(function, k, starts) for k in range(function.n_instructions())
         )
 
-    def count(self, zero_inputs: Collection[int] = (), *, signs_free: bool = True) -> int:
+    def count(
+        self,
+        zero_inputs: Collection[int] = (),
+        *,
+        same: Mapping[int, int] = MappingProxyType({}),
+        signs_free: bool = True,
+    ) -> int:
         """Count the operations that remain when some inputs are zero.
 
         Args:
             zero_inputs: Positions, in the concatenation of all inputs, that are zero.
+            same: Positions that hold the same value as another one.
             signs_free: Whether sign changes cost nothing.
 
         Returns:
@@ -86,8 +94,8 @@ class Program:
         for instruction in self.instructions:
             if instruction.op == "input":
                 position = instruction.arguments[0]
-                value = graph.constant(0.0) if position in zero else graph.input(position)
-                slots[instruction.result] = value
+                value = graph.input(same.get(position, position))
+                slots[instruction.result] = graph.constant(0.0) if position in zero else value
             elif instruction.op == "output":
                 outputs.append(slots[instruction.arguments[0]])
             elif instruction.op == "constant":

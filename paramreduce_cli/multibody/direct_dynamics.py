@@ -11,7 +11,7 @@ import casadi as ca
 
 from paramreduce_cli.multibody.inverse_dynamics import (
     BodyInertia,
-    body_inertia,
+    body_inertias,
     inverse_dynamics,
 )
 from paramreduce_cli.multibody.kinematics import (
@@ -28,30 +28,30 @@ from paramreduce_cli.records import BASE, Mechanism
 
 
 def direct_dynamics(
-    mechanism: Mechanism, z: ca.SX, dz: ca.SX, phi: ca.SX
+    mechanism: Mechanism, q: ca.SX, dq: ca.SX, phi: ca.SX
 ) -> tuple[list[list[ca.SX]], list[ca.SX]]:
-    """Mass matrix and bias forces.
+    """Mass matrix and bias forces of the open tree.
 
     Args:
-        mechanism: The tree.
-        z: Coordinates, (n_dof,), rad or m.
-        dz: Velocities.
+        mechanism: The tree; its loops are left open.
+        q: Generalised coordinates, (n_q,), rad or m.
+        dq: Velocities.
         phi: Standard parameters, (n_parameters,).
 
     Returns:
         M as rows (both triangles, sharing expressions) and delta, with
-        tau = M ddz + delta.
+        tau = M ddq + delta.
     """
-    still = ca.SX(mechanism.n_dof, 1)
-    delta = inverse_dynamics(mechanism, z, dz, still, phi)
-    return mass_matrix(mechanism, z, phi), delta
+    still = ca.SX(mechanism.n_q, 1)
+    delta = inverse_dynamics(mechanism, q, dq, still, phi)
+    return mass_matrix(mechanism, q, phi), delta
 
 
-def mass_matrix(mechanism: Mechanism, z: ca.SX, phi: ca.SX) -> list[list[ca.SX]]:
+def mass_matrix(mechanism: Mechanism, q: ca.SX, phi: ca.SX) -> list[list[ca.SX]]:
     """Mass matrix of the tree by composite bodies."""
-    joints = motions(mechanism, z)
-    n = mechanism.n_dof
-    composites = [body_inertia(phi, i) for i in range(n)]
+    joints = motions(mechanism, q)
+    n = mechanism.n_q
+    composites = body_inertias(mechanism, phi)
     for i in reversed(range(n)):
         parent = mechanism.bodies[i].parent
         if parent != BASE:

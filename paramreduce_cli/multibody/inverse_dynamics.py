@@ -8,7 +8,6 @@ U = skew(w') + skew(w)^2 is formed once a body and serves both force and moment
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -39,11 +38,17 @@ class BodyInertia:
     """Inertia about the frame origin, kg m^2."""
 
 
-def body_inertia(phi: Sequence[ca.SX] | ca.SX, index: int) -> BodyInertia:
-    """The parameters of body ``index`` in the stacked vector ``phi``."""
-    start = len(PARAMETER_KINDS) * index
-    m, mx, my, mz, xx, xy, xz, yy, yz, zz = (phi[start + k] for k in range(len(PARAMETER_KINDS)))
-    return BodyInertia(m, (mx, my, mz), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz)))
+def body_inertias(mechanism: Mechanism, phi: ca.SX) -> list[BodyInertia]:
+    """The parameters of every body in the stacked vector ``phi``; zeros where it has no mass."""
+    count = len(PARAMETER_KINDS)
+    order = {body: position for position, body in enumerate(mechanism.inertial)}
+    result = []
+    for i in range(mechanism.n_q):
+        own = range(count * order[i], count * (order[i] + 1)) if i in order else None
+        values = [ca.SX(0)] * count if own is None else [phi[k] for k in own]
+        m, mx, my, mz, xx, xy, xz, yy, yz, zz = values
+        result.append(BodyInertia(m, (mx, my, mz), ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))))
+    return result
 
 
 @dataclass(frozen=True)
@@ -60,33 +65,33 @@ class BodyMotion:
 
 
 def inverse_dynamics(
-    mechanism: Mechanism, z: ca.SX, dz: ca.SX, ddz: ca.SX, phi: ca.SX, *, gravity: bool = True
+    mechanism: Mechanism, q: ca.SX, dq: ca.SX, ddq: ca.SX, phi: ca.SX, *, gravity: bool = True
 ) -> list[ca.SX]:
-    """Joint torques and forces for a motion.
+    """Joint torques and forces of the open tree for a motion.
 
     Args:
-        mechanism: The tree.
-        z: Coordinates, (n_dof,), rad or m.
-        dz: Velocities.
-        ddz: Accelerations.
+        mechanism: The tree; its loops are left open.
+        q: Generalised coordinates, (n_q,), rad or m.
+        dq: Velocities.
+        ddq: Accelerations.
         phi: Standard parameters, (n_parameters,).
         gravity: Whether gravity acts.
 
     Returns:
         One expression per joint, N m or N.
     """
-    moving = body_motions(mechanism, motions(mechanism, z), dz, ddz, gravity=gravity)
+    moving = body_motions(mechanism, motions(mechanism, q), dq, ddq, gravity=gravity)
     forces: list[Vector] = []
     moments: list[Vector] = []
-    for i, motion in enumerate(moving):
-        force, moment = inertial_wrench(body_inertia(phi, i), motion)
+    for inertia, motion in zip(body_inertias(mechanism, phi), moving, strict=True):
+        force, moment = inertial_wrench(inertia, motion)
         forces.append(force)
         moments.append(moment)
     return transmit(mechanism, [m.joint for m in moving], forces, moments)
 
 
 def body_motions(
-    mechanism: Mechanism, joints: list[JointMotion], dz: ca.SX, ddz: ca.SX, *, gravity: bool
+    mechanism: Mechanism, joints: list[JointMotion], dq: ca.SX, ddq: ca.SX, *, gravity: bool
 ) -> list[BodyMotion]:
     """Propagate velocities and accelerations from the base outwards."""
     down = (-mechanism.gravity).tolist() if gravity else [0.0, 0.0, 0.0]
@@ -103,13 +108,13 @@ def body_motions(
         omega, omega_dot, acceleration = map(joint.to_body, (omega, omega_dot, acceleration))
         axis = joint.axis()
         if body.joint == "revolute":
-            turning = scale(dz[i], axis)
-            rise = add(scale(ddz[i], axis), cross(omega, turning))
+            turning = scale(dq[i], axis)
+            rise = add(scale(ddq[i], axis), cross(omega, turning))
             acceleration = add(acceleration, _swing(joint, omega, omega_dot, turning, rise))
             omega, omega_dot = add(omega, turning), add(omega_dot, rise)
         else:
-            acceleration = add(acceleration, scale(ddz[i], axis))
-            acceleration = add(acceleration, scale(2 * dz[i], cross(omega, axis)))
+            acceleration = add(acceleration, scale(ddq[i], axis))
+            acceleration = add(acceleration, scale(2 * dq[i], cross(omega, axis)))
         result.append(
             BodyMotion(joint, omega, omega_dot, acceleration, _u_matrix(omega, omega_dot))
         )
@@ -171,8 +176,8 @@ def transmit(
     Returns:
         One torque or force per joint.
     """
-    tau = [ca.SX(0)] * mechanism.n_dof
-    for i in reversed(range(mechanism.n_dof)):
+    tau = [ca.SX(0)] * mechanism.n_q
+    for i in reversed(range(mechanism.n_q)):
         joint = joints[i]
         axis = joint.axis()
         if joint.body.joint == "revolute":

@@ -115,23 +115,49 @@ def _cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
     return c, s
 
 
-def motions(mechanism: Mechanism, z: ca.SX) -> list[JointMotion]:
-    """One motion per body at the coordinates ``z`` (n_dof,)."""
-    return [joint_motion(body, z[i]) for i, body in enumerate(mechanism.bodies)]
+def motions(mechanism: Mechanism, q: ca.SX) -> list[JointMotion]:
+    """One motion per body at the generalised coordinates ``q`` (n_q,)."""
+    return [joint_motion(body, q[i]) for i, body in enumerate(mechanism.bodies)]
 
 
-def body_poses(mechanism: Mechanism, z: FloatArray) -> FloatArray:
+def point_in_base(joints: list[JointMotion], body: int, point: FloatArray) -> Vector:
+    """Position in the base frame of a point given in the frame of a body, m.
+
+    Args:
+        joints: One motion per body of the mechanism.
+        body: Index of the body, :data:`BASE` for the base.
+        point: (3,), m
+    """
+    x, y, z = np.asarray(point).tolist()
+    position: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
+    while body != BASE:
+        position = add(joints[body].origin, joints[body].to_parent(position))
+        body = joints[body].body.parent
+    return position
+
+
+def direction_in_base(joints: list[JointMotion], body: int, direction: FloatArray) -> Vector:
+    """Components in the base frame of a direction given in the frame of a body."""
+    x, y, z = np.asarray(direction).tolist()
+    components: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
+    while body != BASE:
+        components = joints[body].to_parent(components)
+        body = joints[body].body.parent
+    return components
+
+
+def body_poses(mechanism: Mechanism, q: FloatArray) -> FloatArray:
     """Poses of the body frames in the base frame.
 
     Args:
-        mechanism: The tree.
-        z: Coordinates of one state, (n_dof,), rad or m.
+        mechanism: Whose bodies are placed.
+        q: Generalised coordinates of one state, (n_q,), rad or m.
 
     Returns:
         Homogeneous transforms, (n_bodies, 4, 4).
     """
     poses: list[FloatArray] = []
-    for body, value in zip(mechanism.bodies, z, strict=True):
+    for body, value in zip(mechanism.bodies, q, strict=True):
         motion = np.eye(4)
         moved = value + body.offset
         if body.joint == "revolute":

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, FloatArray
 
@@ -50,16 +51,30 @@ class ObservedSet:
     ) -> None:
         self.states = states
         self.n_samples = n_samples
+        self._coordinates = Coordinates(dynamics.mechanism)
         self._dynamics = dynamics
         self._phi = phi
 
     def blocks(self) -> Iterator[Block]:
-        """Yield the samples in order; every call starts anew."""
+        """Yield the samples in order; every call starts anew.
+
+        Raises:
+            DataError: The loops cannot be closed throughout a trajectory.
+        """
+        trajectory, last = -1, (np.zeros(0), np.zeros((0, self._dynamics.mechanism.n_q)))
         for s in self.states():
-            K = self._dynamics.regressor(s.z, s.dz, s.ddz)
+            if s.trajectory != trajectory:
+                trajectory, last = s.trajectory, (last[0][:0], last[1][:0])
+            start = last[1][-1] if last[1].size else None
+            q, dq, ddq = self._coordinates.states(s.z, s.dz, s.ddz, start)
+            self._coordinates.check_motion(
+                np.concatenate([last[0], s.time]), np.concatenate([last[1], q])
+            )
+            last = (s.time[-1:], q[-1:])
+            K = self._dynamics.regressor(q, dq, ddq)
             tau = K @ self._phi if s.tau is None else s.tau
             W = K.reshape(-1, K.shape[2])
-            yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, W)
+            yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, q, dq, ddq, W)
 
     def factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint."""

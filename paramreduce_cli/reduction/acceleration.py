@@ -10,7 +10,7 @@ import numpy as np
 from paramreduce_cli.records import Block, FloatArray
 
 DirectRegressor = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""States to the linear maps of [M | delta] by the parameters."""
+"""Generalised coordinates and velocities to the linear maps of [M | delta] by the parameters."""
 
 _SINGULAR = 1e-10
 """Ratio of eigenvalues at which a mass matrix counts as singular: beyond it, accelerations are
@@ -56,7 +56,7 @@ def acceleration_errors(
     for block in blocks:
         for start in range(0, block.time.size, step):
             part = slice(start, start + step)
-            A, B = direct_regressor(block.z[part], block.dz[part])
+            A, B = direct_regressor(block.q[part], block.dq[part])
             M = np.moveaxis(A @ parameters, -1, 1)
             bias = np.moveaxis(B @ parameters, -1, 1)
             values, vectors = np.linalg.eigh(M)

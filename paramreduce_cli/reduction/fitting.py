@@ -89,10 +89,3 @@ def torque_errors(
         infinity=largest / max(chi_largest, tiny),
         joints=np.sqrt(squares / np.maximum(chi_square, tiny)),
     )
-
-
-def model_column(subset: IntArray, parameters: FloatArray, n: int) -> FloatArray:
-    """All parameters of a reduced model, zero where one is not kept, (n,)."""
-    result = np.zeros(n)
-    result[subset] = parameters
-    return result

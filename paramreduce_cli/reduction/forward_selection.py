@@ -19,7 +19,8 @@ def forward_selection(problem: SelectionProblem) -> IntArray:
     """Add, one by one, the parameter that lowers the torque error most.
 
     For a column x of which r is left after projecting out the subset, adding it lowers the
-    squared error by (r . e)^2 / (r . r), e being what is left of the torques. Once nothing is
+    squared error by (r . e)^2 / (r . r), e being what is left of the torques; for a group it is
+    what its columns explain together, per column. Once nothing is
     left but round-off, the column of which the largest share is left comes next, so that the
     order goes on to a well-conditioned base; dependent columns follow in order of preference.
 
@@ -32,8 +33,7 @@ def forward_selection(problem: SelectionProblem) -> IntArray:
         if not lengths.any():
             break
         if np.linalg.norm(remainder.chi) > FULL_PRECISION * remainder.chi_length:
-            gains = (remainder.chi @ remainder.X) ** 2
-            scores = np.divide(gains, lengths, out=np.full_like(gains, -1.0), where=lengths > 0)
+            scores = remainder.gains()
         else:
             scores = remainder.relative_squared_lengths()
         remainder.take(first_of_the_best(scores))

@@ -24,21 +24,40 @@ class SelectionProblem:
         chi: (k,)
         candidates: Columns that may be chosen, in ascending order.
         preference: All columns, the most wanted first; it breaks every tie.
+        groups: Sets of columns that are chosen or left out together; all others stand alone.
     """
 
     W: FloatArray
     chi: FloatArray
     candidates: IntArray
     preference: IntArray
+    groups: tuple[IntArray, ...] = ()
 
     @property
     def candidates_by_preference(self) -> IntArray:
         """The candidates, the most wanted first."""
         return self.preference[np.isin(self.preference, self.candidates)]
 
+    def units(self) -> list[IntArray]:
+        """What is chosen as one, candidates alone or in groups, the most wanted first.
+
+        A group stands where its most wanted member does, its members in order of preference.
+        """
+        owner = {int(column): k for k, group in enumerate(self.groups) for column in group}
+        found: dict[int, list[int]] = {}
+        for column in self.candidates_by_preference.tolist():
+            found.setdefault(owner.get(column, -1 - column), []).append(column)
+        return [np.array(columns, dtype=np.int64) for columns in found.values()]
+
+    def sizes(self, order: IntArray) -> IntArray:
+        """Numbers of columns at which an order is between groups, not inside one."""
+        position = {int(column): k for k, column in enumerate(order)}
+        inside = {p for unit in self.units() for p in sorted(position[int(c)] for c in unit)[:-1]}
+        return np.array([n for n in range(1, order.size + 1) if n - 1 not in inside], np.int64)
+
 
 Heuristic = Callable[[SelectionProblem], IntArray]
-"""Orders all candidates: the first n of them are the subset of size n."""
+"""Orders all candidates, groups in one piece: the first n of them are the subset of size n."""
 
 
 def first_of_the_best(scores: FloatArray) -> int:

@@ -12,7 +12,7 @@ from paramreduce_cli.registry import heuristic
 def qr(problem: SelectionProblem) -> IntArray:
     """Order columns by how much of them is independent of those before.
 
-    Each step takes the column of which most is left; it looks at W alone, not at the torques.
+    Each step takes the column of which most is left, or the group with the most per column; it looks at W alone, not at the torques.
     Dependent columns follow in order of preference.
 
     Returns:

@@ -12,12 +12,15 @@ from paramreduce_cli.reduction.problem import SelectionProblem
 class Remainder:
     """What is left of the candidate columns and of chi once some columns are taken.
 
-    Columns stand in order of preference. Taking one removes its direction from all others by
-    modified Gram-Schmidt, the new direction itself orthogonalised twice.
+    Columns stand in order of preference, those of a group together; scores are per unit, a
+    column or a group. Taking one removes its directions from all others by modified
+    Gram-Schmidt, each new direction itself orthogonalised twice.
     """
 
     def __init__(self, problem: SelectionProblem) -> None:
-        self.columns: IntArray = problem.candidates_by_preference
+        units = problem.units()
+        self.columns: IntArray = np.concatenate(units)
+        self._sizes = np.array([unit.size for unit in units])
         self.X: FloatArray = problem.W[:, self.columns].copy()
         self.chi: FloatArray = problem.chi.copy()
         self.chi_length = float(np.linalg.norm(problem.chi))
@@ -26,23 +29,49 @@ class Remainder:
         self.order: list[int] = []
 
     def squared_lengths(self) -> FloatArray:
-        """Of what is left of each column, zero where it is dependent, (n_left,)."""
-        squared = np.einsum("ij,ij->j", self.X, self.X)
-        squared[squared <= (DEPENDENT * self._lengths) ** 2] = 0.0
-        return squared
+        """Of what is left of each unit per column, zero where it is dependent, (n_units,)."""
+        return self._per_unit(self._squared_lengths())
 
     def relative_squared_lengths(self) -> FloatArray:
         """The same relative to the whole columns."""
-        return self.squared_lengths() / np.maximum(self._lengths, np.finfo(float).tiny) ** 2
+        whole = np.maximum(self._lengths, np.finfo(float).tiny) ** 2
+        return self._per_unit(self._squared_lengths() / whole)
 
-    def take(self, position: int) -> None:
-        """Add the column at a position to the subset."""
+    def gains(self) -> FloatArray:
+        """By how much each unit would lower the squared error, per column, (n_units,)."""
+        squared = self._squared_lengths()
+        gains = (self.chi @ self.X) ** 2
+        scores = np.divide(gains, squared, out=np.full_like(gains, -1.0), where=squared > 0)
+        if self._sizes.size == self.columns.size:
+            return scores
+        starts = self._starts()
+        result = scores[starts]
+        for unit in np.flatnonzero(self._sizes > 1):
+            part = slice(starts[unit], starts[unit] + self._sizes[unit])
+            alive = squared[part] > 0
+            if alive.any():
+                fitted = np.linalg.lstsq(self.X[:, part][:, alive], self.chi, rcond=DEPENDENT)[0]
+                explained = self.X[:, part][:, alive] @ fitted
+                result[unit] = explained @ explained / self._sizes[unit]
+        return result
+
+    def take(self, unit: int) -> None:
+        """Add the columns of a unit to the subset."""
+        start = int(self._starts()[unit])
+        for _ in range(int(self._sizes[unit])):
+            self._take_column(start)
+        self._sizes = np.delete(self._sizes, unit)
+
+    def _take_column(self, position: int) -> None:
         direction = self.X[:, position]
+        dependent = np.linalg.norm(direction) <= DEPENDENT * self._lengths[position]
+        self.order.append(int(self.columns[position]))
+        self._drop(position)
+        if dependent:
+            return
         for _ in range(2):
             direction = direction - self._basis @ (self._basis.T @ direction)
             direction = direction / np.linalg.norm(direction)
-        self.order.append(int(self.columns[position]))
-        self._drop(position)
         self.X -= np.outer(direction, direction @ self.X)
         self.chi -= direction * (direction @ self.chi)
         self._basis = np.column_stack([self._basis, direction])
@@ -50,6 +79,19 @@ class Remainder:
     def take_the_rest(self) -> IntArray:
         """Append all that is left, in order of preference, and return the whole order."""
         return np.array([*self.order, *self.columns.tolist()], dtype=np.int64)
+
+    def _starts(self) -> IntArray:
+        return np.concatenate([[0], np.cumsum(self._sizes)[:-1]]).astype(np.int64)
+
+    def _per_unit(self, values: FloatArray) -> FloatArray:
+        if self._sizes.size == self.columns.size:
+            return values
+        return np.add.reduceat(values, self._starts()) / self._sizes
+
+    def _squared_lengths(self) -> FloatArray:
+        squared = np.einsum("ij,ij->j", self.X, self.X)
+        squared[squared <= (DEPENDENT * self._lengths) ** 2] = 0.0
+        return squared
 
     def _drop(self, position: int) -> None:
         self.columns = np.delete(self.columns, position)

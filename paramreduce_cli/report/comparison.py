@@ -142,7 +142,8 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
         x, y = a["reduction"][name]["order"], b["reduction"][name]["order"]
         yield from _exact(f"parameters ordered, {name}", len(x), len(y))
         errors = zip(a["validation"][name], b["validation"][name], strict=False)
-        for n, (row_a, row_b) in enumerate(errors, start=1):
+        for row_a, row_b in errors:
+            n = row_a["n"]
             if n > min(len(x), len(y)):
                 break
             if set(x[:n]) == set(y[:n]):

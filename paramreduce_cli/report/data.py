@@ -25,6 +25,8 @@ class Motion:
     z: FloatArray
     dz: FloatArray
     ddz: FloatArray
+    q: FloatArray
+    """Generalised coordinates, (n_samples, n_q)."""
     full: FloatArray
     """Full model, (n_samples, n_dof)."""
     reduced: FloatArray
@@ -51,6 +53,8 @@ class Skeleton:
     """Centres of mass, NaN for bodies without mass, (n_bodies, 3), m."""
     parents: tuple[int, ...]
     kinds: tuple[str, ...]
+    closures: tuple[FloatArray, ...]
+    """From one body's origin over the closure to the other's, for each loop, (n_points, 3), m."""
 
 
 @dataclass(frozen=True)
@@ -92,6 +96,7 @@ def first_motion(
         z=np.concatenate([p.z for p in parts]),
         dz=np.concatenate([p.dz for p in parts]),
         ddz=np.concatenate([p.ddz for p in parts]),
+        q=np.concatenate([p.q for p in parts]),
         full=full / nominal_torque,
         reduced=reduced / nominal_torque,
     )

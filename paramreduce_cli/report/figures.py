@@ -94,21 +94,33 @@ def poses(data: ReportData) -> Figure:
 def _extent(skeleton: Skeleton) -> FloatArray:
     """Corners of the box around a pose and the base, (2, 3), m."""
     points = np.vstack(
-        [np.zeros(3), skeleton.poses[:, :3, 3], skeleton.joints[:, :3, 3], skeleton.masses]
+        [
+            np.zeros((0 if skeleton.closures else 1, 3)),
+            skeleton.poses[:, :3, 3],
+            skeleton.joints[:, :3, 3],
+            skeleton.masses,
+            *skeleton.closures,
+        ]
     )
     return np.array([np.nanmin(points, axis=0), np.nanmax(points, axis=0)])
 
 
 def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
+    link = {"color": "#44607a", "linewidth": 4, "solid_capstyle": "round", "alpha": 0.9}
     for i, parent in enumerate(skeleton.parents):
         start = np.zeros(3) if parent < 0 else skeleton.poses[parent][:3, 3]
         middle, end = skeleton.joints[i][:3, 3], skeleton.poses[i][:3, 3]
-        path = np.array([start, middle, end]).T
-        axes.plot(*path, color="#44607a", linewidth=4, solid_capstyle="round", alpha=0.9)
+        if not skeleton.closures:
+            axes.plot(*np.array([start, middle, end]).T, **link)
+        elif skeleton.kinds[i] == "revolute":  # what slides is not tied to where it slides from
+            axes.plot(*np.array([middle if parent < 0 else start, middle, end]).T, **link)
         axis = skeleton.joints[i][:3, 2] * 0.14 * half
         ends = np.array([middle - axis, middle + axis]).T
         colour = "#d9730d" if skeleton.kinds[i] == "revolute" else "#2f8f5b"
         axes.plot(*ends, color=colour, linewidth=2.4, solid_capstyle="butt")
+    for path in skeleton.closures:
+        axes.plot(*path.T, **link)
+        axes.scatter(*path[len(path) // 2], s=14, color="#d9730d")
     for i in set(range(len(skeleton.parents))) - set(skeleton.parents):
         tip = skeleton.poses[i]
         to_mass = np.array([tip[:3, 3], skeleton.masses[i]]).T
@@ -116,7 +128,8 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
         for column, colour in zip(range(3), ("#c2384f", "#2f8f5b", "#0b62c4"), strict=True):
             arrow = np.array([tip[:3, 3], tip[:3, 3] + 0.25 * half * tip[:3, column]]).T
             axes.plot(*arrow, color=colour, linewidth=1.4)
-    axes.scatter(0, 0, 0, marker="s", s=40, color="#30363d")
+    if not skeleton.closures:
+        axes.scatter(0, 0, 0, marker="s", s=40, color="#30363d")
     axes.set_box_aspect((1, 1, 1), zoom=1.15)
     axes.view_init(elev=22, azim=-60)
     for axis in (axes.xaxis, axes.yaxis, axes.zaxis):

@@ -44,6 +44,7 @@ def summary_of(
         "reduction": {
             name: {
                 "order": [reduction.names[k] for k in ordering.order],
+                "n": ordering.n,
                 "torque_error_1": ordering.torque_error_1,
                 "torque_error_inf": ordering.torque_error_inf,
                 "minimum_norm_from": _first(ordering.minimum_norm),
@@ -59,7 +60,7 @@ def summary_of(
             "parameters": dict(zip(selected.parameters, selected.values, strict=True)),
             "accepted": validation.accepted,
             "verdict": validation.verdict,
-            **_rows(chosen)[selected.n - 1],
+            **next(row for row in _rows(chosen) if row["n"] == selected.n),
         },
         "remarks": list(validation.remarks),
     }
@@ -73,6 +74,7 @@ def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
     return {
         "criterion": trajectories.criterion,
         "scaling": trajectories.scaling,
+        "constraints": [c.name for c in trajectories.constraints],
         "period": trajectories.period,
         "estimation": [_trajectory(t) for t in trajectories.estimation],
         "validation": [_trajectory(t) for t in trajectories.validation],
@@ -87,6 +89,7 @@ def _trajectory(t: Trajectory) -> dict[str, Any]:
         "peak_position": t.peak_position,
         "peak_velocity": t.peak_velocity,
         "reach": t.reach,
+        "extremes": t.extremes,
         "cpu_seconds": t.cpu_seconds,
         "iterations": t.iterations,
         "status": t.status,

@@ -107,8 +107,8 @@ def dynamic_parameters(data: ReportData) -> Table:
     """The standard parameters of every body."""
     values = data.model.values.reshape(-1, len(PARAMETER_KINDS))
     rows = [
-        (body.name, *(f"{value:g}" for value in row))
-        for body, row in zip(data.model.mechanism.bodies, values, strict=True)
+        (data.model.mechanism.bodies[k].name, *(f"{value:g}" for value in row))
+        for k, row in zip(data.model.mechanism.inertial, values, strict=True)
     ]
     title = "Standard parameters (kg, kg m, kg m²)"
     return Table(title, ("body", *PARAMETER_KINDS), tuple(rows))
@@ -142,7 +142,8 @@ def trajectories(data: ReportData) -> Table:
     variants = tuple(found.estimation[0].kappa_variants)
     header = (
         "trajectory", *(f"κ {name}" for name in variants), "κ at start",
-        "peak |z - middle|", "peak speed", "share of limits", "CPU s", "iterations", "status",
+        "peak |z - middle|", "peak speed", "share of limits",
+        *(f"{c.name}" for c in found.constraints), "CPU s", "iterations", "status",
     )  # fmt: skip
     rows = [
         _trajectory_row(f"{name} {k + 1}", t)
@@ -163,6 +164,7 @@ def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
         spread(t.peak_position),
         spread(t.peak_velocity),
         spread(t.reach),
+        *(f"{low:.3g} ... {high:.3g}" for low, high in t.extremes),
         f"{t.cpu_seconds:.2f}",
         str(t.iterations),
         t.status.replace("_", " "),
@@ -196,9 +198,9 @@ def summary(data: ReportData) -> Table:
     )  # fmt: skip
     rows = []
     for name, r in data.validation.heuristics.items():
-        if n > r.n.size:
+        k = r.row(n)
+        if k is None:
             continue
-        k = n - 1
         cells = [name, str(int(data.model.affecting.sum())), str(data.reduction.rank), str(n)]
         for key, error in (("inverse", "torque"), ("direct", "acceleration")):
             whole = int(full[f"operations_{key}"])
@@ -252,7 +254,7 @@ def operations(data: ReportData) -> Table:
         (
             selected.heuristic,
             str(selected.n),
-            *(str(int(getattr(result, key)[selected.n - 1])) for key in keys),
+            *(str(int(getattr(result, key)[result.row(selected.n)])) for key in keys),
         ),
     ]
     header = ("model", "n", "d", "d, signs counted", "[M, δ]", "[M, δ], signs counted")

@@ -9,9 +9,7 @@ from typing import Literal
 import numpy as np
 
 from paramreduce_cli.records import BASE, Body, FloatArray, Mechanism
-
-_EXACT = (0.0, 0.5, 1.0)
-_SNAP = 4 * np.finfo(float).eps
+from paramreduce_cli.robots.frames import rotation_x, rotation_z, translation
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,10 @@ def mechanism_from_dh(
         place = _modified if convention == "modified" else _standard
         before, after = place(row)
         offset = row.theta if row.joint == "revolute" else row.d
-        bodies.append(Body(row.name, index[row.parent], row.joint, before, after, offset))
+        coordinate = f"z_{row.name}"
+        bodies.append(
+            Body(row.name, index[row.parent], row.joint, before, after, coordinate, offset)
+        )
         index[row.name] = len(bodies) - 1
     return Mechanism(
         robot,
@@ -88,33 +89,6 @@ def _still_part(row: DHRow) -> FloatArray:
     if row.joint == "revolute":
         return translation(0.0, 0.0, row.d)
     return rotation_z(row.theta)
-
-
-def rotation_x(angle: float) -> FloatArray:
-    """Homogeneous rotation about x, (4, 4)."""
-    c, s = _exact(np.cos(angle)), _exact(np.sin(angle))
-    return np.array([[1.0, 0, 0, 0], [0, c, -s, 0], [0, s, c, 0], [0, 0, 0, 1]])
-
-
-def rotation_z(angle: float) -> FloatArray:
-    """Homogeneous rotation about z, (4, 4)."""
-    c, s = _exact(np.cos(angle)), _exact(np.sin(angle))
-    return np.array([[c, -s, 0, 0], [s, c, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1.0]])
-
-
-def translation(x: float, y: float, z: float) -> FloatArray:
-    """Homogeneous translation in m, (4, 4)."""
-    result = np.eye(4)
-    result[:3, 3] = x, y, z
-    return result
-
-
-def _exact(value: float) -> float:
-    """Undo the rounding of pi: cos(pi/2) is zero, not 6e-17, or ranks would change."""
-    for exact in _EXACT:
-        if abs(abs(value) - exact) <= _SNAP:
-            return float(np.copysign(exact, value)) if exact else 0.0
-    return float(value)
 
 
 def _lengths(rows: Sequence[DHRow]) -> dict[str, float]:

@@ -15,10 +15,11 @@ from paramreduce_cli.multibody.base_parameters import (
     regrouping,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.multibody.relations import regrouping_expressions
 from paramreduce_cli.records import BaseParameters, FloatArray, Mechanism, Model
 from paramreduce_cli.registry import stage
-from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh
+from paramreduce_cli.stages.description import described_mechanism
 
 _STATES = 300
 """Random states on which ranks are decided; many more rows than columns."""
@@ -32,9 +33,9 @@ def build_model(config: Config) -> Model:
 
     The ranks are decided on seeded random states.
     """
-    mechanism = _mechanism(config, 1.0)
+    mechanism = described_mechanism(config)
     rng = np.random.default_rng(config.model.seed)
-    states = _random_states(mechanism, rng)
+    states = random_states(mechanism, _STATES, rng)
     K = Dynamics(mechanism).regressor(*states)
     W = K.reshape(-1, K.shape[2])
     values = config.standard_parameters()
@@ -77,58 +78,17 @@ def _expressions(
     states: tuple[FloatArray, FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> list[str]:
-    """Regrouping relations, coefficients named where they follow changed lengths as well."""
+    """Regrouping relations, coefficients named where they follow changed lengths as well.
+
+    Without named lengths, as in mechanisms with loops, coefficients are numbers.
+    """
     betas, lengths = [base.beta], [mechanism.lengths]
-    for _ in range(_CHANGED_GEOMETRIES):
-        changed = _mechanism(config, rng)
+    for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
+        changed = described_mechanism(config, lambda length: length * rng.uniform(0.8, 1.25))
         K = Dynamics(changed, once=True).regressor(*states)
         betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns))
         lengths.append(changed.lengths)
     return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
-
-
-def _mechanism(config: Config, stretch: np.random.Generator | float) -> Mechanism:
-    """The mechanism of a config, its lengths multiplied by a number or by random ones."""
-
-    def stretched(length: float) -> float:
-        factor = stretch if isinstance(stretch, float) else float(stretch.uniform(0.8, 1.25))
-        return length * factor
-
-    names = config.body_names()
-    rows = [
-        DHRow(
-            name=names[k],
-            parent=_parent(joint.parent, names[k - 1] if k else None),
-            joint=joint.type,
-            a=stretched(joint.a),
-            alpha=joint.alpha,
-            d=stretched(joint.d),
-            theta=joint.theta,
-            gamma=joint.gamma,
-            b=stretched(joint.b),
-        )
-        for k, joint in enumerate(config.description.dh.joints)
-    ]
-    return mechanism_from_dh(
-        config.robot, rows, config.description.dh.convention, config.description.gravity
-    )
-
-
-def _parent(given: str | None, above: str | None) -> str | None:
-    if given == "base":
-        return None
-    return given if given is not None else above
-
-
-def _random_states(
-    mechanism: Mechanism, rng: np.random.Generator
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Anywhere: whole turns, slides as long as the arm, speeds and accelerations normal."""
-    longest = max((abs(length) for length in mechanism.lengths.values()), default=1.0)
-    reach = [np.pi if body.joint == "revolute" else longest for body in mechanism.bodies]
-    shape = (_STATES, mechanism.n_dof)
-    z = rng.uniform(-1, 1, size=shape) * reach
-    return z, rng.normal(size=shape), rng.normal(size=shape)
 
 
 def _preference(config: Config, mechanism: Mechanism) -> np.ndarray:

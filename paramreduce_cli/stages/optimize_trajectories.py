@@ -11,8 +11,17 @@ from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.optimiser import Settings, describe
 from paramreduce_cli.excitation.workers import Task, excitation_of, optimise_all
-from paramreduce_cli.records import Coefficients, FloatArray, Model, Run, Trajectories, Trajectory
+from paramreduce_cli.records import (
+    Coefficients,
+    Constraint,
+    FloatArray,
+    Model,
+    Run,
+    Trajectories,
+    Trajectory,
+)
 from paramreduce_cli.registry import stage
+from paramreduce_cli.stages.description import described_constraints
 
 _SETS = ("estimation", "validation")
 _ROUNDING = 1e-9
@@ -34,6 +43,7 @@ def optimize_trajectories(
         base=model.base,
         nominal_torque=model.nominal_torque,
         criterion=wanted.criterion,
+        constraints=described_constraints(config, model.mechanism),
         settings=joint_settings(config, wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
@@ -42,7 +52,12 @@ def optimize_trajectories(
     found = optimise_all(task, keys, run)
     sets = {name: tuple(found[key] for key in keys if key.startswith(name)) for name in _SETS}
     return Trajectories(
-        wanted.period, wanted.criterion, wanted.scaling, sets["estimation"], sets["validation"]
+        wanted.period,
+        wanted.criterion,
+        wanted.scaling,
+        task.constraints,
+        sets["estimation"],
+        sets["validation"],
     )
 
 
@@ -78,8 +93,14 @@ def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
 def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectories:
     """The trajectories of coefficients that the user brings, measured but not changed."""
     wanted, n = config.trajectories, config.n_dof
+    constraints = described_constraints(config, model.mechanism)
     excitation = excitation_of(
-        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
+        model.mechanism,
+        model.base,
+        model.nominal_torque,
+        wanted.criterion,
+        wanted.scaling,
+        constraints,
     )
 
     def measure(coefficients: FloatArray) -> Trajectory:
@@ -104,8 +125,14 @@ def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectori
             )
         sets[name] = tuple(measure(entry) for entry in values)
         _check_motion(brought.source, name, sets[name], joint_limits(config))
+        _check_bounds(brought.source, name, sets[name], constraints)
     return Trajectories(
-        brought.period, "brought", wanted.scaling, sets["estimation"], sets["validation"]
+        brought.period,
+        "brought",
+        wanted.scaling,
+        constraints,
+        sets["estimation"],
+        sets["validation"],
     )
 
 
@@ -129,6 +156,26 @@ def _check_motion(
         if wrong:
             warnings.warn(
                 f"{source}: a trajectory of the {name} set {what}",
+                ParamreduceWarning,
+                stacklevel=2,
+            )
+
+
+def _check_bounds(
+    source: str,
+    name: str,
+    trajectories: tuple[Trajectory, ...],
+    constraints: tuple[Constraint, ...],
+) -> None:
+    """Remark on bounded quantities that leave their bounds."""
+    for k, constraint in enumerate(constraints):
+        low = min(float(t.extremes[k, 0]) for t in trajectories)
+        high = max(float(t.extremes[k, 1]) for t in trajectories)
+        slack = _ROUNDING * max(abs(low), abs(high))
+        if low < constraint.lower - slack or high > constraint.upper + slack:
+            warnings.warn(
+                f"{source}: {constraint.name} goes from {low:.4g} to {high:.4g} in the {name} set, "
+                f"outside its bounds [{constraint.lower:.4g}, {constraint.upper:.4g}]",
                 ParamreduceWarning,
                 stacklevel=2,
             )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,7 +26,8 @@ from paramreduce_cli.records import (
     Reduction,
     Samples,
 )
-from paramreduce_cli.reduction.fitting import Fit, NormErrors, fit, model_column, torque_errors
+from paramreduce_cli.reduction.fitting import Fit, NormErrors, fit, torque_errors
+from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.registry import stage
 
@@ -44,13 +46,32 @@ def reduce(config: Config | None, model: Model | None, samples: Samples) -> Redu
             "samples of this one, or give no CONFIG."
         )
     weights = _weights(wanted, samples)
-    factor = combined_factor(samples.estimation.factors(), weights)
-    problem = _problem(factor, samples.estimation.n_samples * weights.size, model, samples)
+    columns = grouped_columns(samples.names, _groups(wanted))
+    factor = _merged(combined_factor(samples.estimation.factors(), weights), columns)
+    problem = _problem(factor, samples.estimation.n_samples * weights.size, model, columns)
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
-    _remark_on_rank(rank, model)
+    _remark_on_rank(rank, model, columns)
     found = {name: _ordered(problem, name, wanted.stop) for name in wanted.heuristics}
-    orderings = _with_norms(found, samples, weights)
-    return Reduction(samples.names, weights, rank, factor, orderings)
+    orderings = _with_norms(found, samples, columns, weights)
+    return Reduction(columns.names, columns.expansion, weights, rank, factor, orderings)
+
+
+def _groups(wanted: ReductionSection) -> list[Group]:
+    return [
+        Group(name, tuple(members), section.tied)
+        for section in wanted.groups
+        for name, members in section.groups().items()
+    ]
+
+
+def _merged(factor: FloatArray, columns: GroupedColumns) -> FloatArray:
+    """The triangular factor of [W T | chi], T adding up the columns of tied groups."""
+    if len(columns.names) == columns.expansion.shape[0]:
+        return factor
+    merged: FloatArray = np.linalg.qr(
+        np.column_stack([factor[:, :-1] @ columns.expansion, factor[:, -1]]), mode="r"
+    )  # type: ignore[assignment]
+    return merged
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
@@ -69,14 +90,16 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
 
 
 def _problem(
-    factor: FloatArray, rows: int, model: Model | None, samples: Samples
+    factor: FloatArray, rows: int, model: Model | None, columns: GroupedColumns
 ) -> SelectionProblem:
     W, chi = factor[:, :-1], factor[:, -1]
     if not np.isfinite(factor).all():
         raise DataError("the observation matrix holds numbers too large to calculate with.")
     if not np.any(chi):
         raise DataError("the torques of the estimation set are all zero: nothing to explain.")
-    affecting = affecting_columns(W) if model is None else model.affecting
+    affecting = affecting_columns(W)
+    if model is not None:
+        affecting = model.affecting @ columns.expansion > 0
     candidates = np.flatnonzero(affecting)
     if candidates.size == 0:
         raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
@@ -84,11 +107,13 @@ def _problem(
         raise DataError(
             f"{rows} rows are too few for {candidates.size} parameters; bring more samples."
         )
-    return SelectionProblem(W, chi, candidates, preference_order(samples.names))
+    preference = preference_order(columns.names)
+    return SelectionProblem(W, chi, candidates, preference, columns.groups)
 
 
-def _remark_on_rank(rank: int, model: Model | None) -> None:
-    if model is not None and rank < model.base.columns.size:
+def _remark_on_rank(rank: int, model: Model | None, columns: GroupedColumns) -> None:
+    tied = len(columns.names) < columns.expansion.shape[0]
+    if model is not None and not tied and rank < model.base.columns.size:
         warnings.warn(
             f"the estimation set excites only {rank} of the {model.base.columns.size} base "
             "parameters; the others cannot be told apart on it",
@@ -97,56 +122,66 @@ def _remark_on_rank(rank: int, model: Model | None) -> None:
         )
 
 
-def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> tuple[IntArray, list[Fit], float]:
+@dataclass(frozen=True)
+class _Found:
+    """What a heuristic found: an order and the fits of its subsets."""
+
+    order: IntArray
+    n: IntArray
+    fits: list[Fit]
+    seconds: float
+
+
+def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> _Found:
     started = time.perf_counter()
     order = registry.heuristic[name](problem)
     seconds = time.perf_counter() - started
-    fits = [fit(problem, order[:n]) for n in range(1, order.size + 1)]
-    kept = _kept(fits, stop)
-    return order[:kept], fits[:kept], seconds
+    sizes = problem.sizes(order)
+    fits = [fit(problem, order[:n]) for n in sizes]
+    kept = _kept(sizes, fits, stop)
+    return _Found(order[: sizes[kept - 1]], sizes[:kept], fits[:kept], seconds)
 
 
-def _kept(fits: list[Fit], stop: Stop) -> int:
-    """How many parameters the stopping rule leaves: the smaller of its two limits."""
-    limits = [len(fits)]
+def _kept(sizes: IntArray, fits: list[Fit], stop: Stop) -> int:
+    """How many subsets the stopping rule leaves, at least one: the smaller of its two limits."""
+    kept = len(fits)
     if stop.parameters is not None:
-        limits.append(stop.parameters)
+        kept = min(kept, int(np.sum(sizes <= stop.parameters)))
     if stop.torque_error is not None:
-        good = (n for n, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
-        limits.append(next(good, len(fits)))
-    return min(limits)
+        good = (k for k, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
+        kept = min(kept, next(good, len(fits)))
+    return max(kept, 1)
 
 
 def _with_norms(
-    found: dict[str, tuple[IntArray, list[Fit], float]], samples: Samples, weights: FloatArray
+    found: dict[str, _Found], samples: Samples, columns: GroupedColumns, weights: FloatArray
 ) -> dict[str, Ordering]:
     """One pass over the samples for the 1- and infinity norms of all models together."""
-    columns = [
-        model_column(order[: n + 1], f.parameters, len(samples.names))
-        for order, fits, _ in found.values()
-        for n, f in enumerate(fits)
+    models = [
+        columns.expansion[:, entry.order[:n]] @ f.parameters
+        for entry in found.values()
+        for n, f in zip(entry.n, entry.fits, strict=True)
     ]
-    errors = torque_errors(samples.estimation.blocks(), np.column_stack(columns), weights)
+    errors = torque_errors(samples.estimation.blocks(), np.column_stack(models), weights)
     orderings = {}
     start = 0
-    for name, (order, fits, seconds) in found.items():
-        part = slice(start, start + order.size)
-        orderings[name] = _ordering(name, order, fits, errors, part, seconds)
-        start += order.size
+    for name, entry in found.items():
+        part = slice(start, start + entry.n.size)
+        orderings[name] = _ordering(name, entry, errors, part)
+        start += entry.n.size
     return orderings
 
 
-def _ordering(
-    name: str, order: IntArray, fits: list[Fit], errors: NormErrors, part: slice, seconds: float
-) -> Ordering:
+def _ordering(name: str, found: _Found, errors: NormErrors, part: slice) -> Ordering:
     return Ordering(
         heuristic=name,
-        order=order,
-        torque_error=np.array([f.torque_error for f in fits]),
+        order=found.order,
+        n=found.n,
+        torque_error=np.array([f.torque_error for f in found.fits]),
         torque_error_1=errors.one[part],
         torque_error_inf=errors.infinity[part],
-        parameters=tuple(f.parameters for f in fits),
-        beta=tuple(f.beta for f in fits),
-        minimum_norm=np.array([f.minimum_norm for f in fits]),
-        seconds=seconds,
+        parameters=tuple(f.parameters for f in found.fits),
+        beta=tuple(f.beta for f in found.fits),
+        minimum_norm=np.array([f.minimum_norm for f in found.fits]),
+        seconds=found.seconds,
     )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from paramreduce_cli import registry
 from paramreduce_cli.config import Config
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.records import (
     BASE,
     FloatArray,
+    Mechanism,
     Model,
     Provenance,
     Reduction,
@@ -18,7 +22,6 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.reduction.fitting import model_column
 from paramreduce_cli.registry import stage
 from paramreduce_cli.report.data import (
     Motion,
@@ -72,7 +75,7 @@ def _gather(
 ) -> ReportData:
     selected = validation.selected
     ordering = reduction.orderings[selected.heuristic]
-    column = model_column(ordering.subset(selected.n), selected.values, len(reduction.names))
+    column = reduction.standard(ordering.subset(selected.n), selected.values)
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), column, reduction.nominal_torque)
     return ReportData(
@@ -83,35 +86,54 @@ def _gather(
         reduction=reduction,
         validation=validation,
         motion=motion,
-        skeletons=tuple(_skeleton(model, z) for z in _shown_poses(config, motion)),
+        skeletons=tuple(_skeleton(model, q) for q in _shown_poses(config, model, motion)),
     )
 
 
-def _shown_poses(config: Config, motion: Motion) -> list[FloatArray]:
+def _shown_poses(config: Config, model: Model, motion: Motion) -> list[FloatArray]:
     if config.report.poses is not None:
-        return [config.per_joint(pose) for pose in config.report.poses]
+        wanted = np.array([config.per_joint(pose) for pose in config.report.poses])
+        coordinates = Coordinates(model.mechanism, once=True)
+        return [coordinates.positions(z[None], None)[0] for z in wanted]
     picks = np.linspace(0, motion.time.size, _POSES, endpoint=False).astype(int)
-    return [motion.z[k] for k in picks]
+    return [motion.q[k] for k in picks]
 
 
-def _skeleton(model: Model, z: FloatArray) -> Skeleton:
+def _skeleton(model: Model, q: FloatArray) -> Skeleton:
     mechanism = model.mechanism
-    poses = body_poses(mechanism, z)
+    poses = body_poses(mechanism, q)
     joints = [
         body.before if body.parent == BASE else poses[body.parent] @ body.before
         for body in mechanism.bodies
     ]
-    standard = model.values.reshape(len(mechanism.bodies), -1)
+    standard = model.values.reshape(len(mechanism.inertial), -1)
     m = np.where(standard[:, :1] > 0, standard[:, :1], np.nan)
-    centres = np.einsum("kij,kj->ki", poses[:, :3, :3], standard[:, 1:4] / m) + poses[:, :3, 3]
+    own = poses[list(mechanism.inertial)]
+    centres = np.full((len(mechanism.bodies), 3), np.nan)
+    centres[list(mechanism.inertial)] = own[:, :3, 3] + np.einsum(
+        "kij,kj->ki", own[:, :3, :3], standard[:, 1:4] / m
+    )
     return Skeleton(
-        z=z,
+        z=q[list(mechanism.independent)],
         poses=poses,
         masses=centres,
         joints=np.array(joints),
         parents=tuple(body.parent for body in mechanism.bodies),
         kinds=tuple(body.joint for body in mechanism.bodies),
+        closures=tuple(_closure_path(mechanism, poses)),
     )
+
+
+def _closure_path(mechanism: Mechanism, poses: FloatArray) -> Iterator[FloatArray]:
+    """From body to body by way of each closure; ends on the base are left out."""
+    for closure in mechanism.loops.closures if mechanism.loops is not None else ():
+        points: list[FloatArray] = []
+        for body, frame in zip(closure.bodies, closure.frames, strict=True):
+            pose = np.eye(4) if body == BASE else poses[body]
+            way = [pose[:3, 3], (pose @ frame)[:3, 3]]
+            ends = way[1:] if body == BASE else way
+            points += ends if not points else ends[::-1]
+        yield np.array(points)
 
 
 def _setup(config: Config) -> TrajectorySetup:
@@ -137,6 +159,14 @@ def _setup(config: Config) -> TrajectorySetup:
     ]
     if t.acceleration_limits is not None:
         rows.append(("acceleration limits, rad/s² or m/s²", spread(t.acceleration_limits)))
+    for c in t.constraints:
+        low = "" if c.min is None else f"{c.min:.4g} ≤ "
+        high = "" if c.max is None else f" ≤ {c.max:.4g}"
+        rows.append((f"{c.quantity} {c.name}", f"{low}{c.name}{high}"))
+    if config.sampling.symmetries:
+        rows.append(
+            ("estimation set completed by symmetries", str(len(config.sampling.symmetries)))
+        )
     if t.file is not None:
         rows.append(("coefficients brought in", t.file.name))
     return TrajectorySetup(tuple(rows))

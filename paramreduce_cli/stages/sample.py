@@ -10,6 +10,7 @@ import numpy as np
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.symmetry import Symmetry, completed, symmetries
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
@@ -39,13 +40,14 @@ def sample(
     """
     dynamics = Dynamics(model.mechanism)
     wanted = config.sampling
+    images = symmetries(config.sampling.symmetries, model.mechanism.coordinate_names)
     points = wanted.points or config.trajectories.points
     estimation = _observed(
-        model, dynamics, trajectories, "estimation", recordings.estimation, points
+        model, dynamics, trajectories, "estimation", recordings.estimation, points, images
     )
     points = wanted.validation_points or config.trajectories.points
     validation = _observed(
-        model, dynamics, trajectories, "validation", recordings.validation, points
+        model, dynamics, trajectories, "validation", recordings.validation, points, images
     )
     return Samples(
         names=model.mechanism.parameter_names,
@@ -64,6 +66,7 @@ def _observed(
     name: str,
     recording: Recording | None,
     points: int,
+    images: list[Symmetry],
 ) -> ObservedSet:
     if recording is not None:
         _warn_of_still_joints(model, recording)
@@ -72,7 +75,10 @@ def _observed(
         )
     if trajectories is None:
         raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
-    series: tuple[Trajectory, ...] = getattr(trajectories, name)
+    found: tuple[Trajectory, ...] = getattr(trajectories, name)
+    series = [trajectory.coefficients for trajectory in found]
+    if name == "estimation":
+        series = completed(series, images)
     period = trajectories.period
     return ObservedSet(
         lambda: _series_blocks(series, period, points),
@@ -82,15 +88,13 @@ def _observed(
     )
 
 
-def _series_blocks(
-    series: tuple[Trajectory, ...], period: float, points: int
-) -> Iterator[StateBlock]:
+def _series_blocks(series: list[FloatArray], period: float, points: int) -> Iterator[StateBlock]:
     times = sample_times(period, points)
-    for index, trajectory in enumerate(series):
-        harmonics = (trajectory.coefficients.shape[1] - 1) // 2
+    for index, coefficients in enumerate(series):
+        harmonics = (coefficients.shape[1] - 1) // 2
         for start in range(0, points, BLOCK_SAMPLES):
             basis = fourier_basis(period, harmonics, times[start : start + BLOCK_SAMPLES])
-            yield StateBlock(index, basis.time, *basis.states(trajectory.coefficients))
+            yield StateBlock(index, basis.time, *basis.states(coefficients))
 
 
 def _recorded_blocks(r: Recording) -> Iterator[StateBlock]:

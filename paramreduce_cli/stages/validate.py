@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.relations import approximate_expressions
@@ -21,7 +22,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.acceleration import AccelerationErrors, acceleration_errors
-from paramreduce_cli.reduction.fitting import NormErrors, model_column, torque_errors
+from paramreduce_cli.reduction.fitting import NormErrors, torque_errors
 from paramreduce_cli.registry import stage
 
 _DEFAULT_TORQUE_ERROR = 0.01
@@ -40,6 +41,7 @@ def validate(config: Config, model: Model, samples: Samples, reduction: Reductio
     if nominal is None:
         raise DataError("samples.h5 holds no /nominal_acceleration; it is needed to validate.")
     columns = _columns(reduction, model)
+    _check_coordinates(model, samples)
     weights = reduction.nominal_torque
 
     def errors_on(sample_set: SampleSet) -> tuple[NormErrors, AccelerationErrors]:
@@ -53,10 +55,13 @@ def validate(config: Config, model: Model, samples: Samples, reduction: Reductio
     heuristics = {}
     start = 0
     for name, ordering in reduction.orderings.items():
-        part = slice(start, start + ordering.order.size)
-        heuristics[name] = _judged(ordering, dynamics, estimation, validation, part)
-        start += ordering.order.size
-    full = _full_model(model, dynamics, estimation[1], validation[1])
+        part = slice(start, start + ordering.n.size)
+        counts = _operations(
+            config, dynamics, [reduction.expansion[:, ordering.subset(n)] for n in ordering.n]
+        )
+        heuristics[name] = _judged(ordering, counts, estimation, validation, part)
+        start += ordering.n.size
+    full = _full_model(config, model, dynamics, estimation[1], validation[1])
     selected = _select(config, model, reduction)
     accepted, verdict = _verdict(config, selected, heuristics[selected.heuristic])
     return Validation(
@@ -70,29 +75,37 @@ def validate(config: Config, model: Model, samples: Samples, reduction: Reductio
     )
 
 
+def _check_coordinates(model: Model, samples: Samples) -> None:
+    n_q = model.mechanism.n_q
+    block = next(iter(samples.estimation.blocks()))
+    if block.q.shape[1] != n_q:
+        raise DataError(
+            f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need; make it "
+            "with `paramreduce sample`."
+        )
+
+
 def _columns(reduction: Reduction, model: Model) -> FloatArray:
     """Every subset of every heuristic as a column, and the full model as the last one."""
-    n = len(reduction.names)
-    if tuple(reduction.names) != model.mechanism.parameter_names:
+    if reduction.expansion.shape[0] != len(model.mechanism.parameter_names):
         raise DataError("reduction.h5 has other parameters than model.h5; run `paramreduce run`.")
     columns = [
-        model_column(ordering.subset(k + 1), values, n)
+        reduction.standard(ordering.subset(n), values)
         for ordering in reduction.orderings.values()
-        for k, values in enumerate(ordering.parameters)
+        for n, values in zip(ordering.n, ordering.parameters, strict=True)
     ]
     return np.column_stack([*columns, model.values])
 
 
 def _judged(
     ordering: Ordering,
-    dynamics: Dynamics,
+    counts: IntArray,
     estimation: tuple[NormErrors, AccelerationErrors],
     validation: tuple[NormErrors, AccelerationErrors],
     part: slice,
 ) -> HeuristicValidation:
-    counts = _operations(dynamics, [ordering.subset(n + 1) for n in range(ordering.order.size)])
     return HeuristicValidation(
-        n=np.arange(1, ordering.order.size + 1),
+        n=ordering.n,
         torque_error_estimation=estimation[0].two[part],
         torque_error_validation=validation[0].two[part],
         torque_error_joint_estimation=estimation[0].joints[part],
@@ -114,27 +127,44 @@ def _judged(
     )
 
 
-def _operations(dynamics: Dynamics, subsets: list[IntArray]) -> IntArray:
-    """IDM and DDM by our count, then by the paper's rule, (n_subsets, 4)."""
-    return np.array(
-        [
+def _operations(config: Config, dynamics: Dynamics, expansions: list[FloatArray]) -> IntArray:
+    """IDM and DDM by our count, then by the paper's rule, (n_subsets, 4).
+
+    Args:
+        config: Says which functions are counted.
+        dynamics: Of the mechanism.
+        expansions: For each subset, standard parameters from its values, (n_standard, n).
+    """
+    independent = config.validation.operations == "independent"
+    counts = []
+    for expansion in expansions:
+        kept = np.flatnonzero(expansion.any(axis=1))
+        first = np.argmax(expansion != 0, axis=0)
+        owner = first[np.argmax(expansion[kept] != 0, axis=1)]
+        same = {int(k): int(other) for k, other in zip(kept, owner, strict=True) if k != other}
+        counts.append(
             [
-                *dynamics.count_operations(kept),
-                *dynamics.count_operations(kept, signs_free=False),
+                value
+                for signs_free in (True, False)
+                for value in dynamics.count_operations(
+                    kept, same=same, signs_free=signs_free, independent=independent
+                )
             ]
-            for kept in subsets
-        ]
-    )
+        )
+    return np.array(counts)
 
 
 def _full_model(
+    config: Config,
     model: Model,
     dynamics: Dynamics,
     estimation: AccelerationErrors,
     validation: AccelerationErrors,
 ) -> dict[str, int | float]:
-    affecting = np.flatnonzero(model.affecting)
-    full, base = _operations(dynamics, [affecting, model.base.columns])
+    unit = np.eye(model.values.size)
+    full, base = _operations(
+        config, dynamics, [unit[:, model.affecting], unit[:, model.base.columns]]
+    )
     names = (
         "operations_inverse",
         "operations_direct",
@@ -157,32 +187,44 @@ def _select(config: Config, model: Model, reduction: Reduction) -> Selected:
             f"reduction.h5 has no {wanted.heuristic}; run `paramreduce reduce` with this config."
         )
     ordering = reduction.orderings[wanted.heuristic]
-    n = wanted.n
-    if n is None:
-        limit = wanted.torque_error or _DEFAULT_TORQUE_ERROR
-        good = np.flatnonzero(ordering.torque_error <= limit)
-        if good.size == 0:
-            raise ConfigError(
-                f"selected.torque_error: no subset of {wanted.heuristic} has an error of at most "
-                f"{limit:g}; the smallest is {ordering.torque_error.min():.3g}. Raise it, or let "
-                "reduction.stop go further."
-            )
-        n = int(good[0]) + 1
-    if n > ordering.order.size:
-        raise ConfigError(
-            f"selected.n is {n}, but {wanted.heuristic} orders {ordering.order.size} parameters. "
-            "Ask for fewer, or let reduction.stop go further."
-        )
+    row = _selected_row(wanted, ordering)
+    n = int(ordering.n[row])
     kept = ordering.subset(n)
+    known = np.linalg.pinv(reduction.expansion) @ model.values
     return Selected(
         heuristic=wanted.heuristic,
         n=n,
         parameters=tuple(reduction.names[k] for k in kept),
-        values=ordering.parameters[n - 1],
+        values=ordering.parameters[row],
         expressions=tuple(
-            approximate_expressions(reduction.names, kept, ordering.beta[n - 1], model.values)
+            approximate_expressions(reduction.names, kept, ordering.beta[row], known)
         ),
     )
+
+
+def _selected_row(wanted: SelectedSection, ordering: Ordering) -> int:
+    """Where the subset that the config asks for stands in the ordering."""
+    if wanted.n is not None:
+        row = ordering.row(wanted.n)
+        if row is None:
+            most = int(ordering.n[-1])
+            raise ConfigError(
+                f"selected.n is {wanted.n}, but {wanted.heuristic} orders {most} parameters. Ask for "
+                "fewer, or let reduction.stop go further."
+                if wanted.n > most
+                else f"selected.n is {wanted.n}, but with groups {wanted.heuristic} has subsets of "
+                f"{', '.join(map(str, ordering.n))} parameters only. Choose one of these."
+            )
+        return row
+    limit = wanted.torque_error or _DEFAULT_TORQUE_ERROR
+    good = np.flatnonzero(ordering.torque_error <= limit)
+    if good.size == 0:
+        raise ConfigError(
+            f"selected.torque_error: no subset of {wanted.heuristic} has an error of at most "
+            f"{limit:g}; the smallest is {ordering.torque_error.min():.3g}. Raise it, or let "
+            "reduction.stop go further."
+        )
+    return int(good[0])
 
 
 def _verdict(config: Config, selected: Selected, result: HeuristicValidation) -> tuple[bool, str]:
@@ -194,7 +236,7 @@ def _verdict(config: Config, selected: Selected, result: HeuristicValidation) ->
         limit = getattr(limits, key)
         if limit is None:
             continue
-        value = float(getattr(result, key)[selected.n - 1])
+        value = float(getattr(result, key)[result.row(selected.n)])
         share = "error" in key
         text = f"{key.replace('_', ' ')} {_shown(value, share)} (limit {_shown(limit, share)})"
         (met if value <= limit else missed).append(text)
@@ -230,7 +272,7 @@ def _remarks(
                 f"{config.validation.condition_factor:g} times worse conditioned than the full "
                 "model's."
             )
-        if name == selected.heuristic and unsafe[selected.n - 1]:
+        if name == selected.heuristic and unsafe[result.row(selected.n)]:
             remarks.append(
                 f"The selected model ({name}, n = {selected.n}) is not safe for direct dynamics: use "
                 "its inverse dynamics only."

@@ -1,0 +1,58 @@
+"""What all sections of a config are made of: names, numbers, one value for all joints or one each."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, WithJsonSchema
+
+from paramreduce_cli.config.numbers import Limit, Number, Whole
+
+NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
+Positive = Annotated[Number, Field(gt=0)]
+Span = Annotated[Number, Field(ge=1e-6, le=1e6)]
+Count = Annotated[Whole, Field(ge=1, le=100_000)]
+Seed = Annotated[Whole, Field(ge=0)]
+Name = Annotated[
+    str,
+    BeforeValidator(lambda value: str(value) if type(value) is int else value),
+    Field(pattern=NAME),
+    WithJsonSchema({"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}),
+]
+
+
+def as_list(value: Any) -> Any:
+    return value if isinstance(value, list) else [value]
+
+
+def as_pairs(value: Any) -> Any:
+    if isinstance(value, list) and value and not isinstance(value[0], list):
+        return [value]
+    return value
+
+
+_SCALAR = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+_VECTOR = {"type": "array", "items": _SCALAR, "minItems": 1}
+_ONE_OR_EACH = WithJsonSchema({"anyOf": [*_SCALAR["anyOf"], _VECTOR]})
+_PAIR_OR_EACH = WithJsonSchema({"anyOf": [_VECTOR, {"type": "array", "items": _VECTOR}]})
+
+PerJoint = Annotated[list[Number], BeforeValidator(as_list), Field(min_length=1), _ONE_OR_EACH]
+"""One number for all joints or one for each."""
+PositivePerJoint = Annotated[
+    list[Positive], BeforeValidator(as_list), Field(min_length=1), _ONE_OR_EACH
+]
+LimitPerJoint = Annotated[
+    list[Annotated[Limit, Field(ge=1e-6)]],
+    BeforeValidator(as_list),
+    Field(min_length=1),
+    _ONE_OR_EACH,
+]
+Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
+PairPerJoint = Annotated[list[Pair], BeforeValidator(as_pairs), Field(min_length=1), _PAIR_OR_EACH]
+"""One [lower, upper] for all joints or one for each."""
+
+
+class Section(BaseModel):
+    """A mapping in which unknown keys are errors."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)

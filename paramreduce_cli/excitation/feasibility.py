@@ -1,0 +1,159 @@
+"""Motions that close the loops and keep the bounds: where to begin, and how to make sure.
+
+Bounds are checked on a grid finer than the one optimised on; what they miss by between its
+points is mended by drawing the motion together towards a resting position inside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.optimize
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
+from paramreduce_cli.excitation.limits import JointLimits
+from paramreduce_cli.excitation.objective import Excitation, FreeObjective
+from paramreduce_cli.multibody.coordinates import Follower
+from paramreduce_cli.records import FloatArray
+
+FINER = 4
+"""How much finer the grid is on which bounds are checked in the end."""
+_SMALLEST_SHARE = 1e-3
+_SHRINKS = 0.8
+_HALVINGS = 12
+_INSET = 0.98
+"""Share of the position range in which a resting position is looked for."""
+
+
+@dataclass(frozen=True)
+class Bound:
+    """The bound that a motion is nearest to, or misses by most."""
+
+    excess: float
+    """Above zero outside; without unit."""
+    name: str
+
+
+def worst_bound(excitation: Excitation, z: FloatArray, positions: Follower) -> Bound:
+    """Of the positions z, (n_samples, n_dof); infinite where the loops cannot be closed."""
+    try:
+        rows = excitation.quantities.rows(positions(z))
+    except DataError as error:
+        return Bound(np.inf, str(error))
+    if not rows.size:
+        return Bound(-np.inf, "")
+    worst = int(np.argmax(rows.max(axis=0)))
+    constraint = excitation.quantities.constraints[excitation.quantities.owners[worst]]
+    bounds = [
+        text
+        for text, there in (
+            (f"at least {constraint.lower:.4g}", constraint.lower > -np.inf),
+            (f"at most {constraint.upper:.4g}", constraint.upper < np.inf),
+        )
+        if there
+    ]
+    name = f"{constraint.name} ({constraint.kind}, {' and '.join(bounds)})"
+    return Bound(float(rows[:, worst].max()), name)
+
+
+def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
+    """Independent coordinates inside all limits and bounds, (n_dof,).
+
+    The middle of the limits, or the assembly, or what a search from there finds.
+
+    Raises:
+        DataError: There is none to be found; says which bound stands in the way.
+    """
+    mechanism = excitation.coordinates.mechanism
+    middle, reach = limits.middle, _INSET * limits.reach
+    tried = [middle]
+    if mechanism.loops is not None:
+        home = mechanism.loops.assembly[list(mechanism.independent)]
+        tried.append(np.clip(home, middle - reach, middle + reach))
+
+    def worst(z: FloatArray) -> Bound:
+        return worst_bound(excitation, z[None], Follower(excitation.coordinates))
+
+    for z in list(tried):
+        if worst(z).excess < 0:
+            return z
+        found = scipy.optimize.minimize(
+            lambda z: min(worst(z).excess, 1e6),
+            z,
+            method="Nelder-Mead",
+            bounds=np.column_stack([middle - reach, middle + reach]),
+            options={"maxfev": 200 * z.size, "xatol": 1e-6, "fatol": 1e-9},
+        )
+        if worst(found.x).excess < 0:
+            return np.asarray(found.x)
+        tried.append(found.x)
+    nearest = min((worst(z) for z in tried), key=lambda bound: bound.excess)
+    raise DataError(
+        "no position of the mechanism was found that keeps all of trajectories.constraints within "
+        f"the position limits: {nearest.name} stands in the way. Loosen it or the position limits."
+    )
+
+
+def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective) -> FloatArray:
+    """Draw a free series together towards a resting position until it keeps the bounds.
+
+    Args:
+        free: A free series, (n_dof, 1 + 2 harmonics).
+        still: The free series that rests inside all bounds.
+        objective: Not a number outside the bounds.
+
+    Raises:
+        DataError: Even the smallest motion does not keep them.
+    """
+    share = 1.0
+    while share > _SMALLEST_SHARE:
+        drawn = still + share * (free - still)
+        if np.isfinite(objective(drawn.ravel())[0]):
+            return drawn
+        share *= _SHRINKS
+    raise DataError("no motion was found that keeps the bounds")
+
+
+def drawn_inside(
+    excitation: Excitation,
+    coefficients: FloatArray,
+    rest: FloatArray,
+    period: float,
+    points: int,
+    positions: Follower,
+) -> FloatArray:
+    """Draw a series together towards a resting position until it keeps the bounds on a fine grid.
+
+    Args:
+        excitation: With the bounds.
+        coefficients: Of a series, (n_dof, 1 + 2 harmonics).
+        rest: Independent coordinates inside all bounds, (n_dof,).
+        period: s
+        points: Of the grid that was optimised on.
+        positions: Where the mechanism is.
+    """
+    basis = fine_basis(period, (coefficients.shape[1] - 1) // 2, points)
+    still = np.zeros_like(coefficients)
+    still[:, 0] = rest
+
+    def drawn(share: float) -> FloatArray:
+        return still + share * (coefficients - still)
+
+    def inside(share: float) -> bool:
+        z = basis.states(drawn(share))[0]
+        return worst_bound(excitation, z, positions).excess <= 0
+
+    if inside(1.0):
+        return coefficients
+    low, high = 0.0, 1.0
+    for _ in range(_HALVINGS):
+        middle = (low + high) / 2
+        low, high = (middle, high) if inside(middle) else (low, middle)
+    return drawn(low)
+
+
+def fine_basis(period: float, harmonics: int, points: int) -> FourierBasis:
+    """The series on the grid on which bounds are checked."""
+    return fourier_basis(period, harmonics, sample_times(period, FINER * points))

@@ -1,0 +1,62 @@
+"""Complete a set of trajectories to one with the symmetry of the mechanism.
+
+A symmetry lets each independent coordinate move as another one did, perhaps the other way.
+All products of those given are taken, so that the set has the symmetry of their group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray
+
+
+@dataclass(frozen=True)
+class Symmetry:
+    """Coordinate k moves as coordinate ``sources[k]`` did, times ``signs[k]``."""
+
+    sources: tuple[int, ...]
+    signs: tuple[int, ...]
+
+    def after(self, other: Symmetry) -> Symmetry:
+        """Apply first the other one, then this."""
+        return Symmetry(
+            tuple(other.sources[k] for k in self.sources),
+            tuple(s * other.signs[k] for s, k in zip(self.signs, self.sources, strict=True)),
+        )
+
+    def image(self, coefficients: FloatArray) -> FloatArray:
+        """The image of a series, (n_dof, 1 + 2 harmonics)."""
+        return coefficients[list(self.sources)] * np.array(self.signs)[:, None]
+
+
+def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Symmetry]:
+    """The group that some symmetries generate, the identity first.
+
+    Args:
+        given: For each, the names of the coordinates that move in place of each one in turn,
+            ``-NAME`` where it moves the other way.
+        names: Of the independent coordinates, (n_dof,).
+    """
+    generators = [
+        Symmetry(
+            tuple(names.index(entry.removeprefix("-")) for entry in images),
+            tuple(-1 if entry.startswith("-") else 1 for entry in images),
+        )
+        for images in given
+    ]
+    found = [Symmetry(tuple(range(len(names))), (1,) * len(names))]
+    for element in found:  # grows while it is walked through, until nothing new comes
+        for generator in generators:
+            product = generator.after(element)
+            if product not in found:
+                found.append(product)
+    return found
+
+
+def completed(series: Sequence[FloatArray], images: Sequence[Symmetry]) -> list[FloatArray]:
+    """All images of all series, those of one series together."""
+    return [symmetry.image(coefficients) for coefficients in series for symmetry in images]

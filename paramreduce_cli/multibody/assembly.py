@@ -1,0 +1,201 @@
+"""Close the loops of a mechanism once, and tell whether its description makes sense.
+
+Ranks are decided on several configurations reached from the assembly by small random moves,
+so that one singular configuration is not taken for a property of the mechanism.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import casadi as ca
+import numpy as np
+import scipy.optimize
+
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.multibody.base_parameters import independent_columns
+from paramreduce_cli.multibody.closures import closure_equations, equation_names
+from paramreduce_cli.records import FloatArray, IntArray, Loops, Mechanism
+
+_CLOSED = 1e-9
+"""Largest gap of an assembled loop, m."""
+_RANK = 1e-7
+"""Share of its length that must be left of a row or column that counts as independent."""
+_MOVES = 8
+_MOVE = 0.05
+"""Length of a random move, rad or m."""
+_SEED = 0
+
+
+def assembled(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with its loops closed, and its independent coordinates as in the guess.
+
+    Raises:
+        ConfigError: The loops cannot be closed from the guess, equations are redundant, or the
+            independent coordinates are too many, too few or not independent.
+    """
+    loops = mechanism.loops
+    if loops is None:
+        return mechanism
+    equations = _Equations(mechanism)
+    if not mechanism.dependent:
+        raise ConfigError(
+            "description.tree.independent: all coordinates are named, so that the closures have "
+            "none left to determine. Leave out those that the loops determine."
+        )
+    q = _closed(equations, mechanism, loops)
+    configurations = [q, *_moved(equations, q)]
+    jacobians = [equations.jacobian(c) for c in configurations]
+    _check_redundancy(mechanism, jacobians)
+    _check_choice(mechanism, jacobians)
+    return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
+
+
+class _Equations:
+    """Phi and its Jacobian in numbers, at one configuration."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        q = ca.SX.sym("q", mechanism.n_q)
+        phi = closure_equations(mechanism, q)
+        self._function = ca.Function("phi", [q], [phi, ca.jacobian(phi, q)])
+
+    def gap(self, q: FloatArray) -> FloatArray:
+        return np.array(self._function(q)[0]).ravel()
+
+    def jacobian(self, q: FloatArray) -> FloatArray:
+        return np.array(self._function(q)[1])
+
+
+def _closed(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
+    """Move the dependent coordinates until the loops are closed."""
+    dependent = list(mechanism.dependent)
+    start = loops.assembly
+
+    def whole(d: FloatArray) -> FloatArray:
+        q = start.copy()
+        q[dependent] = d
+        return q
+
+    found = scipy.optimize.least_squares(
+        lambda d: equations.gap(whole(d)),
+        start[dependent],
+        jac=lambda d: equations.jacobian(whole(d))[:, dependent],
+        method="trf",
+        x_scale="jac",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+        max_nfev=300,
+    )
+    q = whole(found.x)
+    gaps = np.abs(equations.gap(q))
+    if gaps.max() > _CLOSED:
+        names = equation_names(mechanism)
+        worst = int(np.argmax(gaps))
+        before = float(np.abs(equations.gap(start)).max())
+        fixed = ", ".join(
+            f"{mechanism.generalised_names[k]} = {start[k]:g}" for k in mechanism.independent
+        )
+        raise ConfigError(
+            f"description.tree.guess: the loops cannot be closed from it with {fixed}: at the guess "
+            f"they are {before:.3g} m open, and at best {gaps[worst]:.3g} m, at {names[worst]}. "
+            "Give a guess nearer to an assembly, or check lengths and frames."
+        )
+    return q
+
+
+def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:
+    """Configurations nearby, by random moves along the loops."""
+    rng = np.random.default_rng(_SEED)
+    found = []
+    for _ in range(_MOVES):
+        move = rng.normal(size=q.size)
+        new = q + _MOVE * move / np.linalg.norm(move)
+        for _ in range(20):
+            step, *_ = np.linalg.lstsq(equations.jacobian(new), equations.gap(new), rcond=1e-9)
+            new = new - step
+        if np.abs(equations.gap(new)).max() <= _CLOSED:
+            found.append(new)
+    return found
+
+
+def _independent(rows: FloatArray) -> IntArray:
+    """Rows that do not depend on those before them; lengths as they are, rows are alike."""
+    return np.array(independent_columns(rows.T, np.arange(rows.shape[0]), _RANK), dtype=np.int64)
+
+
+def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """The Jacobian of the largest rank, and its independent rows."""
+    rows = [_independent(jacobian) for jacobian in jacobians]
+    best = max(range(len(rows)), key=lambda k: rows[k].size)
+    return jacobians[best], rows[best]
+
+
+def _check_redundancy(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
+    names = equation_names(mechanism)
+    jacobian, rows = _generic(jacobians)
+    if rows.size == mechanism.n_q:
+        raise ConfigError(
+            f"description.tree.closures: the loops are over-constrained: {rows.size} independent "
+            f"equations for {mechanism.n_q} coordinates leave nothing that moves. Leave out a "
+            "closure, or use joints or closures with more freedom."
+        )
+    if rows.size < len(names):
+        extra = [names[k] for k in range(len(names)) if k not in rows]
+        hint = ""
+        planar = [c.name for c in _closures(mechanism) if c.kind in ("point", "revolute")]
+        if any(name.rsplit(" (", 1)[0] in planar for name in extra):
+            hint = (
+                " In a mechanism that moves in a plane, a pin is a closure of type planar (two "
+                "equations across the z axis of its first frame)."
+            )
+        raise ConfigError(
+            f"description.tree.closures: of the {len(names)} equations only {rows.size} are "
+            f"independent; these follow from the ones before them wherever the loops are closed: "
+            f"{', '.join(extra)}. Use closures with fewer equations.{hint}"
+        )
+    if not np.isfinite(jacobian).all():
+        raise ConfigError("description.tree: the closures are not differentiable at the assembly.")
+
+
+def _closures(mechanism: Mechanism) -> tuple:
+    return mechanism.loops.closures if mechanism.loops is not None else ()
+
+
+def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
+    jacobian, rows = _generic(jacobians)
+    freedom = mechanism.n_q - rows.size
+    names = mechanism.generalised_names
+    named = [names[k] for k in mechanism.independent]
+    suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
+    if len(named) != freedom:
+        raise ConfigError(
+            f"description.tree.independent: names {len(named)} coordinates, but the mechanism has "
+            f"{freedom} degrees of freedom: {mechanism.n_q} coordinates less {rows.size} independent "
+            f"equations. Name {freedom}, for example {suggestion}."
+        )
+    dependent = list(mechanism.dependent)
+    ratios = []
+    for entry in jacobians:
+        block = entry[:, dependent]
+        sizes = np.linalg.svd(block, compute_uv=False)
+        ratios.append(sizes[-1] / sizes[0])
+    if max(ratios) <= _RANK:
+        raise ConfigError(
+            f"description.tree.independent: {', '.join(named)} are not independent: the loops tie "
+            "them to each other, and leave others undetermined. Choose others, for example "
+            f"{suggestion}."
+        )
+    if ratios[0] <= _RANK:
+        raise ConfigError(
+            "description.tree.guess: the assembly it leads to is a singular configuration, in which "
+            f"{', '.join(named)} do not determine the other coordinates. Give a guess away from it."
+        )
+
+
+def _well_chosen(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:
+    """Coordinates that can be independent, those already named first where they can be."""
+    others = [k for k in range(mechanism.n_q) if k not in mechanism.independent]
+    order = np.array([*others, *mechanism.independent], dtype=np.int64)
+    dependent = independent_columns(jacobian, order, _RANK)
+    return [k for k in range(mechanism.n_q) if k not in dependent]

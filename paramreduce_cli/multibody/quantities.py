@@ -1,0 +1,154 @@
+"""Bounded quantities of a mechanism: their values, and smooth rows that are negative inside.
+
+The rows are made so that they are smooth where the quantities are not (an angle of zero, a
+point on the axis), without unit, and about as large as the share by which a bound is missed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from paramreduce_cli.expressions.compiled import BatchFunction
+from paramreduce_cli.multibody.kinematics import (
+    JointMotion,
+    Vector,
+    cross,
+    direction_in_base,
+    dot,
+    motions,
+    point_in_base,
+)
+from paramreduce_cli.multibody.projection import Projection
+from paramreduce_cli.records import Constraint, FloatArray, Mechanism
+
+
+class Quantities:
+    """Evaluate constraints on many configurations.
+
+    Args:
+        mechanism: Whose quantities they are.
+        constraints: Each with one or two bounds.
+    """
+
+    def __init__(self, mechanism: Mechanism, constraints: Sequence[Constraint]) -> None:
+        self.mechanism = mechanism
+        self.constraints = tuple(constraints)
+        sides = [(c.upper < np.inf) + (c.lower > -np.inf) for c in constraints]
+        self.owners = np.repeat(np.arange(len(sides)), sides)
+        """Index of the constraint that each row belongs to, (n_rows,)."""
+
+    @cached_property
+    def _values(self) -> BatchFunction:
+        q, raw = self._symbols
+        return BatchFunction([q], [_natural(raw, self.constraints)])
+
+    @cached_property
+    def _rows(self) -> BatchFunction:
+        q, raw = self._symbols
+        return BatchFunction([q], [self._bounded(raw)])
+
+    @cached_property
+    def _jacobian(self) -> BatchFunction:
+        q, raw = self._symbols
+        by_q = ca.jacobian(self._bounded(raw), q)
+        loop = self._projection
+        by_z = by_q if loop is None else loop.pulled(q, by_q.T).T
+        return BatchFunction([q], [by_z.T])
+
+    @cached_property
+    def _projection(self) -> Projection | None:
+        return None if self.mechanism.loops is None else Projection(self.mechanism)
+
+    @cached_property
+    def _symbols(self) -> tuple[ca.MX, ca.MX]:
+        """Coordinates and one smooth measure for each constraint."""
+        q = ca.SX.sym("q", self.mechanism.n_q)
+        joints = motions(self.mechanism, q)
+        inner = ca.Function("measures", [q], [_measure(joints, q, c) for c in self.constraints])
+        symbol = ca.MX.sym("q", self.mechanism.n_q)
+        measures = inner.call([symbol])
+        for k, constraint in enumerate(self.constraints):
+            if constraint.kind == "singularity":
+                assert self._projection is not None
+                measures[k] = self._projection.distance(symbol)
+        return symbol, ca.vertcat(*measures)
+
+    def _bounded(self, measures: ca.MX) -> ca.MX:
+        rows = []
+        for k, constraint in enumerate(self.constraints):
+            rows += _bounded_rows(measures[k], constraint)
+        return ca.vertcat(*rows)
+
+    def values(self, q: FloatArray) -> FloatArray:
+        """The quantities in their units, (n_samples, n_constraints), at q (n_samples, n_q)."""
+        if not self.constraints:
+            return np.zeros((q.shape[0], 0))
+        return self._values(q)[0]
+
+    def rows(self, q: FloatArray) -> FloatArray:
+        """Rows that are at most zero where the bounds hold, (n_samples, n_rows)."""
+        if not self.constraints:
+            return np.zeros((q.shape[0], 0))
+        return self._rows(q)[0]
+
+    def jacobian(self, q: FloatArray) -> FloatArray:
+        """Derivatives of the rows by the independent coordinates, (n_samples, n_rows, n_dof)."""
+        shape = (q.shape[0], self.owners.size, self.mechanism.n_dof)
+        if not self.constraints:
+            return np.zeros(shape)
+        return self._jacobian(q)[0].reshape(shape)
+
+
+def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.SX:
+    """A smooth function of the quantity: cosine of an angle, square of a distance."""
+    bodies, vectors = constraint.bodies, constraint.vectors
+    if constraint.kind == "coordinate":
+        return q[bodies[0]]
+    if constraint.kind == "angle":
+        a, b = (
+            direction_in_base(joints, body, vector / np.linalg.norm(vector))
+            for body, vector in zip(bodies, vectors, strict=True)
+        )
+        return dot(a, b)
+    if constraint.kind == "singularity":
+        return ca.SX(0)
+    start = point_in_base(joints, bodies[1], vectors[1])
+    end = point_in_base(joints, bodies[0], vectors[0])
+    gap: Vector = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    if constraint.kind == "distance":
+        return dot(gap, gap)
+    axis = vectors[2] / np.linalg.norm(vectors[2])
+    across = cross(direction_in_base(joints, bodies[1], axis), gap)
+    return dot(across, across)
+
+
+def _natural(measures: ca.MX, constraints: tuple[Constraint, ...]) -> ca.MX:
+    values = []
+    for k, constraint in enumerate(constraints):
+        value = measures[k]
+        if constraint.kind == "angle":
+            value = ca.acos(ca.fmin(ca.fmax(value, -1), 1))
+        elif constraint.kind.startswith("distance"):
+            value = ca.sqrt(value)
+        values.append(value)
+    return ca.vertcat(*values)
+
+
+def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
+    upper, lower = constraint.upper, constraint.lower
+    has_upper, has_lower = upper < np.inf, lower > -np.inf
+    if constraint.kind == "angle":
+        over, under = ca.cos(upper) - measure, measure - ca.cos(lower)
+    elif constraint.kind.startswith("distance"):
+        over = measure / upper**2 - 1
+        under = 1 - measure / lower**2 if lower else -measure
+    elif constraint.kind == "singularity":
+        over, under = measure, 1 - measure / lower
+    else:
+        span = upper - lower if has_upper and has_lower else 1.0
+        over, under = (measure - upper) / span, (lower - measure) / span
+    return [over] * has_upper + [under] * has_lower

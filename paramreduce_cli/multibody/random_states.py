@@ -1,0 +1,68 @@
+"""Random states of a mechanism, on which ranks are decided."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.records import FloatArray, Mechanism
+
+_SHARES = (0.25, 0.5, 1.0)
+"""Of a random move, at which a mechanism with loops is looked at: it may not get further."""
+_NEAREST = 0.1
+"""Share of the assembly's distance to singularity that a state must keep: nearer, single rows
+outweigh all others."""
+
+
+def random_states(
+    mechanism: Mechanism, count: int, rng: np.random.Generator
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """States anywhere: whole turns, slides as long as the mechanism, normal speeds and accelerations.
+
+    Those of loops are reached from the assembly by random moves, as far as these go without
+    coming near a singular configuration.
+
+    Args:
+        mechanism: With assembled loops, if any.
+        count: Number of states.
+        rng: Where they come from.
+
+    Returns:
+        q, dq, ddq, each (count, n_q).
+    """
+    bodies = [mechanism.bodies[k] for k in mechanism.independent]
+    longest = _extent(mechanism)
+    reach = np.array([np.pi if body.joint == "revolute" else longest for body in bodies])
+    shape = (count, mechanism.n_dof)
+    z = rng.uniform(-1, 1, size=shape) * reach
+    dz, ddz = rng.normal(size=shape), rng.normal(size=shape)
+    if mechanism.loops is None:
+        return z, dz, ddz
+    coordinates = Coordinates(mechanism)
+    q = _wandered(mechanism, coordinates, z, rng)
+    return coordinates.states(q[:, list(mechanism.independent)], dz, ddz, start=q)
+
+
+def _wandered(
+    mechanism: Mechanism, coordinates: Coordinates, moves: FloatArray, rng: np.random.Generator
+) -> FloatArray:
+    """Configurations on the way of random moves of random length, (n_samples, n_q)."""
+    assert mechanism.loops is not None
+    assembly = mechanism.loops.assembly
+    home = assembly[list(mechanism.independent)]
+    least = _NEAREST * float(coordinates.distance(assembly[None])[0])
+    q = np.tile(assembly, (moves.shape[0], 1))
+    lengths: FloatArray = rng.uniform(0, 1, size=(moves.shape[0], 1))
+    for share in _SHARES:
+        reached, _ = coordinates.follow(home + share * lengths * moves, q)
+        safe = coordinates.distance(reached) >= least
+        q[safe] = reached[safe]
+    return q
+
+
+def _extent(mechanism: Mechanism) -> float:
+    """A length that is typical of the mechanism, m."""
+    if mechanism.loops is None:
+        return max((abs(length) for length in mechanism.lengths.values()), default=1.0)
+    return float(np.ptp(body_poses(mechanism, mechanism.loops.assembly)[:, :3, 3], axis=0).max())
