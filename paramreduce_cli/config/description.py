@@ -4,10 +4,18 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, WithJsonSchema, model_validator
 
 from paramreduce_cli.config.numbers import Number
-from paramreduce_cli.config.section import Name, Positive, Section, as_list
+from paramreduce_cli.config.section import (
+    ONE_OR_MORE_NAMES,
+    SCALAR,
+    VECTOR,
+    Name,
+    Positive,
+    Section,
+    as_list,
+)
 from paramreduce_cli.records import JOINT_AXES, JOINT_COORDINATES
 
 
@@ -73,7 +81,18 @@ def _as_steps(value: Any) -> Any:
     return value
 
 
-Placement = Annotated[list[Step], BeforeValidator(_as_steps)]
+_STEP = {
+    "type": "object",
+    "properties": {"xyz": VECTOR, "rx": SCALAR, "ry": SCALAR, "rz": SCALAR},
+    "additionalProperties": False,
+    "minProperties": 1,
+    "maxProperties": 1,
+}
+Placement = Annotated[
+    list[Step],
+    BeforeValidator(_as_steps),
+    WithJsonSchema({"anyOf": [VECTOR, _STEP, {"type": "array", "items": _STEP}]}),
+]
 """A point [x, y, z], or steps that are taken one after the other."""
 
 
@@ -94,8 +113,18 @@ def _not_zero(value: list[float]) -> list[float]:
     return value
 
 
-Direction = Annotated[Vector, BeforeValidator(_as_direction), AfterValidator(_not_zero)]
+_DIRECTION = {"anyOf": [{"enum": list(_NAMED_DIRECTIONS)}, VECTOR]}
+Direction = Annotated[
+    Vector,
+    BeforeValidator(_as_direction),
+    AfterValidator(_not_zero),
+    WithJsonSchema(_DIRECTION),
+]
 """``x``, ``y``, ``z``, ``-x``, ... or [x, y, z] of any length."""
+
+_ONE_OR_MORE_DIRECTIONS = WithJsonSchema(
+    {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}
+)
 
 JointKind = Literal["revolute", "prismatic", "universal", "spherical", "free"]
 
@@ -109,11 +138,11 @@ class TreeBody(Section):
     """Body it is mounted on."""
     joint: JointKind = "revolute"
     """`universal` turns about two axes, `spherical` about x, y and z, `free` slides along x, y and z, then turns about them."""
-    axes: Annotated[list[Direction], BeforeValidator(as_list)] = []
+    axes: Annotated[list[Direction], BeforeValidator(as_list), _ONE_OR_MORE_DIRECTIONS] = []
     """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
     at: Placement = []
     """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""
-    coordinates: Annotated[list[Name], BeforeValidator(as_list)] = []
+    coordinates: Annotated[list[Name], BeforeValidator(as_list), ONE_OR_MORE_NAMES] = []
     """Names of the joint's coordinates; if left out q_NAME, or q_NAME_1, q_NAME_2, ..."""
     massless: bool = False
     """Whether the body has no mass and so no parameters."""

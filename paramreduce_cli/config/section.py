@@ -13,11 +13,13 @@ Positive = Annotated[Number, Field(gt=0)]
 Span = Annotated[Number, Field(ge=1e-6, le=1e6)]
 Count = Annotated[Whole, Field(ge=1, le=100_000)]
 Seed = Annotated[Whole, Field(ge=0)]
+_NAME = {"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}
+ONE_OR_MORE_NAMES = WithJsonSchema({"anyOf": [*_NAME["anyOf"], {"type": "array", "items": _NAME}]})
 Name = Annotated[
     str,
     BeforeValidator(lambda value: str(value) if type(value) is int else value),
     Field(pattern=NAME),
-    WithJsonSchema({"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}),
+    WithJsonSchema(_NAME),
 ]
 
 
@@ -31,10 +33,10 @@ def as_pairs(value: Any) -> Any:
     return value
 
 
-_SCALAR = {"anyOf": [{"type": "number"}, {"type": "string"}]}
-_VECTOR = {"type": "array", "items": _SCALAR, "minItems": 1}
-_ONE_OR_EACH = WithJsonSchema({"anyOf": [*_SCALAR["anyOf"], _VECTOR]})
-_PAIR_OR_EACH = WithJsonSchema({"anyOf": [_VECTOR, {"type": "array", "items": _VECTOR}]})
+SCALAR = {"anyOf": [{"type": "number"}, {"type": "string"}]}
+VECTOR = {"type": "array", "items": SCALAR, "minItems": 1}
+_ONE_OR_EACH = WithJsonSchema({"anyOf": [*SCALAR["anyOf"], VECTOR]})
+_PAIR_OR_EACH = WithJsonSchema({"anyOf": [VECTOR, {"type": "array", "items": VECTOR}]})
 
 PerJoint = Annotated[list[Number], BeforeValidator(as_list), Field(min_length=1), _ONE_OR_EACH]
 """One number for all joints or one for each."""

@@ -6,15 +6,13 @@ points is mended by drawing the motion together towards a resting position insid
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.optimize
 
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import JointLimits
-from paramreduce_cli.excitation.objective import Excitation, FreeObjective
+from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
 from paramreduce_cli.multibody.coordinates import Follower
 from paramreduce_cli.records import FloatArray
 
@@ -25,37 +23,6 @@ _SHRINKS = 0.8
 _HALVINGS = 12
 _INSET = 0.98
 """Share of the position range in which a resting position is looked for."""
-
-
-@dataclass(frozen=True)
-class Bound:
-    """The bound that a motion is nearest to, or misses by most."""
-
-    excess: float
-    """Above zero outside; without unit."""
-    name: str
-
-
-def worst_bound(excitation: Excitation, z: FloatArray, positions: Follower) -> Bound:
-    """Of the positions z, (n_samples, n_dof); infinite where the loops cannot be closed."""
-    try:
-        rows = excitation.quantities.rows(positions(z))
-    except DataError as error:
-        return Bound(np.inf, str(error))
-    if not rows.size:
-        return Bound(-np.inf, "")
-    worst = int(np.argmax(rows.max(axis=0)))
-    constraint = excitation.quantities.constraints[excitation.quantities.owners[worst]]
-    bounds = [
-        text
-        for text, there in (
-            (f"at least {constraint.lower:.4g}", constraint.lower > -np.inf),
-            (f"at most {constraint.upper:.4g}", constraint.upper < np.inf),
-        )
-        if there
-    ]
-    name = f"{constraint.name} ({constraint.kind}, {' and '.join(bounds)})"
-    return Bound(float(rows[:, worst].max()), name)
 
 
 def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
@@ -74,7 +41,7 @@ def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
         tried.append(np.clip(home, middle - reach, middle + reach))
 
     def worst(z: FloatArray) -> Bound:
-        return worst_bound(excitation, z[None], Follower(excitation.coordinates))
+        return excitation.worst_bound(z[None], Follower(excitation.coordinates))
 
     for z in list(tried):
         if worst(z).excess < 0:
@@ -113,7 +80,11 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         if np.isfinite(objective(drawn.ravel())[0]):
             return drawn
         share *= _SHRINKS
-    raise DataError("no motion was found that keeps the bounds")
+    nearest = objective.worst_bound(drawn.ravel())
+    raise DataError(
+        "no motion was found that keeps trajectories.constraints: even the smallest about a "
+        f"position that keeps them is stopped by {nearest.name}. Loosen it."
+    )
 
 
 def drawn_inside(
@@ -122,7 +93,6 @@ def drawn_inside(
     rest: FloatArray,
     period: float,
     points: int,
-    positions: Follower,
 ) -> FloatArray:
     """Draw a series together towards a resting position until it keeps the bounds on a fine grid.
 
@@ -132,7 +102,6 @@ def drawn_inside(
         rest: Independent coordinates inside all bounds, (n_dof,).
         period: s
         points: Of the grid that was optimised on.
-        positions: Where the mechanism is.
     """
     basis = fine_basis(period, (coefficients.shape[1] - 1) // 2, points)
     still = np.zeros_like(coefficients)
@@ -143,7 +112,14 @@ def drawn_inside(
 
     def inside(share: float) -> bool:
         z = basis.states(drawn(share))[0]
-        return worst_bound(excitation, z, positions).excess <= 0
+        positions = Follower(excitation.coordinates)
+        if excitation.worst_bound(z, positions).excess > 0:
+            return False
+        try:
+            excitation.coordinates.check_motion(basis.time, positions(z))
+        except DataError:
+            return False
+        return True
 
     if inside(1.0):
         return coefficients

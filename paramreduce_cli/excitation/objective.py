@@ -43,6 +43,15 @@ class Level:
 
 
 @dataclass(frozen=True)
+class Bound:
+    """The bound that a motion is nearest to, or misses by most."""
+
+    excess: float
+    """Above zero outside; without unit."""
+    name: str
+
+
+@dataclass(frozen=True)
 class Excitation:
     """What is measured along a trajectory: base columns of W, weighted and scaled, and bounds."""
 
@@ -125,6 +134,24 @@ class Excitation:
         z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.jacobian(q))
         return -level.barrier * float(np.log(room).sum()), z_bar.T @ basis.position
 
+    def worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
+        """Of the positions z, (n_samples, n_dof); infinite where the loops cannot be closed."""
+        try:
+            rows = self.quantities.rows(positions(z))
+        except DataError as error:
+            return Bound(np.inf, str(error))
+        if not rows.size:
+            return Bound(-np.inf, "none")
+        worst = int(np.argmax(rows.max(axis=0)))
+        constraint = self.quantities.constraints[self.quantities.owners[worst]]
+        bounds = []
+        if constraint.lower > -np.inf:
+            bounds.append(f"at least {constraint.lower:.4g}")
+        if constraint.upper < np.inf:
+            bounds.append(f"at most {constraint.upper:.4g}")
+        name = f"{constraint.name} ({constraint.kind}, {' and '.join(bounds)})"
+        return Bound(float(rows[:, worst].max()), name)
+
 
 class FreeObjective:
     """The criterion over free series, with a barrier at their bounds, for a solver.
@@ -166,10 +193,16 @@ class FreeObjective:
             barrier, barrier_bar = self._excitation.barrier(*along)
             if np.isfinite(barrier):
                 value, bar = self._excitation.value_and_gradient(*along)
+                self._positions.keep()
                 return value + barrier, pull(bar + barrier_bar)
         except DataError:
             pass
         return np.nan, np.full(x.size, np.nan)
+
+    def worst_bound(self, x: FloatArray) -> Bound:
+        """The bound that the series at ``x`` misses by most, or is nearest to."""
+        coefficients, _ = self._admissible(x)
+        return self._excitation.worst_bound(self._basis.states(coefficients)[0], self._positions)
 
     def _admissible(self, x: FloatArray) -> tuple[FloatArray, Pullback]:
         free = self._mixing @ x.reshape(self._shape)

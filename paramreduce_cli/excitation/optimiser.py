@@ -2,7 +2,7 @@
 
 All starts go through the blunt levels; the most promising ones through the sharp levels,
 with IPOPT's stopping rules tightened. The numbers were chosen by measurement, on serial arms
-for motions that only keep joint limits, on the Hexaglide for those with bounds or loops.
+for motions that only keep joint limits, on a parallel robot with six legs for those with bounds or loops.
 
 With loops, coordinates are mixed so that equal steps move the whole mechanism equally far:
 left to themselves, some combinations of slides of a parallel robot would turn its platform
@@ -197,9 +197,7 @@ class _Search:
             self._mixing @ candidate.free, self.plan.polishing[-1].limits
         )
         settings = self._settings
-        return drawn_inside(
-            self._excitation, series, self._rest, settings.period, settings.points, self._positions
-        )
+        return drawn_inside(self._excitation, series, self._rest, settings.period, settings.points)
 
     def kappa(self, series: FloatArray) -> float:
         """The condition number that the settings ask for."""

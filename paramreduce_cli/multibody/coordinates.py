@@ -167,21 +167,15 @@ class Coordinates:
         return q, made
 
     def _check_reached(self, z: FloatArray, reached: FloatArray) -> None:
-        """Refuse positions that were not reached, saying where.
-
-        Raises:
-            DataError: One was not.
-        """
         if (reached == 1).all():
             return
         worst = int(np.argmin(reached))
         names = self.mechanism.coordinate_names
         there = ", ".join(f"{n} = {v:.4g}" for n, v in zip(names, z[worst], strict=True))
         raise DataError(
-            f"the loops cannot be closed at {there}: {100 * reached[worst]:.0f} % of the way there "
-            "from the nearest known position the mechanism comes to a singular configuration or to "
-            "the end of its reach. Keep the motion away from there, by its limits or by "
-            "trajectories.constraints."
+            f"the loops cannot be closed at {there}: on the way there from the nearest known "
+            "position the mechanism comes to a singular configuration or to the end of its reach. "
+            "Keep the motion away from there, by its limits or by trajectories.constraints."
         )
 
     def tangent(self, q: FloatArray) -> FloatArray:
@@ -214,7 +208,7 @@ class Coordinates:
                 "determine the other coordinates. Keep away from it with a constraint on "
                 "singularity under trajectories.constraints."
             )
-        sign = np.linalg.slogdet(self._dependent_jacobian(q))[0]
+        sign = self._side(q)
         tangent = self.tangent(q)
         z = q[:, self._independent]
         step = np.diff(q, axis=0)
@@ -231,9 +225,25 @@ class Coordinates:
                 "there, or sample it more densely."
             )
 
-    def _dependent_jacobian(self, q: FloatArray) -> FloatArray:
+    def check_side(self, z: FloatArray, q: FloatArray) -> None:
+        """Refuse positions beyond a singular configuration, seen from the assembly.
+
+        Raises:
+            DataError: The determinant of Phi_d has the other sign at a sample.
+        """
+        beyond = self._side(q) != self._assembly_side
+        self._check_reached(z, np.where(beyond, 0.5, 1.0))
+
+    def _side(self, q: FloatArray) -> FloatArray:
+        """Sign of the determinant of Phi_d, (n_samples,)."""
         n_d = len(self._dependent)
-        return self._jacobian(q)[0].reshape(-1, n_d, n_d)
+        sign: FloatArray = np.linalg.slogdet(self._jacobian(q)[0].reshape(-1, n_d, n_d))[0]
+        return sign
+
+    @cached_property
+    def _assembly_side(self) -> float:
+        assert self.mechanism.loops is not None
+        return float(self._side(self.mechanism.loops.assembly[None])[0])
 
     @cached_property
     def _jacobian(self) -> BatchFunction:
@@ -276,7 +286,8 @@ class Coordinates:
 class Follower:
     """Positions along a motion that changes a little from call to call.
 
-    Each call starts from the positions found last for as many samples.
+    Each call starts from the positions kept last for as many samples, and stays on the side of
+    singular configurations that the assembly is on.
 
     Args:
         coordinates: Of the mechanism.
@@ -284,20 +295,26 @@ class Follower:
 
     def __init__(self, coordinates: Coordinates) -> None:
         self._coordinates = coordinates
-        self._last: dict[int, tuple[FloatArray, FloatArray]] = {}
+        self._kept: dict[int, FloatArray] = {}
+        self._last: tuple[FloatArray, FloatArray] | None = None
 
     def __call__(self, z: FloatArray) -> FloatArray:
         """Generalised coordinates, (n_samples, n_q), at z (n_samples, n_dof).
 
         Raises:
-            DataError: The loops cannot be closed at a sample.
+            DataError: The loops cannot be closed at a sample without passing a singularity.
         """
         if self._coordinates.mechanism.loops is None:
             return z
-        known = self._last.get(z.shape[0])
-        if known is not None and np.array_equal(known[0], z):
-            return known[1]
-        starts = [None] if known is None else [known[1], None]
-        q = self._coordinates.positions(z, *starts)
-        self._last[z.shape[0]] = (z, q)
-        return q
+        if self._last is None or not np.array_equal(self._last[0], z):
+            kept = self._kept.get(z.shape[0])
+            q = self._coordinates.positions(z, *([None] if kept is None else [kept, None]))
+            self._coordinates.check_side(z, q)
+            self._last = (z, q)
+        return self._last[1]
+
+    def keep(self) -> None:
+        """Start from the positions found last from now on, because they are good ones."""
+        if self._last is not None:
+            q = self._last[1]
+            self._kept[q.shape[0]] = q

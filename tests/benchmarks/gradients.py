@@ -10,8 +10,9 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.ipopt import minimise
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
-from paramreduce_cli.excitation.optimiser import SCREENING, settings_basis
+from paramreduce_cli.excitation.optimiser import FREE, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.multibody.coordinates import Follower
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import joint_settings
 
@@ -24,11 +25,12 @@ class Differences:
     def __init__(self, excitation, basis, limits, level):
         self._excitation, self._basis = excitation, basis
         self._limits, self._level = limits, level
+        self._positions = Follower(excitation.coordinates)
 
     def value(self, x):
-        coefficients, _ = self._limits.admissible(x.reshape(6, 9), self._level.norm)
-        W = self._excitation.weighted(self._basis.states(coefficients))
-        scaled, _ = self._excitation.scaling(W, self._excitation.beta)
+        coefficients, _ = self._limits.admissible(x.reshape(6, 9), self._level.limits)
+        W = self._excitation.weighted(self._basis.states(coefficients), self._positions)
+        scaled, _ = self._excitation.scaling(W, self._excitation.beta, self._level.maxima)
         eigenvalues = scipy.linalg.eigvalsh(scaled.T @ scaled, check_finite=False)
         return self._excitation.criterion(eigenvalues, self._level.sharpness)[0]
 
@@ -41,7 +43,7 @@ class Differences:
 def descend(make, start):
     started = time.process_time()
     x, curvature = start, None
-    for level in SCREENING:
+    for level in FREE.screening:
         end = minimise(make(level), x, 100, curvature)
         x, curvature = end.x, end.curvature
     return time.process_time() - started, end.value
@@ -59,7 +61,8 @@ def rows():
     limits = LimitMap(settings.limits, basis, "gauge")
 
     def objective(level):
-        return FreeObjective(excitation, basis, limits, level.sharpness, level.norm)
+        positions = Follower(excitation.coordinates)
+        return FreeObjective(excitation, basis, limits, level, positions, np.eye(limits.n_dof))
 
     ratios = []
     for seed in range(3):

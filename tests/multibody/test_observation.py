@@ -15,7 +15,7 @@ def blocks_of(W, tau, trajectory, size):
         part = slice(start, start + size)
         rows = slice(start * n_dof, (start + size) * n_dof)
         states = np.zeros_like(tau[part])
-        yield Block(trajectory, states[:, 0], states, states, states, tau[part], W[rows])
+        yield Block(trajectory, states[:, 0], *[states] * 3, tau[part], *[states] * 3, W[rows])
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])

@@ -18,7 +18,7 @@ def setup(seed=0):
     z, dz, ddz = random_states(mechanism, 30, seed)
     W = dynamics.regressor(z, dz, ddz).reshape(-1, 50)
     tau = (W @ phi).reshape(-1, 5)
-    return dynamics, phi, [Block(0, z[:, 0], z, dz, ddz, tau, W)]
+    return dynamics, phi, [Block(0, z[:, 0], z, dz, ddz, tau, z, dz, ddz, W)]
 
 
 def test_the_full_model_predicts_the_accelerations():

@@ -42,7 +42,12 @@ def test_norms_by_their_definitions():
     states = np.zeros((20, 3))
     blocks = [
         Block(
-            0, states[k : k + 7, 0], *[states[k : k + 7]] * 3, tau[k : k + 7], W[3 * k : 3 * k + 21]
+            0,
+            states[k : k + 7, 0],
+            *[states[k : k + 7]] * 3,
+            tau[k : k + 7],
+            *[states[k : k + 7]] * 3,
+            W[3 * k : 3 * k + 21],
         )
         for k in range(0, 20, 7)
     ]
