@@ -17,6 +17,8 @@ from paramreduce_cli.runner import Runner
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"
 
+CLOSED_LOOPS = ["four_bar", "five_bar", "rssr", "hexaglide"]
+
 PI = np.pi
 PUMA_ROWS = [
     (0, 0, 0), (0, -PI / 2, 0), (0.4318, 0, -0.1491),

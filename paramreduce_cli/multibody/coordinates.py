@@ -253,8 +253,8 @@ class Coordinates:
         )
 
     def distance(self, q: FloatArray) -> FloatArray:
-        """Distance to singularity of closed loops, 0 to 1, (n_samples,); see Projection."""
-        return self._distance(q)[0][:, 0]
+        """Distance to singularity of loops, 0 to 1, (n_samples,); see :class:`Projection`."""
+        return np.nan_to_num(self._distance(q)[0][:, 0], nan=0.0)
 
     def _advance(self, q: FloatArray, dz: FloatArray) -> tuple[FloatArray, BoolArray]:
         """One predicted step with its corrections; where it cannot be trusted, False."""

@@ -1,43 +1,114 @@
-"""Lagrange's equations from energies, by automatic differentiation of homogeneous transforms."""
+"""Lagrange's equations from energies, by automatic differentiation of homogeneous transforms.
+
+Loops are closed with Lagrange multipliers; nothing here knows of projections.
+"""
 
 import casadi as ca
 import numpy as np
 
 
+class Lagrange:
+    """Energies, equations of motion and closure equations of a mechanism as CasADi functions."""
+
+    def __init__(self, mechanism):
+        n = mechanism.n_q
+        q, dq, ddq = (ca.MX.sym(name, n) for name in ("q", "dq", "ddq"))
+        phi = ca.MX.sym("phi", len(mechanism.parameter_names))
+        poses = _poses(mechanism, q)
+        kinetic, potential = 0, 0
+        for order, k in enumerate(mechanism.inertial):
+            own_kinetic, own_potential = _energies(
+                poses[k], q, dq, phi[10 * order : 10 * order + 10], mechanism.gravity
+            )
+            kinetic, potential = kinetic + own_kinetic, potential + own_potential
+        momentum = ca.gradient(kinetic, dq)
+        rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)
+        tau = rate - ca.gradient(kinetic - potential, q)
+        gaps = _gaps(mechanism, poses)
+        jacobian = ca.jacobian(gaps, q)
+        drift = ca.jtimes(ca.jtimes(gaps, q, dq), q, dq)
+        self.tau = ca.Function("tau", [q, dq, ddq, phi], [tau])
+        self.tau_by_phi = ca.Function("K", [q, dq, ddq, phi], [ca.jacobian(tau, phi)])
+        self.mass_matrix = ca.Function("M", [q, phi], [ca.hessian(kinetic, dq)[0]])
+        self.energy = ca.Function("E", [q, dq, phi], [kinetic + potential])
+        self.closures = ca.Function("closures", [q, dq], [gaps, jacobian, drift])
+
+
 def inverse_dynamics(mechanism):
-    """A function (z, dz, ddz, phi) -> tau made from kinetic and potential energy alone."""
-    n = mechanism.n_dof
-    z, dz, ddz = (ca.MX.sym(name, n) for name in ("z", "dz", "ddz"))
-    phi = ca.MX.sym("phi", 10 * n)
-    kinetic, potential = 0, 0
+    """A function (q, dq, ddq, phi) -> tau of the open tree."""
+    function = Lagrange(mechanism).tau
+    return lambda *values: np.array(function(*values)).ravel()
+
+
+def _poses(mechanism, q):
     poses = []
     for k, body in enumerate(mechanism.bodies):
-        angle = z[k] + body.offset
+        value = q[k] + body.offset
         zero, one = ca.MX(0), ca.MX(1)
         if body.joint == "revolute":
-            c, s, slide = ca.cos(angle), ca.sin(angle), zero
+            c, s, slide = ca.cos(value), ca.sin(value), zero
         else:
-            c, s, slide = one, zero, angle
+            c, s, slide = one, zero, value
         motion = ca.vertcat(
             ca.horzcat(c, -s, 0, 0), ca.horzcat(s, c, 0, 0), ca.horzcat(0, 0, 1, slide),
             ca.horzcat(0, 0, 0, 1),
         )  # fmt: skip
         local = ca.mtimes([ca.DM(body.before), motion, ca.DM(body.after)])
-        pose = local if body.parent < 0 else ca.mtimes(poses[body.parent], local)
-        poses.append(pose)
-        R, p = pose[:3, :3], pose[:3, 3]
-        v = ca.jtimes(p, z, dz)
-        R_dot = ca.reshape(ca.jtimes(ca.vec(R), z, dz), 3, 3)
-        skew = R.T @ R_dot
-        w = ca.vertcat(skew[2, 1], skew[0, 2], skew[1, 0])
-        m, moment = phi[10 * k], phi[10 * k + 1 : 10 * k + 4]
-        xx, xy, xz, yy, yz, zz = (phi[10 * k + i] for i in range(4, 10))
-        inertia = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-        kinetic += m * ca.dot(v, v) / 2 + ca.dot(v, R @ ca.cross(w, moment))
-        kinetic += ca.dot(w, inertia @ w) / 2
-        potential -= ca.dot(ca.DM(mechanism.gravity), m * p + R @ moment)
-    momentum = ca.gradient(kinetic, dz)
-    rate = ca.jtimes(momentum, z, dz) + ca.jtimes(momentum, dz, ddz)
-    tau = rate - ca.gradient(kinetic - potential, z)
-    function = ca.Function("tau", [z, dz, ddz, phi], [tau])
-    return lambda *values: np.array(function(*values)).ravel()
+        poses.append(local if body.parent < 0 else ca.mtimes(poses[body.parent], local))
+    return poses
+
+
+def _energies(pose, q, dq, phi, gravity):
+    R, p = pose[:3, :3], pose[:3, 3]
+    v = ca.jtimes(p, q, dq)
+    R_dot = ca.reshape(ca.jtimes(ca.vec(R), q, dq), 3, 3)
+    skew = R.T @ R_dot
+    w = ca.vertcat(skew[2, 1], skew[0, 2], skew[1, 0])
+    m, moment = phi[0], phi[1:4]
+    xx, xy, xz, yy, yz, zz = (phi[i] for i in range(4, 10))
+    inertia = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+    kinetic = m * ca.dot(v, v) / 2 + ca.dot(v, R @ ca.cross(w, moment))
+    kinetic += ca.dot(w, inertia @ w) / 2
+    return kinetic, -ca.dot(ca.DM(gravity), m * p + R @ moment)
+
+
+def _gaps(mechanism, poses):
+    """Closure equations, in whatever form is shortest with homogeneous transforms."""
+    gaps = []
+    for closure in mechanism.loops.closures if mechanism.loops else ():
+        A, B = (
+            ca.DM(frame) if body < 0 else poses[body] @ ca.DM(frame)
+            for body, frame in zip(closure.bodies, closure.frames, strict=True)
+        )
+        if closure.kind == "distance":
+            gaps.append(ca.norm_2(A[:3, 3] - B[:3, 3]) - closure.length)
+            continue
+        seen = A[:3, :3].T @ (B[:3, 3] - A[:3, 3])
+        gaps.append(seen[:2] if closure.kind == "planar" else seen)
+        if closure.kind == "revolute":
+            gaps.append((A[:3, :3].T @ B[:3, 2])[:2])
+    return ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
+
+
+def forward_dynamics(oracle, independent, q, dq, phi, tau):
+    """Accelerations and multipliers from the KKT system of one state.
+
+    M ddq + J' l = S' tau - h and J ddq = -dJ/dt dq, with S picking the independent coordinates.
+    """
+    n = q.size
+    M = np.array(oracle.mass_matrix(q, phi))
+    h = np.array(oracle.tau(q, dq, np.zeros(n), phi)).ravel()
+    _, J, drift = (np.array(part) for part in oracle.closures(q, dq))
+    force = np.zeros(n)
+    force[list(independent)] = tau
+    kkt = np.block([[M, J.T], [J, np.zeros((J.shape[0], J.shape[0]))]])
+    solution = np.linalg.solve(kkt, np.concatenate([force - h, -drift.ravel()]))
+    return solution[:n]
+
+
+def tangent(oracle, independent, q):
+    """dq/dz from the null space of the closures' Jacobian."""
+    _, J, _ = (np.array(part) for part in oracle.closures(q, np.zeros(q.size)))
+    _, s, Vt = np.linalg.svd(J)
+    null = Vt[int(np.sum(s > 1e-9 * s[0])) :].T
+    return null @ np.linalg.inv(null[list(independent)])

@@ -1,0 +1,263 @@
+"""Closed loops against Lagrange's equations with multipliers, and against power balance."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import CLOSED_LOOPS, CONFIGS
+from oracles.lagrange import Lagrange, forward_dynamics, tangent
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.records import Constraint
+from paramreduce_cli.stages.build_model import build_model
+from paramreduce_cli.stages.description import described_constraints, described_mechanism
+
+REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8}
+"""Amplitudes of independent coordinates about the assembly, rad or m, that all loops survive."""
+
+
+@pytest.fixture(scope="module", params=CLOSED_LOOPS)
+def case(request):
+    config = load_config(CONFIGS / f"{request.param}.yaml")
+    mechanism = described_mechanism(config)
+    rng = np.random.default_rng(3)
+    phi = config.standard_parameters() + rng.normal(size=len(mechanism.parameter_names)) * 1e-2
+    return config, mechanism, Lagrange(mechanism), phi
+
+
+def states_of(mechanism, count=4):
+    return random_states(mechanism, count, np.random.default_rng(1))
+
+
+def motion(mechanism, points, seed=0):
+    """A random periodic motion about the assembly, with its time derivatives."""
+    rng = np.random.default_rng(seed)
+    coefficients = rng.normal(size=(mechanism.n_dof, 5)) * REACH[mechanism.robot] / 3
+    coefficients[:, 0] = mechanism.loops.assembly[list(mechanism.independent)]
+    basis = fourier_basis(2 * np.pi, 2, sample_times(2 * np.pi, points))
+    return basis.time, Coordinates(mechanism).states(*basis.states(coefficients))
+
+
+def test_states_satisfy_the_closures_and_their_derivatives(case):
+    _, mechanism, oracle, _ = case
+    for q, dq, ddq in zip(*states_of(mechanism), strict=True):
+        gap, J, drift = (np.array(part) for part in oracle.closures(q, dq))
+        assert np.abs(gap).max() < 1e-12
+        scale = np.abs(J).max()
+        assert np.abs(J @ dq).max() < 1e-11 * scale * np.abs(dq).max()
+        left = J @ ddq + drift.ravel()
+        assert np.abs(left).max() < 1e-11 * scale * np.abs(ddq).max()
+
+
+def test_torques_against_lagrange(case):
+    _, mechanism, oracle, phi = case
+    states = states_of(mechanism)
+    found = Dynamics(mechanism).inverse(*states, phi)
+    for k, (q, dq, ddq) in enumerate(zip(*states, strict=True)):
+        R = tangent(oracle, mechanism.independent, q)
+        expected = R.T @ np.array(oracle.tau(q, dq, ddq, phi)).ravel()
+        assert found[k] == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+
+
+def test_mass_matrix_bias_and_accelerations_against_the_kkt_system(case):
+    _, mechanism, oracle, phi = case
+    independent = list(mechanism.independent)
+    q_all, dq_all, _ = states_of(mechanism)
+    A, B = Dynamics(mechanism).direct_regressor(q_all, dq_all)
+    rng = np.random.default_rng(2)
+    for k, (q, dq) in enumerate(zip(q_all, dq_all, strict=True)):
+        M, delta = A[k] @ phi, B[k] @ phi
+        # The KKT system is linear in tau: its response to unit torques is M^-1, at rest -M^-1 delta.
+        rest = forward_dynamics(oracle, independent, q, dq, phi, np.zeros(mechanism.n_dof))
+        units = [
+            forward_dynamics(oracle, independent, q, dq, phi, unit) - rest
+            for unit in np.eye(mechanism.n_dof)
+        ]
+        M_kkt = np.linalg.inv(np.array(units)[:, independent].T)
+        assert pytest.approx(M_kkt, rel=1e-8, abs=1e-8 * np.abs(M_kkt).max()) == M
+        expected = -M_kkt @ rest[independent]
+        assert delta == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+        tau = rng.normal(size=mechanism.n_dof) * np.abs(delta).max()
+        ddq = forward_dynamics(oracle, independent, q, dq, phi, tau)
+        ddz = np.linalg.solve(M, tau - delta)
+        assert ddz == pytest.approx(ddq[independent], rel=1e-8, abs=1e-8 * np.abs(ddq).max())
+
+
+def test_power_balance(case):
+    """d/dt (T + V) = tau . dz, with the rate of a periodic energy by its Fourier transform."""
+    _, mechanism, oracle, phi = case
+    points = 256
+    _, (q, dq, ddq) = motion(mechanism, points)
+    energy = np.array(oracle.energy.map(points)(q.T, dq.T, np.tile(phi, (points, 1)).T)).ravel()
+    frequency = 1j * np.fft.rfftfreq(points, 1 / points)
+    rate = np.fft.irfft(frequency * np.fft.rfft(energy), points)
+    tau = Dynamics(mechanism).inverse(q, dq, ddq, phi)
+    power = np.einsum("kj,kj->k", tau, dq[:, list(mechanism.independent)])
+    assert np.abs(power).max() > 1e-3
+    assert np.abs(rate - power).max() < 1e-7 * np.abs(power).max()
+
+
+def test_base_count_is_the_rank_of_the_oracles_observation_matrix(case):
+    config, mechanism, oracle, phi = case
+    rows = []
+    for q, dq, ddq in zip(*random_states(mechanism, 60, np.random.default_rng(5)), strict=True):
+        R = tangent(oracle, mechanism.independent, q)
+        rows.append(R.T @ np.array(oracle.tau_by_phi(q, dq, ddq, phi)))
+    W = np.vstack(rows)
+    lengths = np.linalg.norm(W, axis=0)
+    live = lengths > 1e-10 * lengths.max()
+    singular = np.linalg.svd(W[:, live] / lengths[live], compute_uv=False)
+    rank = int(np.sum(singular > 1e-9 * singular[0]))
+    model = build_model(config)
+    assert (model.affecting.sum(), model.base.columns.size) == (live.sum(), rank)
+
+
+def test_counts_of_the_six_legged_robot():
+    model = build_model(load_config(CONFIGS / "hexaglide.yaml"))
+    assert (model.values.size, model.affecting.sum(), model.base.columns.size) == (70, 70, 64)
+
+
+def test_a_point_mass_at_a_spherical_joint_may_belong_to_either_body():
+    """The six null vectors: a unit mass at the end of a bar, taken from the platform."""
+    mechanism = described_mechanism(load_config(CONFIGS / "hexaglide.yaml"))
+    K = Dynamics(mechanism).regressor(*states_of(mechanism, 40))
+    W = K.reshape(-1, 70)
+    W = W / np.linalg.norm(W, axis=0).max()
+    names = mechanism.parameter_names
+    for closure in mechanism.loops.closures:
+        null = np.zeros(70)
+        for body, frame, sign in zip(closure.bodies, closure.frames, (1, -1), strict=True):
+            name, (x, y, z) = mechanism.bodies[body].name, frame[:3, 3]
+            point = {"m": 1, "mx": x, "my": y, "mz": z, "Ixx": y * y + z * z, "Iyy": x * x + z * z,
+                     "Izz": x * x + y * y, "Ixy": -x * y, "Ixz": -x * z, "Iyz": -y * z}  # fmt: skip
+            for kind, value in point.items():
+                null[names.index(f"{kind}_{name}")] += sign * value
+        assert np.abs(null).max() >= 1
+        assert np.abs(W @ null).max() < 1e-12
+
+
+@pytest.mark.parametrize("name", CLOSED_LOOPS)
+def test_adjoint_of_observations_through_the_position_problem(name):
+    mechanism = described_mechanism(load_config(CONFIGS / f"{name}.yaml"))
+    observation = Dynamics(mechanism).observation(np.arange(3, 8))
+    coordinates = Coordinates(mechanism)
+    q, dq, ddq = states_of(mechanism, 6)
+    independent = list(mechanism.independent)
+    states = [part[:, independent] for part in (q, dq, ddq)]
+    rng = np.random.default_rng(0)
+    W_bar = rng.normal(size=(6 * mechanism.n_dof, 5))
+    bars = observation.adjoint(q, *states[1:], W_bar)
+    step = 1e-6
+    for k, bar in enumerate(bars):
+        direction = rng.normal(size=bar.shape)
+
+        def value(sign, k=k, direction=direction):
+            moved = [s + sign * step * direction if j == k else s for j, s in enumerate(states)]
+            there = coordinates.positions(moved[0], q)
+            return np.sum(observation.forward(there, *moved[1:]) * W_bar)
+
+        slope = (value(1) - value(-1)) / (2 * step)
+        size = np.sum(np.abs(bar * direction))
+        assert slope == pytest.approx(np.sum(bar * direction), abs=1e-5 * size)
+
+
+QUANTITIES = [
+    Constraint("low", "coordinate", (1,), (), -0.5, 2.0),
+    Constraint("tilt", "angle", (0, 2), (np.array([1.0, 0, 0]), np.array([0.6, 0.8, 0])), 0.1, 2.5),
+    Constraint("apart", "distance", (1, 2), (np.array([0.2, 0, 0]), np.array([0, 0.1, 0])), 0.1, 1),
+    Constraint(
+        "radius", "distance-from-axis", (1, -1),
+        (np.array([0.3, 0.1, 0]), np.array([0.1, 0, 0]), np.array([0, 1.0, 0])), 0.05, 1.5,
+    ),
+    Constraint("away", "singularity", (), (), 0.05, np.inf),
+]  # fmt: skip
+
+
+def test_quantities_by_their_definitions_and_their_derivatives():
+    mechanism = described_mechanism(load_config(CONFIGS / "five_bar.yaml"))
+    quantities = Quantities(mechanism, QUANTITIES)
+    q, _, _ = states_of(mechanism, 5)
+    values = quantities.values(q)
+    for k, one in enumerate(q):
+        poses = body_poses(mechanism, one)
+        end = (poses[1] @ [0.2, 0, 0, 1])[:3] - (poses[2] @ [0, 0.1, 0, 1])[:3]
+        u, v = poses[0][:3, 0], poses[2][:3, :3] @ [0.6, 0.8, 0]
+        seen = (poses[1] @ [0.3, 0.1, 0, 1])[:3] - [0.1, 0, 0]
+        expected = [one[1], np.arccos(u @ v), np.linalg.norm(end), np.hypot(seen[0], seen[2])]
+        assert values[k, :4] == pytest.approx(expected, rel=1e-12)
+    rows = quantities.rows(q)
+    inside = (values >= [c.lower for c in QUANTITIES]) & (values <= [c.upper for c in QUANTITIES])
+    for j in range(len(QUANTITIES)):
+        own = rows[:, quantities.owners == j]
+        assert np.array_equal((own <= 0).all(axis=1), inside[:, j])
+    jacobian = quantities.jacobian(q)
+    coordinates, step = Coordinates(mechanism), 1e-6
+    z = q[:, list(mechanism.independent)]
+    for j in range(mechanism.n_dof):
+        ahead, behind = (
+            quantities.rows(coordinates.positions(z + sign * step * np.eye(2)[j], q))
+            for sign in (1, -1)
+        )
+        slope = (ahead - behind) / (2 * step)
+        assert jacobian[:, :, j] == pytest.approx(slope, rel=1e-5, abs=1e-7)
+
+
+def test_distance_to_singularity_is_zero_where_far_links_line_up():
+    mechanism = described_mechanism(load_config(CONFIGS / "five_bar.yaml"))
+    # Elbows so far apart that both far links lie on one line.
+    half = np.arccos((0.45 - 0.15) / 0.35)
+    q = np.array([np.pi - half, half - np.pi, half, -half])
+    assert Coordinates(mechanism).distance(q[None])[0] < 1e-8
+    assert Coordinates(mechanism).distance(mechanism.loops.assembly[None])[0] > 0.2
+
+
+def test_a_turning_crank_stays_on_its_assembly_mode():
+    mechanism = described_mechanism(load_config(CONFIGS / "four_bar.yaml"))
+    coordinates = Coordinates(mechanism)
+    time = np.linspace(0, 4 * np.pi, 400)
+    z = (mechanism.loops.assembly[0] + time)[:, None]
+    q = coordinates.positions(z, None)
+    coordinates.check_motion(time, q)
+    assert np.abs(np.diff(q[:, 1:], axis=0)).max() < 0.1
+    assert q[199, 0] - q[0, 0] > 6
+
+
+def test_a_rocker_driven_over_its_dead_point_is_refused():
+    config = load_config(CONFIGS / "four_bar.yaml")
+    mechanism = described_mechanism(config)
+    driven = dataclasses.replace(mechanism.loops, independent=(2,))
+    mechanism = dataclasses.replace(mechanism, loops=driven)
+    z = np.linspace(mechanism.loops.assembly[2], mechanism.loops.assembly[2] + 2.0, 50)
+    with pytest.raises(DataError, match="singular configuration or to the end of its reach"):
+        Coordinates(mechanism).positions(z[:, None], None)
+
+
+def test_follower_finds_what_a_fresh_start_finds():
+    mechanism = described_mechanism(load_config(CONFIGS / "hexaglide.yaml"))
+    coordinates = Coordinates(mechanism)
+    follower = Follower(coordinates)
+    basis = fourier_basis(2 * np.pi, 2, sample_times(2 * np.pi, 40))
+    rng = np.random.default_rng(0)
+    for _ in range(5):
+        coefficients = rng.normal(size=(6, 5)) * 0.01
+        coefficients[:, 0] = 1.5
+        z = basis.states(coefficients)[0]
+        found = follower(z)
+        follower.keep()
+        assert found == pytest.approx(coordinates.positions(z, None), abs=1e-10)
+
+
+def test_constraints_of_the_six_legged_robot_at_home():
+    config = load_config(CONFIGS / "hexaglide.yaml")
+    mechanism = described_mechanism(config)
+    constraints = described_constraints(config, mechanism)
+    values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
+    assert values[0] == pytest.approx(0, abs=1e-9)
+    assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)
