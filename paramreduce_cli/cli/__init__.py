@@ -76,6 +76,7 @@ for _command in (
     files.init,
     files.inspect,
     files.compare_command,
+    files.table_command,
     files.graph,
 ):
     cli.add_command(_command)

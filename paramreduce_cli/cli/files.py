@@ -11,6 +11,7 @@ import click
 import rich.markup
 import rich.table
 
+from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.report_files import load_json
 from paramreduce_cli.artifacts.store import Store, load_file
@@ -28,6 +29,7 @@ from paramreduce_cli.report.comparison import (
     Tolerance,
     compare,
 )
+from paramreduce_cli.report.overview import overview
 from paramreduce_cli.workflow import FORMATS
 
 DIFFERENT = 1
@@ -170,6 +172,37 @@ def _load_summary(path: Path) -> dict[str, Any]:
     if not isinstance(loaded, dict):
         raise ConfigError(f"{path}: is no summary.json.")
     return loaded
+
+
+@click.command(name="table")
+@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "--output", type=click.Path(path_type=Path), metavar="PREFIX",
+    help="Files are called PREFIX.txt, .csv and .tex.  [default: table, beside the first results]",
+)  # fmt: skip
+def table_command(results: tuple[Path, ...], output: Path | None) -> None:
+    """Set one table over several robots, as text, CSV and LaTeX.
+
+    RESULTS are results folders or summaries. Shows the selected model of each robot beside its
+    full one.
+
+    Example: paramreduce table results/puma560 results/hexaglide
+    """
+    summaries = []
+    for path in results:
+        summaries.append(_load_summary(path))
+        try:
+            made = overview(summaries)
+        except (KeyError, TypeError) as error:
+            raise ConfigError(f"{path}: is no summary of this version ({error}).") from error
+    prefix = output or results[0].resolve().parent / "table"
+    for suffix, text in (
+        ("txt", made.to_text()), ("csv", made.to_csv()), ("tex", made.to_latex()),
+    ):  # fmt: skip
+        with atomically(prefix.with_name(f"{prefix.name}.{suffix}")) as path:
+            path.write_text(text, encoding="utf-8")
+    say(made.to_text())
+    say(f"Written to {prefix}.txt, .csv and .tex")
 
 
 @click.command()

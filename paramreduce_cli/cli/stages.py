@@ -15,7 +15,7 @@ import rich.table
 from paramreduce_cli.artifacts.report_files import load_json
 from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.cli.terminal import err, out, progress_bars, remark, say
-from paramreduce_cli.config import Config, load_config
+from paramreduce_cli.config import Config, load_config, placed_errors
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import Stage, stages_to_run
 from paramreduce_cli.records import Report, Run, Validation
@@ -74,7 +74,8 @@ def stage_command(stage: Stage) -> click.Command:
             raise click.UsageError("--set changes keys of a CONFIG; give one.")
         loaded = load_config(config, overrides) if config is not None else None
         store = _store(loaded, results)
-        with store.locked(), progress_bars(quiet) as progress:
+        placed = placed_errors(config, overrides)
+        with placed, store.locked(), progress_bars(quiet) as progress:
             runner = Runner(loaded, store, jobs or _cores(), progress, samples, remark)
             outcome = runner.run(stage, force=force)
         if not quiet:
@@ -164,7 +165,7 @@ def run(
     """
     loaded = load_config(config, overrides)
     store = _store(loaded, results)
-    with store.locked():
+    with placed_errors(config, overrides), store.locked():
         for stage in stages_to_run(loaded):
             with progress_bars(quiet) as progress:
                 runner = Runner(loaded, store, jobs or _cores(), progress, remark=remark)
@@ -201,8 +202,9 @@ def _say_summary(summary: dict[str, Any]) -> None:
     for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
     for name, rows in summary["validation"].items():
-        if len(rows) >= n:
-            table.add_row(name, *_summary_cells(rows[n - 1]))
+        for row in rows:
+            if row["n"] == n:
+                table.add_row(name, *_summary_cells(row))
     full = summary["full"]
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
     table.add_row("full model", "", "", "", "", *operations)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Iterable, Sequence
+import re
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from types import UnionType
 from typing import Any, Union, get_args, get_origin
@@ -21,6 +23,8 @@ from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import ConfigError
 
 Problem = tuple[reading.Path, str]
+
+_LEADING_KEY = re.compile(r"[a-z_]+(\.\w+)+|nominal_torque")
 
 
 def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
@@ -48,6 +52,27 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     if lines or config is None:
         raise ConfigError("\n".join(dict.fromkeys(lines)))
     return _with_paths(config, path.parent)
+
+
+@contextmanager
+def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[None]:
+    """Add file and line to errors of later work that begin with a key of the config.
+
+    Args:
+        path: The config's file; without one errors stay as they are.
+        overrides: As for :func:`load_config`.
+    """
+    try:
+        yield
+    except ConfigError as error:
+        key = _LEADING_KEY.match(str(error))
+        if path is None or key is None:
+            raise
+        document = _read(path)
+        for text in overrides:
+            reading.apply_override(document, text)
+        steps = tuple(int(s) if s.isdigit() else s for s in key.group().split("."))
+        raise ConfigError(f"{document.place(steps)}: {error}") from error
 
 
 def config_schema() -> dict[str, Any]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.optimize
 
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
@@ -31,7 +31,7 @@ def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
     The middle of the limits, or the assembly, or what a search from there finds.
 
     Raises:
-        DataError: There is none to be found; says which bound stands in the way.
+        ConfigError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * limits.reach
@@ -57,9 +57,12 @@ def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
             return np.asarray(found.x)
         tried.append(found.x)
     nearest = min((worst(z) for z in tried), key=lambda bound: bound.excess)
-    raise DataError(
-        "no position of the mechanism was found that keeps all of trajectories.constraints within "
-        f"the position limits: {nearest.name} stands in the way. Loosen it or the position limits."
+    if np.isinf(nearest.excess):
+        raise ConfigError(f"trajectories.position_limits: {nearest.name}")
+    raise ConfigError(
+        "trajectories.constraints: no position of the mechanism was found that keeps all of them "
+        f"within the position limits: {nearest.name} stands in the way. Loosen it or the position "
+        "limits."
     )
 
 
@@ -72,7 +75,7 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         objective: Not a number outside the bounds.
 
     Raises:
-        DataError: Even the smallest motion does not keep them.
+        ConfigError: Even the smallest motion does not keep them.
     """
     share = 1.0
     while share > _SMALLEST_SHARE:
@@ -81,9 +84,16 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
             return drawn
         share *= _SHRINKS
     nearest = objective.worst_bound(drawn.ravel())
-    raise DataError(
-        "no motion was found that keeps trajectories.constraints: even the smallest about a "
-        f"position that keeps them is stopped by {nearest.name}. Loosen it."
+    if np.isinf(nearest.excess):
+        raise ConfigError(
+            "trajectories.position_limits: no motion was found that keeps the loops closed; "
+            f"{nearest.name} If trajectories.use_full_range is true every motion reaches the limits: "
+            "narrow them, or set it to false."
+        )
+    raise ConfigError(
+        "trajectories.constraints: no motion was found that keeps them; even the smallest about a "
+        f"position that does is stopped by {nearest.name}. Loosen it, or set "
+        "trajectories.use_full_range to false if it is true."
     )
 
 

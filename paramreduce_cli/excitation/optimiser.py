@@ -95,7 +95,7 @@ def optimise_trajectory(
         progress: Told the share of the work done, 0 to 1.
 
     Raises:
-        DataError: No motion keeps the bounds; says which one stops it.
+        ConfigError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
     search = _Search(excitation, settings)

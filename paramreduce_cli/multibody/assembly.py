@@ -7,6 +7,7 @@ so that one singular configuration is not taken for a property of the mechanism.
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Iterable
 
 import casadi as ca
 import numpy as np
@@ -43,11 +44,12 @@ def assembled(mechanism: Mechanism) -> Mechanism:
             "description.tree.independent: all coordinates are named, so that the closures have "
             "none left to determine. Leave out those that the loops determine."
         )
-    q = _closed(equations, mechanism, loops)
-    configurations = [q, *_moved(equations, q)]
-    jacobians = [equations.jacobian(c) for c in configurations]
+    nearest = _closed(equations, mechanism, loops, range(mechanism.n_q))
+    jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
     _check_redundancy(mechanism, jacobians)
     _check_choice(mechanism, jacobians)
+    q = _closed(equations, mechanism, loops, mechanism.dependent)
+    _check_regular(mechanism, equations.jacobian(q))
     return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
 
 
@@ -66,20 +68,22 @@ class _Equations:
         return np.array(self._function(q)[1])
 
 
-def _closed(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
-    """Move the dependent coordinates until the loops are closed."""
-    dependent = list(mechanism.dependent)
+def _closed(
+    equations: _Equations, mechanism: Mechanism, loops: Loops, moving: Iterable[int]
+) -> FloatArray:
+    """Move some coordinates from the guess until the loops are closed."""
+    free = list(moving)
     start = loops.assembly
 
-    def whole(d: FloatArray) -> FloatArray:
+    def whole(values: FloatArray) -> FloatArray:
         q = start.copy()
-        q[dependent] = d
+        q[free] = values
         return q
 
     found = scipy.optimize.least_squares(
-        lambda d: equations.gap(whole(d)),
-        start[dependent],
-        jac=lambda d: equations.jacobian(whole(d))[:, dependent],
+        lambda values: equations.gap(whole(values)),
+        start[free],
+        jac=lambda values: equations.jacobian(whole(values))[:, free],
         method="trf",
         x_scale="jac",
         xtol=1e-15,
@@ -94,12 +98,15 @@ def _closed(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatA
         worst = int(np.argmax(gaps))
         before = float(np.abs(equations.gap(start)).max())
         fixed = ", ".join(
-            f"{mechanism.generalised_names[k]} = {start[k]:g}" for k in mechanism.independent
+            f"{mechanism.generalised_names[k]} = {start[k]:g}"
+            for k in range(mechanism.n_q)
+            if k not in free
         )
         raise ConfigError(
-            f"description.tree.guess: the loops cannot be closed from it with {fixed}: at the guess "
-            f"they are {before:.3g} m open, and at best {gaps[worst]:.3g} m, at {names[worst]}. "
-            "Give a guess nearer to an assembly, or check lengths and frames."
+            f"description.tree.guess: the loops cannot be closed from it"
+            f"{f' with {fixed}' if fixed else ''}: at the guess they are {before:.3g} m open, and at "
+            f"best {gaps[worst]:.3g} m, at {names[worst]}. Give a guess nearer to an assembly, or "
+            "check lengths and frames."
         )
     return q
 
@@ -186,7 +193,12 @@ def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
             "them to each other, and leave others undetermined. Choose others, for example "
             f"{suggestion}."
         )
-    if ratios[0] <= _RANK:
+
+
+def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
+    sizes = np.linalg.svd(jacobian[:, list(mechanism.dependent)], compute_uv=False)
+    if sizes[-1] <= _RANK * sizes[0]:
+        named = (mechanism.generalised_names[k] for k in mechanism.independent)
         raise ConfigError(
             "description.tree.guess: the assembly it leads to is a singular configuration, in which "
             f"{', '.join(named)} do not determine the other coordinates. Give a guess away from it."

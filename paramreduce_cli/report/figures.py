@@ -114,6 +114,11 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
             axes.plot(*np.array([start, middle, end]).T, **link)
         elif skeleton.kinds[i] == "revolute":  # what slides is not tied to where it slides from
             axes.plot(*np.array([middle if parent < 0 else start, middle, end]).T, **link)
+        if skeleton.kinds[i] == "hidden":
+            continue
+        if skeleton.closures and skeleton.kinds[i] == "prismatic":
+            rail = np.array([middle, end]).T
+            axes.plot(*rail, color="#2f8f5b", linewidth=1, linestyle=":")
         axis = skeleton.joints[i][:3, 2] * 0.14 * half
         ends = np.array([middle - axis, middle + axis]).T
         colour = "#d9730d" if skeleton.kinds[i] == "revolute" else "#2f8f5b"

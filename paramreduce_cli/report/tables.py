@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import unicodedata
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,22 @@ class Table:
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
+
+    def to_text(self) -> str:
+        """Aligned columns under the title."""
+        lines = [self.header, *self.rows]
+        widths = [max(_width(line[k]) for line in lines) for k in range(len(self.header))]
+
+        def aligned(cells: tuple[str, ...]) -> str:
+            padded = (
+                cell + " " * (width - _width(cell))
+                for cell, width in zip(cells, widths, strict=True)
+            )
+            return "  ".join(padded).rstrip()
+
+        rule = "  ".join("-" * width for width in widths)
+        body = [aligned(self.header), rule, *map(aligned, self.rows)]
+        return "\n".join([self.title, "", *body]) + "\n"
 
     def to_csv(self) -> str:
         """Comma-separated values with a header line."""
@@ -48,7 +65,13 @@ class Table:
         return "\n".join(lines) + "\n"
 
 
+def _width(text: str) -> int:
+    """Columns that a text takes; accents stand on the letter before them."""
+    return sum(1 for character in text if not unicodedata.combining(character))
+
+
 _SYMBOLS = {
+    "n_φ": r"$n_\varphi$",
     "κ": r"$\kappa$",
     "ε_τ": r"$\varepsilon_\tau$",
     "ε_z̈": r"$\varepsilon_{\ddot z}$",

@@ -12,6 +12,7 @@ from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.records import (
     BASE,
+    Body,
     FloatArray,
     Mechanism,
     Model,
@@ -119,9 +120,15 @@ def _skeleton(model: Model, q: FloatArray) -> Skeleton:
         masses=centres,
         joints=np.array(joints),
         parents=tuple(body.parent for body in mechanism.bodies),
-        kinds=tuple(body.joint for body in mechanism.bodies),
+        kinds=tuple(_drawn_as(body) for body in mechanism.bodies),
         closures=tuple(_closure_path(mechanism, poses)),
     )
+
+
+def _drawn_as(body: Body) -> str:
+    """How a joint is drawn; slides inside a free joint are no parts of the mechanism."""
+    inside = body.massless and ":" in body.name and body.joint == "prismatic"
+    return "hidden" if inside else body.joint
 
 
 def _closure_path(mechanism: Mechanism, poses: FloatArray) -> Iterator[FloatArray]:

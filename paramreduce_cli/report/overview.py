@@ -1,0 +1,58 @@
+"""One table over several robots: what their selected models are worth [Ros2019], Table 13."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from paramreduce_cli.report.tables import Table, percent
+
+Summary = Mapping[str, Any]
+
+_HEADER = (
+    "robot", "heuristic", "n_φ", "r", "n",
+    "d", "d, n", "saved", "ε_τ E", "ε_τ V",
+    "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V",
+)  # fmt: skip
+
+
+def overview(summaries: Sequence[Summary]) -> Table:
+    """The selected model of every robot beside its full one, inverse and direct dynamics.
+
+    Args:
+        summaries: Contents of ``summary.json``.
+
+    Raises:
+        KeyError: A summary lacks an entry.
+    """
+    return Table("Reduced models", _HEADER, tuple(_row(summary) for summary in summaries))
+
+
+def _row(summary: Summary) -> tuple[str, ...]:
+    model, selected = summary["model"], summary["selected"]
+    return (
+        summary["robot"],
+        selected["heuristic"],
+        str(model["n_affecting"]),
+        str(model["n_base"]),
+        str(selected["n"]),
+        *_function(summary, "inverse", "torque_error"),
+        *_function(summary, "direct", "acceleration_error"),
+    )
+
+
+def _function(summary: Summary, name: str, error: str) -> tuple[str, ...]:
+    full = int(summary["full"][f"operations_{name}"])
+    reduced = int(summary["selected"]["operations"][name])
+    errors = summary["selected"][error]
+    return (
+        str(full),
+        str(reduced),
+        f"{100 * (1 - reduced / full):.0f} %" if full else "-",
+        _share(errors["estimation"]),
+        _share(errors["validation"]),
+    )
+
+
+def _share(value: float | None) -> str:
+    return percent(float("inf") if value is None else value)
