@@ -20,6 +20,7 @@ COMMANDS = [stage.name for stage in pipeline()] + [
     "init",
     "inspect",
     "compare",
+    "table",
     "graph",
 ]
 TWO_LINK = CONFIGS / "two_link.yaml"

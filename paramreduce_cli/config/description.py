@@ -122,6 +122,12 @@ Direction = Annotated[
 ]
 """``x``, ``y``, ``z``, ``-x``, ... or [x, y, z] of any length."""
 
+
+def _as_directions(value: Any) -> Any:
+    plain = isinstance(value, list) and value and isinstance(value[0], int | float)
+    return [value] if plain or not isinstance(value, list) else value
+
+
 _ONE_OR_MORE_DIRECTIONS = WithJsonSchema(
     {"anyOf": [_DIRECTION, {"type": "array", "items": _DIRECTION}]}
 )
@@ -138,7 +144,7 @@ class TreeBody(Section):
     """Body it is mounted on."""
     joint: JointKind = "revolute"
     """`universal` turns about two axes, `spherical` about x, y and z, `free` slides along x, y and z, then turns about them."""
-    axes: Annotated[list[Direction], BeforeValidator(as_list), _ONE_OR_MORE_DIRECTIONS] = []
+    axes: Annotated[list[Direction], BeforeValidator(_as_directions), _ONE_OR_MORE_DIRECTIONS] = []
     """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
     at: Placement = []
     """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""

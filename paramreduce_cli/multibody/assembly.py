@@ -177,9 +177,9 @@ def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
     suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
     if len(named) != freedom:
         raise ConfigError(
-            f"description.tree.independent: names {len(named)} coordinates, but the mechanism has "
-            f"{freedom} degrees of freedom: {mechanism.n_q} coordinates less {rows.size} independent "
-            f"equations. Name {freedom}, for example {suggestion}."
+            f"description.tree.independent: names {len(named)} coordinates, but {freedom} are "
+            f"independent: {mechanism.n_q} coordinates less {rows.size} independent equations. Name "
+            f"{freedom}, for example {suggestion}."
         )
     dependent = list(mechanism.dependent)
     ratios = []

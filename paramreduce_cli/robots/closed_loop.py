@@ -143,7 +143,7 @@ def rotation_to(axis: FloatArray) -> FloatArray:
             cyclic = np.roll(np.eye(3), k + 1, axis=0)
             return cyclic if unit[k] > 0 else cyclic @ np.diag([1.0, -1.0, -1.0])
     side = np.cross(_Z, unit)
-    c, s = unit[2], np.linalg.norm(side)
+    c, s = unit[2], np.hypot(side[0], side[1])
     x, y, z = side / s
     skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     result: FloatArray = np.eye(3) + s * skew + (1 - c) * skew @ skew

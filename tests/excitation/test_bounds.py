@@ -1,0 +1,86 @@
+"""Trajectories of closed loops that must keep bounds."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import CONFIGS
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.limits import LimitMap
+from paramreduce_cli.excitation.objective import FreeObjective, Level
+from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory, settings_basis
+from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.stages.build_model import build_model
+from paramreduce_cli.stages.description import described_constraints
+from paramreduce_cli.stages.optimize_trajectories import joint_settings
+
+
+@pytest.fixture(scope="module", params=["five_bar", "hexaglide"])
+def case(request):
+    config = load_config(CONFIGS / f"{request.param}.yaml")
+    model = build_model(config)
+    wanted = config.trajectories
+    constraints = described_constraints(config, model.mechanism)
+    excitation = excitation_of(
+        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling,
+        constraints,
+    )  # fmt: skip
+    settings = joint_settings(config, wanted.period, wanted.harmonics)
+    settings = dataclasses.replace(settings, starts=1, polished=1, max_iterations=40)
+    return excitation, settings, constraints
+
+
+def test_gradient_with_the_barrier_against_finite_differences(case):
+    excitation, settings, _ = case
+    search = _Search(excitation, settings)
+    start = search.start([0, 3])
+    assert start.kappa_start < 1e5  # beyond, round-off in the Gram matrix shows
+    objective = search._objective(Level(4, 80, 50, 0.1))
+    x = start.free.ravel()
+    value, gradient = objective(x)
+    assert np.isfinite(value)
+    rng = np.random.default_rng(0)
+    for _ in range(3):
+        direction = rng.normal(size=x.size)
+        step = 1e-5
+        slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
+            2 * step
+        )
+        assert slope == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-2)
+
+
+def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
+    excitation, settings, constraints = case
+    found = optimise_trajectory(excitation, settings, [7])
+    assert found.kappa < found.kappa_start
+    harmonics = (found.coefficients.shape[1] - 1) // 2
+    times = sample_times(settings.period, 4 * settings.points)
+    z, dz, _ = fourier_basis(settings.period, harmonics, times).states(found.coefficients)
+    limits = settings.limits
+    assert ((z >= limits.lower) & (z <= limits.upper) & (np.abs(dz) <= limits.velocity)).all()
+    q = Coordinates(excitation.coordinates.mechanism).positions(z, None)
+    values = Quantities(excitation.coordinates.mechanism, constraints).values(q)
+    assert (values >= [c.lower for c in constraints]).all()
+    assert (values <= [c.upper for c in constraints]).all()
+    assert found.extremes == pytest.approx(
+        np.column_stack([values.min(axis=0), values.max(axis=0)]), rel=1e-9
+    )
+
+
+def test_outside_the_bounds_there_is_no_value(case):
+    excitation, settings, _ = case
+    basis = settings_basis(settings)
+    limits = LimitMap(settings.limits, basis, settings.mapping)
+    positions = Follower(excitation.coordinates)
+    n = limits.n_dof
+    objective = FreeObjective(
+        excitation, basis, limits, Level(4, 40, 50, 0.1), positions, np.eye(n)
+    )
+    far = np.random.default_rng(1).normal(size=n * limits.n_columns) * 10
+    value, gradient = objective(far)
+    assert np.isnan(value)
+    assert np.isnan(gradient).all()

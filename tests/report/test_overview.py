@@ -1,0 +1,51 @@
+import csv
+import io
+import json
+
+import pytest
+
+from paramreduce_cli.report.overview import overview
+
+
+@pytest.fixture
+def summary(two_link_results):
+    return json.loads((two_link_results / "report" / "summary.json").read_text())
+
+
+def test_one_row_per_robot_with_the_selected_model(summary):
+    other = {**summary, "robot": "other"}
+    table = overview([summary, other])
+    assert [row[0] for row in table.rows] == ["two_link", "other"]
+    row = dict(zip(table.header[:7], table.rows[0][:7], strict=True))
+    selected = summary["selected"]
+    assert row["heuristic"] == selected["heuristic"]
+    assert int(row["n"]) == selected["n"]
+    assert int(row["d"]) == summary["full"]["operations_inverse"]
+    assert int(row["d, n"]) == selected["operations"]["inverse"]
+    rows = list(csv.reader(io.StringIO(table.to_csv())))
+    assert {len(row) for row in rows} == {15}
+    assert table.to_latex().count("&") == 3 * 14
+    assert "two_link" in table.to_text()
+
+
+def test_the_command_writes_text_csv_and_latex(invoke, two_link_results, tmp_path):
+    code, out, _ = invoke("table", two_link_results, "--output", tmp_path / "all")
+    assert code == 0
+    assert "two_link" in out
+    assert (tmp_path / "all.txt").read_text() in out
+    assert (tmp_path / "all.csv").read_text().startswith("robot,heuristic")
+    assert r"\begin{tabular}" in (tmp_path / "all.tex").read_text()
+
+
+def test_folders_without_a_report(invoke, tmp_path):
+    code, _, err = invoke("table", tmp_path)
+    assert code == 2
+    assert "summary.json: there is no such file" in err
+    assert not (tmp_path / "table.csv").exists()
+
+
+def test_a_summary_of_another_version(invoke, tmp_path):
+    (tmp_path / "old.json").write_text('{"robot": "old"}')
+    code, _, err = invoke("table", tmp_path / "old.json", "--output", tmp_path / "all")
+    assert code == 2
+    assert "is no summary of this version" in err
