@@ -142,11 +142,11 @@ def rotation_to(axis: FloatArray) -> FloatArray:
         if np.array_equal(np.abs(unit), direction):
             cyclic = np.roll(np.eye(3), k + 1, axis=0)
             return cyclic if unit[k] > 0 else cyclic @ np.diag([1.0, -1.0, -1.0])
-    side = np.cross(_Z, unit)
-    c, s = unit[2], np.hypot(side[0], side[1])
-    x, y, z = side / s
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    result: FloatArray = np.eye(3) + s * skew + (1 - c) * skew @ skew
+    if unit[2] < 0:
+        return rotation_to(-unit) @ np.diag([1.0, -1.0, -1.0])
+    x, y, c = unit
+    skew = np.array([[0, 0, x], [0, 0, y], [-x, -y, 0]])  # of z cross the axis
+    result: FloatArray = np.eye(3) + skew + skew @ skew / (1 + c)
     return result
 
 
