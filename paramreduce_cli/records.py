@@ -320,14 +320,25 @@ class Samples:
 
 
 @dataclass(frozen=True)
-class Ordering:
+class BySize:
+    """Arrays with one row for every size of subset."""
+
+    n: IntArray
+    """Sizes of the subsets: 1, 2, ... unless columns are chosen in groups, (m,)."""
+
+    def row(self, n: int) -> int | None:
+        """Where the subset of size n stands in the arrays; None if there is none."""
+        rows = np.flatnonzero(self.n == n)
+        return int(rows[0]) if rows.size else None
+
+
+@dataclass(frozen=True)
+class Ordering(BySize):
     """What one heuristic found: a subset of parameters for every n."""
 
     heuristic: str
     order: IntArray
     """Column indices, the first n of which are the subset of size n."""
-    n: IntArray
-    """Sizes of the subsets: 1, 2, ... unless columns are chosen in groups, (m,)."""
     torque_error: FloatArray
     """Weighted Euclidean error on the estimation set of each subset, (m,)."""
     torque_error_1: FloatArray
@@ -345,11 +356,6 @@ class Ordering:
     def subset(self, n: int) -> IntArray:
         """The columns of the subset of size n, (n,)."""
         return self.order[:n]
-
-    def row(self, n: int) -> int | None:
-        """Where the subset of size n stands in the arrays; None if there is none."""
-        rows = np.flatnonzero(self.n == n)
-        return int(rows[0]) if rows.size else None
 
 
 @dataclass(frozen=True)
@@ -373,10 +379,9 @@ class Reduction:
 
 
 @dataclass(frozen=True)
-class HeuristicValidation:
+class HeuristicValidation(BySize):
     """Errors and costs of one heuristic's subsets; every array has one row per subset."""
 
-    n: IntArray
     torque_error_estimation: FloatArray
     torque_error_validation: FloatArray
     torque_error_joint_estimation: FloatArray
@@ -394,11 +399,6 @@ class HeuristicValidation:
     operations_direct: IntArray
     operations_inverse_paper_rule: IntArray
     operations_direct_paper_rule: IntArray
-
-    def row(self, n: int) -> int | None:
-        """Where the subset of size n stands in the arrays; None if there is none."""
-        rows = np.flatnonzero(self.n == n)
-        return int(rows[0]) if rows.size else None
 
 
 @dataclass(frozen=True)

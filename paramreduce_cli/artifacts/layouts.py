@@ -67,10 +67,15 @@ def _loops_from_json(data: dict[str, Any]) -> Loops:
 
 
 def _constraints_to_json(constraints: tuple[Constraint, ...]) -> str:
-    def plain(value: Any) -> Any:
-        return value.tolist()
+    def plain(constraint: Constraint) -> dict[str, Any]:
+        bounds = {
+            key: value if np.isfinite(value) else None
+            for key, value in (("lower", constraint.lower), ("upper", constraint.upper))
+        }
+        vectors = [vector.tolist() for vector in constraint.vectors]
+        return {**dataclasses.asdict(constraint), "vectors": vectors, **bounds}
 
-    return json.dumps([dataclasses.asdict(c) for c in constraints], default=plain)
+    return json.dumps([plain(constraint) for constraint in constraints], allow_nan=False)
 
 
 def _constraints_from_json(text: str) -> tuple[Constraint, ...]:
@@ -80,6 +85,8 @@ def _constraints_from_json(text: str) -> tuple[Constraint, ...]:
                 **entry,
                 "bodies": tuple(entry["bodies"]),
                 "vectors": tuple(np.array(vector) for vector in entry["vectors"]),
+                "lower": -np.inf if entry["lower"] is None else entry["lower"],
+                "upper": np.inf if entry["upper"] is None else entry["upper"],
             }
         )
         for entry in json.loads(text)

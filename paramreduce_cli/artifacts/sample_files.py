@@ -45,9 +45,9 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
             n_q = block.q.shape[1]
             if n_q != n_dof:  # loops: the independent coordinates are not all there is
                 appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
-        for key in appenders.keys() - {"trajectory"}:
-            appenders[key](getattr(block, key))
-        appenders["trajectory"](np.full(block.time.size, float(block.trajectory)))
+        for key, append in appenders.items():  # in this order: the digest depends on it
+            own = np.full(block.time.size, float(block.trajectory))
+            append(own if key == "trajectory" else getattr(block, key))
         accumulator.add(block)
     writer.dataset(f"{name}/factors", accumulator.result())
 

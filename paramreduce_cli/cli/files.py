@@ -21,7 +21,7 @@ from paramreduce_cli.config.schema import NAME
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.multibody.relations import approximate_expressions
-from paramreduce_cli.records import Reduction, Report
+from paramreduce_cli.records import Ordering, Reduction, Report
 from paramreduce_cli.report.comparison import (
     QUANTITIES,
     TOLERANCES,
@@ -29,7 +29,7 @@ from paramreduce_cli.report.comparison import (
     Tolerance,
     compare,
 )
-from paramreduce_cli.report.overview import overview
+from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.workflow import FORMATS
 
 DIFFERENT = 1
@@ -102,7 +102,7 @@ def _say_model(file: Path, chosen: str) -> None:
     ordering = reduction.orderings.get(name)
     row = ordering.row(int(number)) if ordering is not None and number.isdigit() else None
     if ordering is None or row is None:
-        known = ", ".join(f"{k}:1...{o.n[-1]}" for k, o in reduction.orderings.items())
+        known = ", ".join(f"{k}:{_sizes(o)}" for k, o in reduction.orderings.items())
         raise ConfigError(f"--model {chosen}: there is {known}.")
     n = int(number)
     kept = ordering.subset(n)
@@ -111,6 +111,12 @@ def _say_model(file: Path, chosen: str) -> None:
     say(f"{name}, n = {n}, torque error {ordering.torque_error[row]:.6g}{flag}")
     for value, text in zip(ordering.parameters[row], texts, strict=True):
         say(f"{value: .9e}  =  {text}")
+
+
+def _sizes(ordering: Ordering) -> str:
+    if ordering.n[-1] == ordering.n.size:
+        return f"1...{ordering.n[-1]}"
+    return "|".join(map(str, ordering.n))
 
 
 @click.command(name="compare")
@@ -188,13 +194,13 @@ def table_command(results: tuple[Path, ...], output: Path | None) -> None:
 
     Example: paramreduce table results/puma560 results/hexaglide
     """
-    summaries = []
+    rows = []
     for path in results:
-        summaries.append(_load_summary(path))
         try:
-            made = overview(summaries)
-        except (KeyError, TypeError) as error:
+            rows.append(overview_row(_load_summary(path)))
+        except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(f"{path}: is no summary of this version ({error}).") from error
+    made = overview(rows)
     prefix = output or results[0].resolve().parent / "table"
     for suffix, text in (
         ("txt", made.to_text()), ("csv", made.to_csv()), ("tex", made.to_latex()),

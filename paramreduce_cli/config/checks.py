@@ -66,6 +66,8 @@ def _loops(config: Config) -> Iterator[Problem]:
         for j, name in enumerate(closure.bodies):
             if name not in bodies:
                 yield (*path, "closures", k, "bodies", j), unknown("body", name, bodies)
+        if closure.name is not None and closure.name in {c.name for c in tree.closures[:k]}:
+            yield (*path, "closures", k, "name"), f"{closure.name!r} is taken"
         if closure.bodies[0] == closure.bodies[1]:
             yield (*path, "closures", k, "bodies"), f"ties {closure.bodies[0]!r} to itself"
     for k, name in enumerate(tree.independent):
@@ -103,8 +105,12 @@ def _constraints(config: Config) -> Iterator[Problem]:
             yield (*path, "quantity"), "singularity is of loops, but there is no closure"
 
 
+def _known_parameters(config: Config) -> list[str]:
+    return [f"{kind}_{body}" for body in config.body_names() for kind in PARAMETER_KINDS]
+
+
 def _groups(config: Config) -> Iterator[Problem]:
-    known = [f"{kind}_{body}" for body in config.body_names() for kind in PARAMETER_KINDS]
+    known = _known_parameters(config)
     owner: dict[str, str] = {}
     for k, entry in enumerate(config.reduction.groups):
         path: Path = ("reduction", "groups", k)
@@ -117,8 +123,10 @@ def _groups(config: Config) -> Iterator[Problem]:
         for group, members in entry.groups().items():
             if group in known or group in owner.values():
                 yield (*path, "name"), f"the name {group!r} is taken"
-            for name in members:
-                if name in owner:
+            for j, name in enumerate(members):
+                if name in members[:j]:
+                    yield path, f"{name} stands there twice"
+                elif name in owner:
                     yield path, f"{name} is in the group {owner[name]} already"
             owner |= dict.fromkeys(members, group)
 
@@ -131,6 +139,13 @@ def _symmetries(config: Config) -> Iterator[Problem]:
                 ("sampling", "symmetries", k),
                 f"must name each independent coordinate once: {', '.join(names)}",
             )
+    if config.sampling.symmetries and config.sampling.estimation_file is not None:
+        yield ("sampling", "symmetries"), "complete trajectories, not recordings; leave them out"
+
+
+def _massless(config: Config) -> Iterator[Problem]:
+    if not config.body_names():
+        yield ("description", "tree", "bodies"), "are all massless, so that there is no parameter"
 
 
 def _parameter_sets(config: Config) -> Iterator[Problem]:
@@ -210,7 +225,7 @@ def _limits(config: Config) -> Iterator[Problem]:
 
 
 def _parameter_names(config: Config) -> Iterator[Problem]:
-    known = [f"{kind}_{body}" for body in config.body_names() for kind in PARAMETER_KINDS]
+    known = _known_parameters(config)
     for k, name in enumerate(config.model.base_columns or []):
         if name not in known:
             yield ("model", "base_columns", k), unknown("parameter", name, known)
@@ -245,6 +260,7 @@ _CHECKS: tuple[Check, ...] = (
     _constraints,
     _groups,
     _symmetries,
+    _massless,
     _parameter_sets,
     _per_joint,
     _limits,

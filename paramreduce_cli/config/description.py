@@ -211,6 +211,8 @@ class TreeDescription(Section):
     def _with_closures(self) -> TreeDescription:
         if bool(self.closures) != bool(self.independent):
             raise ValueError("closures and independent belong together; give both or neither")
+        if self.guess and not self.closures:
+            raise ValueError("a guess is for closing loops, but there are no closures")
         return self
 
     def coordinate_names(self) -> list[str]:

@@ -111,24 +111,27 @@ def _similar(path: Path) -> str:
 
 def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
     """Structural errors first; then, with those cut out, whatever the rest still reveals."""
+    constants, unreadable = read_constants(data.get("constants"))
+    mistaken: list[Problem] = [(("constants", name), text) for name, text in unreadable.items()]
     try:
-        config = _parse(data)
-        return config, check(config)
+        config = _parse(data, constants)
+        return config, mistaken + check(config)
     except ValidationError as error:
-        problems = _one_per_key([_describe(entry, data) for entry in error.errors()])
+        problems = mistaken + _one_per_key([_describe(entry, data) for entry in error.errors()])
     remainder = copy.deepcopy(data)
     for path, _ in sorted(problems, key=lambda p: len(p[0]), reverse=True):
         _cut(remainder, path)
     try:
-        rest = check(_parse(remainder))
+        rest = check(_parse(remainder, constants))
     except ValidationError:
         rest = []
     wrong = [path for path, _ in problems]
     return None, problems + [p for p in rest if not any(_touches(p[0], w) for w in wrong)]
 
 
-def _parse(data: dict[str, Any]) -> Config:
-    constants = read_constants(data.get("constants"))
+def _parse(data: dict[str, Any], constants: dict[str, float]) -> Config:
+    if isinstance(data.get("constants"), dict):
+        data = {**data, "constants": constants}
     return Config.model_validate(data, context={"constants": constants})
 
 

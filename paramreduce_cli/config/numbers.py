@@ -99,19 +99,26 @@ def _whole(value: Any, info: ValidationInfo) -> int:
     return int(result)
 
 
-def read_constants(given: Any) -> dict[str, float]:
+def read_constants(given: Any) -> tuple[dict[str, float], dict[str, str]]:
     """Values of a config's ``constants``, each of which may use those above it.
 
-    What cannot be read counts as one here, so that only its own key is reported as wrong.
+    Returns:
+        Values by name, and what is wrong by name. What cannot be read counts as one, so that
+        only its own key is reported.
     """
     values: dict[str, float] = {}
-    if isinstance(given, dict):
-        for name, value in given.items():
-            try:
-                values[str(name)] = parse_number(value, values)
-            except ValueError:
-                values[str(name)] = 1.0
-    return values
+    wrong: dict[str, str] = {}
+    for name, value in given.items() if isinstance(given, dict) else ():
+        if not name.isidentifier() or name in _CONSTANTS:
+            wrong[name] = (
+                "cannot be the name of a constant; use letters, digits and _, not pi or inf"
+            )
+            continue
+        try:
+            values[name] = parse_number(value, values)
+        except ValueError as error:
+            values[name], wrong[name] = 1.0, str(error)
+    return values, wrong
 
 
 _TEXT_OR_NUMBER = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})

@@ -148,10 +148,11 @@ class ConstraintSection(Section):
             raise ValueError("give min or max, or both")
         if self.min is not None and self.max is not None and self.min >= self.max:
             raise ValueError(f"the bounds cross: {self.min:g} is not below {self.max:g}")
-        if self.quantity.startswith("distance") and (self.max or 1.0) <= 0:
-            raise ValueError("a distance needs a max above zero")
-        if self.quantity == "angle" and not 0 <= (self.min or 0.0) <= (self.max or np.pi) <= np.pi:
-            raise ValueError("an angle between axes goes from 0 to pi")
+        given_bounds = [bound for bound in (self.min, self.max) if bound is not None]
+        if self.quantity.startswith("distance") and min(given_bounds) <= 0:
+            raise ValueError("bounds of a distance are above zero")
+        if self.quantity == "angle" and not all(0 < bound < np.pi for bound in given_bounds):
+            raise ValueError("bounds of an angle between axes are between 0 and pi")
         if self.quantity == "singularity" and (self.max is not None or not 0 < (self.min or 0) < 1):
             raise ValueError("distance to singularity takes a min between 0 and 1 and no max")
         return self

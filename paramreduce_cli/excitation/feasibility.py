@@ -21,20 +21,30 @@ FINER = 4
 _SMALLEST_SHARE = 1e-3
 _SHRINKS = 0.8
 _HALVINGS = 12
+_FAR = 1e6
+"""Stands for an infinite excess in the search."""
+_WELL_INSIDE = 0.05
 _INSET = 0.98
 """Share of the position range in which a resting position is looked for."""
 
 
-def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
+def resting_position(
+    excitation: Excitation, limits: JointLimits, margin: float = 1.0
+) -> FloatArray:
     """Independent coordinates inside all limits and bounds, (n_dof,).
 
     The middle of the limits, or the assembly, or what a search from there finds.
+
+    Args:
+        excitation: With the bounds.
+        limits: Of the independent coordinates.
+        margin: Share of the limits that may be used.
 
     Raises:
         ConfigError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
-    middle, reach = limits.middle, _INSET * limits.reach
+    middle, reach = limits.middle, _INSET * margin * limits.reach
     tried = [middle]
     if mechanism.loops is not None:
         home = mechanism.loops.assembly[list(mechanism.independent)]
@@ -47,9 +57,10 @@ def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
         if worst(z).excess < 0:
             return z
         found = scipy.optimize.minimize(
-            lambda z: min(worst(z).excess, 1e6),
+            lambda z: float(np.clip(worst(z).excess, -1.0, _FAR)),
             z,
             method="Nelder-Mead",
+            callback=_stop_inside,
             bounds=np.column_stack([middle - reach, middle + reach]),
             options={"maxfev": 200 * z.size, "xatol": 1e-6, "fatol": 1e-9},
         )
@@ -64,6 +75,12 @@ def resting_position(excitation: Excitation, limits: JointLimits) -> FloatArray:
         f"within the position limits: {nearest.name} stands in the way. Loosen it or the position "
         "limits."
     )
+
+
+def _stop_inside(intermediate_result: scipy.optimize.OptimizeResult) -> None:
+    """End the search well inside the bounds."""
+    if intermediate_result.fun < -_WELL_INSIDE:
+        raise StopIteration
 
 
 def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective) -> FloatArray:
@@ -112,6 +129,9 @@ def drawn_inside(
         rest: Independent coordinates inside all bounds, (n_dof,).
         period: s
         points: Of the grid that was optimised on.
+
+    Raises:
+        ConfigError: Hardly any motion keeps them there.
     """
     basis = fine_basis(period, (coefficients.shape[1] - 1) // 2, points)
     still = np.zeros_like(coefficients)
@@ -137,6 +157,11 @@ def drawn_inside(
     for _ in range(_HALVINGS):
         middle = (low + high) / 2
         low, high = (middle, high) if inside(middle) else (low, middle)
+    if low == 0.0:
+        raise ConfigError(
+            "trajectories.points: the grid is too coarse to keep the constraints between its points. "
+            "Use more."
+        )
     return drawn(low)
 
 

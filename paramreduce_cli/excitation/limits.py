@@ -67,14 +67,14 @@ class LimitMap:
         points, columns = basis.position.shape
         self.n_dof = limits.middle.size
         self.n_columns = columns
-        self._margin = grid_margin((columns - 1) // 2, points)
+        self.margin = grid_margin((columns - 1) // 2, points)
         self._mapping = mapping
         self._middle, self._reach = limits.middle, limits.reach
-        self._positions = _harmonic_shares(basis.position, limits.reach * self._margin)
+        self._positions = _harmonic_shares(basis.position, limits.reach * self.margin)
         self._rates = np.concatenate(
             [
-                _harmonic_shares(basis.velocity, limits.velocity * self._margin),
-                _harmonic_shares(basis.acceleration, limits.acceleration * self._margin),
+                _harmonic_shares(basis.velocity, limits.velocity * self.margin),
+                _harmonic_shares(basis.acceleration, limits.acceleration * self.margin),
             ],
             axis=1,
         )
@@ -119,7 +119,7 @@ class LimitMap:
         room = 1 - span / divisor
 
         def pull(bar: FloatArray) -> FloatArray:
-            centre_bar = bar[:, 0] * self._reach * self._margin
+            centre_bar = bar[:, 0] * self._reach * self.margin
             room_bar = centre_bar * _squashed(offset)
             # Harmonics, centre and room all divide by the same number.
             along = np.sum(bar[:, 1:] * harmonics, axis=1)
@@ -137,7 +137,7 @@ class LimitMap:
 
     def resting_offset(self, z: FloatArray) -> FloatArray:
         """Free offsets of joints that rest at ``z``, both (n_dof,)."""
-        share = (z - self._middle) / (self._reach * self._margin)
+        share = (z - self._middle) / (self._reach * self.margin)
         share = np.clip(share, -_FURTHEST, _FURTHEST)
         return share / np.sqrt(1 - share**2)
 
@@ -154,7 +154,7 @@ class LimitMap:
         """Put the offset where the motion stays in its range, whatever the free offset is."""
         centre, room = (down - up) / 2, 1 - (up + down) / 2
         share = centre + room * _squashed(offset)
-        return np.column_stack([self._middle + self._reach * self._margin * share, harmonics])
+        return np.column_stack([self._middle + self._reach * self.margin * share, harmonics])
 
 
 def _harmonic_shares(motion: FloatArray, limits: FloatArray) -> FloatArray:

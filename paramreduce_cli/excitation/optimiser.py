@@ -147,7 +147,7 @@ class _Search:
         self._rest = settings.limits.middle
         self._mixing = np.eye(mechanism.n_dof)
         if self._bounded:
-            self._rest = resting_position(excitation, settings.limits)
+            self._rest = resting_position(excitation, settings.limits, self._limits.margin)
             R = excitation.coordinates.tangent(self._positions(self._rest[None]))[0]
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T

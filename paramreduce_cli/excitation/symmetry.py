@@ -11,7 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import FloatArray
+
+_MOST = 200
 
 
 @dataclass(frozen=True)
@@ -40,6 +43,9 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
         given: For each, the names of the coordinates that move in place of each one in turn,
             ``-NAME`` where it moves the other way.
         names: Of the independent coordinates, (n_dof,).
+
+    Raises:
+        ConfigError: They generate too many.
     """
     generators = [
         Symmetry(
@@ -49,11 +55,18 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
         for images in given
     ]
     found = [Symmetry(tuple(range(len(names))), (1,) * len(names))]
+    known = set(found)
     for element in found:  # grows while it is walked through, until nothing new comes
         for generator in generators:
             product = generator.after(element)
-            if product not in found:
+            if product not in known:
+                known.add(product)
                 found.append(product)
+        if len(found) > _MOST:
+            raise ConfigError(
+                f"sampling.symmetries generate more than {_MOST} images of every trajectory; that is "
+                "no symmetry of a mechanism."
+            )
     return found
 
 

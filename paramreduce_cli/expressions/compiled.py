@@ -35,7 +35,10 @@ int paramreduce_batch(long long n, const double* const* in, const long long* in_
   for (long long k = 0; k < n; ++k) {{
     for (int i = 0; i < {n_in}; ++i) arg[i] = in[i] + k * in_size[i];
     for (int i = 0; i < {n_out}; ++i) res[i] = out[i] + k * out_size[i];
-    if (kernel(arg, res, 0, work, 0)) return 1;
+    if (kernel(arg, res, 0, work, 0)) {{
+      for (int i = 0; i < {n_out}; ++i)
+        for (long long j = 0; j < out_size[i]; ++j) out[i][k * out_size[i] + j] = 0.0 / 0.0;
+    }}
   }}
   return 0;
 }}
@@ -52,7 +55,13 @@ class BatchFunction:
         once: Whether it is evaluated so little that compiling it does not pay.
     """
 
-    def __init__(self, inputs: list[ca.SX], outputs: list[ca.SX], *, once: bool = False) -> None:
+    def __init__(
+        self,
+        inputs: list[ca.SX] | list[ca.MX],
+        outputs: list[ca.SX] | list[ca.MX],
+        *,
+        once: bool = False,
+    ) -> None:
         dense = ca.cse([ca.densify(ca.vec(output)) for output in outputs])
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
@@ -66,7 +75,8 @@ class BatchFunction:
             arrays: One per input, each (n_samples, size of the input).
 
         Returns:
-            One per output, each (n_samples, size of the output).
+            One per output, each (n_samples, size of the output); not a number in a sample whose
+            linear systems cannot be solved.
         """
         n = arrays[0].shape[0]
         ins = [
@@ -90,9 +100,13 @@ class BatchFunction:
     def _interpret(self, n: int, ins: list[FloatArray]) -> list[FloatArray]:
         if n == 0:
             return [np.empty((0, size)) for size in self._out_sizes]
-        results = self._function.map(n)(*[a.T for a in ins])
-        if len(self._out_sizes) == 1:
-            results = [results]
+        try:
+            results = self._function.map(n).call([ca.DM(a.T) for a in ins])
+        except RuntimeError:  # a linear system somewhere is singular
+            if n == 1:
+                return [np.full((1, size), np.nan) for size in self._out_sizes]
+            parts = [self._interpret(1, [a[k : k + 1] for a in ins]) for k in range(n)]
+            return [np.concatenate(column) for column in zip(*parts, strict=True)]
         return [np.ascontiguousarray(result.full().T) for result in results]
 
 

@@ -16,7 +16,8 @@ import scipy.optimize
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.multibody.base_parameters import independent_columns
 from paramreduce_cli.multibody.closures import closure_equations, equation_names
-from paramreduce_cli.records import FloatArray, IntArray, Loops, Mechanism
+from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.records import BASE, Closure, FloatArray, IntArray, Loops, Mechanism
 
 _CLOSED = 1e-9
 """Largest gap of an assembled loop, m."""
@@ -50,6 +51,7 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     _check_choice(mechanism, jacobians)
     q = _closed(equations, mechanism, loops, mechanism.dependent)
     _check_regular(mechanism, equations.jacobian(q))
+    _check_hinges(mechanism, q)
     return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
 
 
@@ -104,8 +106,8 @@ def _closed(
         )
         raise ConfigError(
             f"description.tree.guess: the loops cannot be closed from it"
-            f"{f' with {fixed}' if fixed else ''}: at the guess they are {before:.3g} m open, and at "
-            f"best {gaps[worst]:.3g} m, at {names[worst]}. Give a guess nearer to an assembly, or "
+            f"{f' with {fixed}' if fixed else ''}: at the guess they are open by {before:.3g}, and at "
+            f"best by {gaps[worst]:.3g}, at {names[worst]} (m, or no unit for a tilt). Give a guess nearer to an assembly, or "
             "check lengths and frames."
         )
     return q
@@ -140,7 +142,7 @@ def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, IntArray]:
 
 def _check_redundancy(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
     names = equation_names(mechanism)
-    jacobian, rows = _generic(jacobians)
+    _, rows = _generic(jacobians)
     if rows.size == mechanism.n_q:
         raise ConfigError(
             f"description.tree.closures: the loops are over-constrained: {rows.size} independent "
@@ -161,11 +163,9 @@ def _check_redundancy(mechanism: Mechanism, jacobians: list[FloatArray]) -> None
             f"independent; these follow from the ones before them wherever the loops are closed: "
             f"{', '.join(extra)}. Use closures with fewer equations.{hint}"
         )
-    if not np.isfinite(jacobian).all():
-        raise ConfigError("description.tree: the closures are not differentiable at the assembly.")
 
 
-def _closures(mechanism: Mechanism) -> tuple:
+def _closures(mechanism: Mechanism) -> tuple[Closure, ...]:
     return mechanism.loops.closures if mechanism.loops is not None else ()
 
 
@@ -203,6 +203,21 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
             "description.tree.guess: the assembly it leads to is a singular configuration, in which "
             f"{', '.join(named)} do not determine the other coordinates. Give a guess away from it."
         )
+
+
+def _check_hinges(mechanism: Mechanism, q: FloatArray) -> None:
+    """Refuse hinges that closed with their axes against each other, which the equations allow."""
+    poses = body_poses(mechanism, q)
+    for closure in _closures(mechanism):
+        a, b = (
+            frame[:3, 2] if body == BASE else poses[body, :3, :3] @ frame[:3, 2]
+            for body, frame in zip(closure.bodies, closure.frames, strict=True)
+        )
+        if closure.kind == "revolute" and a @ b < 0:
+            raise ConfigError(
+                f"description.tree.guess: {closure.name} closes with its two z axes against each "
+                "other. Give a guess in which they agree, or turn one of its frames by {rx: pi}."
+            )
 
 
 def _well_chosen(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:

@@ -15,6 +15,7 @@ from paramreduce_cli.multibody.kinematics import (
     dot,
     motions,
     point_in_base,
+    subtract,
 )
 from paramreduce_cli.records import Closure, Mechanism
 
@@ -49,7 +50,7 @@ def equation_names(mechanism: Mechanism) -> tuple[str, ...]:
 def _equations(joints: list[JointMotion], closure: Closure) -> list[ca.SX]:
     (a, b), (A, B) = closure.bodies, closure.frames
     start, end = point_in_base(joints, a, A[:3, 3]), point_in_base(joints, b, B[:3, 3])
-    gap: Vector = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    gap = subtract(end, start)
     if closure.kind == "distance":
         length = closure.length
         return [(dot(gap, gap) - length**2) / (2 * length)]

@@ -163,7 +163,8 @@ class Coordinates:
             step[active[~good]] = length[~good] / 2
             made[made > 1 - 1e-12] = 1.0
             active = active[(made[active] < 1) & (step[active] >= _SHORTEST_STEP)]
-        q[made == 1][:, self._independent] = z[made == 1]
+        arrived = np.flatnonzero(made == 1)
+        q[arrived[:, None], self._independent] = z[arrived]
         return q, made
 
     def _check_reached(self, z: FloatArray, reached: FloatArray) -> None:

@@ -28,6 +28,11 @@ def add(a: Vector, b: Vector) -> Vector:
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
+def subtract(a: Vector, b: Vector) -> Vector:
+    """A - b"""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
 def scale(factor: ca.SX, a: Vector) -> Vector:
     """Factor * a"""
     return (factor * a[0], factor * a[1], factor * a[2])

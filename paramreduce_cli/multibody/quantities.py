@@ -15,12 +15,12 @@ import numpy as np
 from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.multibody.kinematics import (
     JointMotion,
-    Vector,
     cross,
     direction_in_base,
     dot,
     motions,
     point_in_base,
+    subtract,
 )
 from paramreduce_cli.multibody.projection import Projection
 from paramreduce_cli.records import Constraint, FloatArray, Mechanism
@@ -118,7 +118,7 @@ def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.
         return ca.SX(0)
     start = point_in_base(joints, bodies[1], vectors[1])
     end = point_in_base(joints, bodies[0], vectors[0])
-    gap: Vector = (end[0] - start[0], end[1] - start[1], end[2] - start[2])
+    gap = subtract(end, start)
     if constraint.kind == "distance":
         return dot(gap, gap)
     axis = vectors[2] / np.linalg.norm(vectors[2])
@@ -145,7 +145,7 @@ def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
         over, under = ca.cos(upper) - measure, measure - ca.cos(lower)
     elif constraint.kind.startswith("distance"):
         over = measure / upper**2 - 1
-        under = 1 - measure / lower**2 if lower else -measure
+        under = 1 - measure / lower**2
     elif constraint.kind == "singularity":
         over, under = measure, 1 - measure / lower
     else:

@@ -63,7 +63,7 @@ def _costs(X: FloatArray, chi: FloatArray, units: list[IntArray]) -> FloatArray:
             return np.array(own) / sizes
         return np.array([_rise(X[:, columns], chi, part) for part in parts]) / sizes
     inverse = (Vt.T / s**2) @ Vt
-    if parts[-1][-1] + 1 == len(parts):
+    if (sizes == 1).all():
         alone: FloatArray = phi**2 / np.diag(inverse)
         return alone
     rises = [phi[p] @ np.linalg.solve(inverse[np.ix_(p, p)], phi[p]) for p in parts]

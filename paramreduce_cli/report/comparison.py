@@ -103,9 +103,10 @@ def _numbers(part: str) -> Quantity:
         a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
     ) -> Iterator[Difference]:
         for name, rows in a["validation"].items():
-            others = b["validation"].get(name, [])
-            yield from _exact(f"rows of {part}, {name}", len(rows), len(others))
-            for x, y in zip(rows, others, strict=False):
+            others = {row["n"]: row for row in b["validation"].get(name, [])}
+            yield from _exact(f"sizes of {part}, {name}", [r["n"] for r in rows], [*others])
+            for x in rows:
+                y = others.get(x["n"], x)
                 yield from _row(f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part])
 
     return quantity
@@ -141,13 +142,12 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
             continue
         x, y = a["reduction"][name]["order"], b["reduction"][name]["order"]
         yield from _exact(f"parameters ordered, {name}", len(x), len(y))
-        errors = zip(a["validation"][name], b["validation"][name], strict=False)
-        for row_a, row_b in errors:
+        others = {row["n"]: row for row in b["validation"][name]}
+        for row_a in a["validation"][name]:
             n = row_a["n"]
-            if n > min(len(x), len(y)):
-                break
-            if set(x[:n]) == set(y[:n]):
+            if n > min(len(x), len(y)) or n not in others or set(x[:n]) == set(y[:n]):
                 continue
+            row_b = others[n]
             p, q = (row["torque_error"]["estimation"] for row in (row_a, row_b))
             yield Difference(
                 f"order, {name}, n = {n}", x[n - 1], y[n - 1], tolerated=_TIE.holds(p, q)

@@ -16,19 +16,20 @@ _HEADER = (
 )  # fmt: skip
 
 
-def overview(summaries: Sequence[Summary]) -> Table:
-    """The selected model of every robot beside its full one, inverse and direct dynamics.
+def overview(rows: Sequence[tuple[str, ...]]) -> Table:
+    """The selected model of every robot beside its full one, inverse and direct dynamics."""
+    return Table("Reduced models", _HEADER, tuple(rows))
+
+
+def overview_row(summary: Summary) -> tuple[str, ...]:
+    """One robot's row.
 
     Args:
-        summaries: Contents of ``summary.json``.
+        summary: Contents of its ``summary.json``.
 
     Raises:
-        KeyError: A summary lacks an entry.
+        KeyError, TypeError, ValueError: It is no such summary.
     """
-    return Table("Reduced models", _HEADER, tuple(_row(summary) for summary in summaries))
-
-
-def _row(summary: Summary) -> tuple[str, ...]:
     model, selected = summary["model"], summary["selected"]
     return (
         summary["robot"],

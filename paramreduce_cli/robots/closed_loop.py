@@ -86,7 +86,8 @@ def mechanism_from_bodies(
         guess: Values of coordinates near an assembly; zero for those left out.
 
     Raises:
-        KeyError: A parent is not above its child, or a name is not known.
+        KeyError: A parent is not above its child, or a body is not known.
+        ValueError: An independent coordinate is not known.
     """
     bodies: list[Body] = []
     index: dict[str | None, int] = {None: BASE}

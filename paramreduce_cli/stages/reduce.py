@@ -11,7 +11,7 @@ import numpy as np
 from paramreduce_cli import registry
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import ReductionSection, Stop
-from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.multibody.base_parameters import (
     affecting_columns,
     independent_columns,
@@ -143,14 +143,19 @@ def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> _Found:
 
 
 def _kept(sizes: IntArray, fits: list[Fit], stop: Stop) -> int:
-    """How many subsets the stopping rule leaves, at least one: the smaller of its two limits."""
+    """How many subsets the stopping rule leaves: the smaller of its two limits."""
     kept = len(fits)
     if stop.parameters is not None:
         kept = min(kept, int(np.sum(sizes <= stop.parameters)))
+        if kept == 0:
+            raise ConfigError(
+                f"reduction.stop.parameters is {stop.parameters}, but with groups the smallest subset "
+                f"has {sizes[0]} parameters. Raise it."
+            )
     if stop.torque_error is not None:
         good = (k for k, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
         kept = min(kept, next(good, len(fits)))
-    return max(kept, 1)
+    return kept
 
 
 def _with_norms(

@@ -8,6 +8,7 @@ import numpy as np
 
 from paramreduce_cli import registry
 from paramreduce_cli.config import Config
+from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.records import (
@@ -95,7 +96,10 @@ def _shown_poses(config: Config, model: Model, motion: Motion) -> list[FloatArra
     if config.report.poses is not None:
         wanted = np.array([config.per_joint(pose) for pose in config.report.poses])
         coordinates = Coordinates(model.mechanism, once=True)
-        return [coordinates.positions(z[None], None)[0] for z in wanted]
+        try:
+            return [coordinates.states(*[z[None]] * 3)[0][0] for z in wanted]
+        except DataError as error:
+            raise ConfigError(f"report.poses: {error}") from error
     picks = np.linspace(0, motion.time.size, _POSES, endpoint=False).astype(int)
     return [motion.q[k] for k in picks]
 

@@ -8,9 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from paramreduce_cli.config import Config
-from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.symmetry import Symmetry, completed, symmetries
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
@@ -18,6 +19,7 @@ from paramreduce_cli.multibody.observation import (
     StateBlock,
     standard_deviation,
 )
+from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import (
     FloatArray,
     Model,
@@ -28,6 +30,10 @@ from paramreduce_cli.records import (
     Trajectory,
 )
 from paramreduce_cli.registry import stage
+from paramreduce_cli.stages.description import described_constraints
+from paramreduce_cli.stages.optimize_trajectories import joint_limits
+
+_ROUNDING = 1e-6
 
 
 @stage
@@ -43,11 +49,11 @@ def sample(
     images = symmetries(config.sampling.symmetries, model.mechanism.coordinate_names)
     points = wanted.points or config.trajectories.points
     estimation = _observed(
-        model, dynamics, trajectories, "estimation", recordings.estimation, points, images
+        config, model, dynamics, trajectories, "estimation", recordings.estimation, points, images
     )
     points = wanted.validation_points or config.trajectories.points
     validation = _observed(
-        model, dynamics, trajectories, "validation", recordings.validation, points, images
+        config, model, dynamics, trajectories, "validation", recordings.validation, points, images
     )
     return Samples(
         names=model.mechanism.parameter_names,
@@ -59,7 +65,30 @@ def sample(
     )
 
 
+def _check_images(config: Config, model: Model, series: list[FloatArray], period: float) -> None:
+    """Refuse symmetries that lead out of the limits: they are none of this mechanism."""
+    if not config.sampling.symmetries:
+        return
+    limits = joint_limits(config)
+    quantities = Quantities(model.mechanism, described_constraints(config, model.mechanism))
+    coordinates = Coordinates(model.mechanism)
+    times = sample_times(period, config.trajectories.points)
+    for coefficients in series:
+        basis = fourier_basis(period, (coefficients.shape[1] - 1) // 2, times)
+        z, dz, ddz = basis.states(coefficients)
+        excess = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
+        if excess <= _ROUNDING:
+            q, _, _ = coordinates.states(z, dz, ddz)
+            excess = quantities.rows(q).max(initial=-np.inf)
+        if excess > _ROUNDING:
+            raise ConfigError(
+                "sampling.symmetries: the image of a trajectory leaves the limits or constraints "
+                "under trajectories, so that this is no symmetry of the mechanism and its limits."
+            )
+
+
 def _observed(
+    config: Config,
     model: Model,
     dynamics: Dynamics,
     trajectories: Trajectories | None,
@@ -79,6 +108,7 @@ def _observed(
     series = [trajectory.coefficients for trajectory in found]
     if name == "estimation":
         series = completed(series, images)
+        _check_images(config, model, series, trajectories.period)
     period = trajectories.period
     return ObservedSet(
         lambda: _series_blocks(series, period, points),

@@ -10,6 +10,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.relations import approximate_expressions
 from paramreduce_cli.records import (
+    BoolArray,
     FloatArray,
     HeuristicValidation,
     IntArray,
@@ -56,9 +57,8 @@ def validate(config: Config, model: Model, samples: Samples, reduction: Reductio
     start = 0
     for name, ordering in reduction.orderings.items():
         part = slice(start, start + ordering.n.size)
-        counts = _operations(
-            config, dynamics, [reduction.expansion[:, ordering.subset(n)] for n in ordering.n]
-        )
+        subsets = [reduction.expansion[:, ordering.subset(n)] for n in ordering.n]
+        counts = _operations(config, dynamics, model.affecting, subsets)
         heuristics[name] = _judged(ordering, counts, estimation, validation, part)
         start += ordering.n.size
     full = _full_model(config, model, dynamics, estimation[1], validation[1])
@@ -77,12 +77,12 @@ def validate(config: Config, model: Model, samples: Samples, reduction: Reductio
 
 def _check_coordinates(model: Model, samples: Samples) -> None:
     n_q = model.mechanism.n_q
-    block = next(iter(samples.estimation.blocks()))
-    if block.q.shape[1] != n_q:
-        raise DataError(
-            f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need; make it "
-            "with `paramreduce sample`."
-        )
+    for part in (samples.estimation, samples.validation):
+        if part is not None and next(iter(part.blocks())).q.shape[1] != n_q:
+            raise DataError(
+                f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need; make "
+                "it with `paramreduce sample`."
+            )
 
 
 def _columns(reduction: Reduction, model: Model) -> FloatArray:
@@ -127,18 +127,21 @@ def _judged(
     )
 
 
-def _operations(config: Config, dynamics: Dynamics, expansions: list[FloatArray]) -> IntArray:
+def _operations(
+    config: Config, dynamics: Dynamics, affecting: BoolArray, expansions: list[FloatArray]
+) -> IntArray:
     """IDM and DDM by our count, then by the paper's rule, (n_subsets, 4).
 
     Args:
         config: Says which functions are counted.
         dynamics: Of the mechanism.
+        affecting: Parameters that change the torques at all, (n_standard,).
         expansions: For each subset, standard parameters from its values, (n_standard, n).
     """
     independent = config.validation.operations == "independent"
     counts = []
     for expansion in expansions:
-        kept = np.flatnonzero(expansion.any(axis=1))
+        kept = np.flatnonzero(expansion.any(axis=1) & affecting)
         first = np.argmax(expansion != 0, axis=0)
         owner = first[np.argmax(expansion[kept] != 0, axis=1)]
         same = {int(k): int(other) for k, other in zip(kept, owner, strict=True) if k != other}
@@ -163,7 +166,7 @@ def _full_model(
 ) -> dict[str, int | float]:
     unit = np.eye(model.values.size)
     full, base = _operations(
-        config, dynamics, [unit[:, model.affecting], unit[:, model.base.columns]]
+        config, dynamics, model.affecting, [unit[:, model.affecting], unit[:, model.base.columns]]
     )
     names = (
         "operations_inverse",

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from paramreduce_cli.report.overview import overview
+from paramreduce_cli.report.overview import overview, overview_row
 
 
 @pytest.fixture
@@ -14,7 +14,7 @@ def summary(two_link_results):
 
 def test_one_row_per_robot_with_the_selected_model(summary):
     other = {**summary, "robot": "other"}
-    table = overview([summary, other])
+    table = overview([overview_row(summary), overview_row(other)])
     assert [row[0] for row in table.rows] == ["two_link", "other"]
     row = dict(zip(table.header[:7], table.rows[0][:7], strict=True))
     selected = summary["selected"]

@@ -19,7 +19,7 @@ def build(invoke, tmp_path, *overrides, text=None, stage="build-model"):
     ("old", "new", "line", "says"),
     [
         ("q_crank: pi/2, q", "q_crank: 0, q_cranc: 1, q", 23, "did you mean q_crank?"),
-        ("coupler: 0.9 ", "coupler: 0.1 ", 23, "at best 0.277 m, at pin (x)"),
+        ("coupler: 0.9 ", "coupler: 0.1 ", 23, "at best by 0.277, at pin (x)"),
         ("bodies: [coupler, rocker]", "bodies: [coupler, roker]", 21, "did you mean rocker?"),
         ("bodies: [coupler, rocker]", "bodies: [rocker, rocker]", 21, "ties 'rocker' to itself"),
         ("type: planar", "type: point", 19, "pin (z)"),
@@ -124,7 +124,7 @@ def test_limits_that_the_loops_do_not_reach(invoke, tmp_path):
         ("{name: a, quantity: coordinate, coordinate: q_x, min: 0}", "coordinate 'q_x' is not"),
         ("{name: a, quantity: angle, bodies: [crank, roker], max: 1}", "did you mean rocker?"),
         ("{name: a, quantity: angle, bodies: [crank, rocker]}", "give min or max"),
-        ("{name: a, quantity: angle, bodies: [crank, rocker], max: 4}", "from 0 to pi"),
+        ("{name: a, quantity: angle, bodies: [crank, rocker], max: 4}", "between 0 and pi"),
         ("{name: a, quantity: distance, bodies: [crank, rocker], max: -1}", "above zero"),
         ("{name: a, quantity: singularity, max: 1}", "takes a min"),
         ("{name: a, quantity: singularity, min: 0.1, body: crank}", "takes no body"),
