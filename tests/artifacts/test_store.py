@@ -1,11 +1,14 @@
 import dataclasses
+import os
 import resource
+import shutil
 import subprocess
 import sys
 
 import h5py
 import numpy as np
 import pytest
+from conftest import CONFIGS
 
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
 from paramreduce_cli.artifacts.layouts import mechanism_from_json, mechanism_to_json
@@ -195,3 +198,23 @@ def test_stamp_survives(tmp_path):
     made = write(tmp_path / "x.h5", stamp(), lambda w: w.dataset("a", [1.0, 2.0]))
     assert read_stamp(tmp_path / "x.h5") == made
     assert made.digest
+
+
+def test_digests_do_not_depend_on_the_order_of_sets(two_link_results, tmp_path):
+    """The same samples written under two hash seeds have one digest."""
+    script = (
+        "import sys; from paramreduce_cli.__main__ import main; "
+        "sys.argv = ['paramreduce', 'sample', sys.argv[1], '--results', sys.argv[2], '--force', "
+        "'--quiet']; main()"
+    )
+    digests = set()
+    for seed in ("1", "2"):
+        copy = tmp_path / seed
+        shutil.copytree(two_link_results, copy)
+        subprocess.run(
+            [sys.executable, "-c", script, str(CONFIGS / "two_link.yaml"), str(copy)],
+            env={**os.environ, "PYTHONHASHSEED": seed},
+            check=True,
+        )
+        digests.add(read_stamp(copy / "samples.h5").digest)
+    assert len(digests) == 1

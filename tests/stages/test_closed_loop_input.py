@@ -1,5 +1,7 @@
 """What a user of closed loops can get wrong, and what they are told."""
 
+import h5py
+import numpy as np
 import pytest
 from conftest import CONFIGS
 
@@ -151,3 +153,116 @@ def test_recordings_beyond_the_reach_of_the_loops(invoke, tmp_path):
     assert code == 2
     assert "the loops cannot be closed at q_rocker = " in err
     assert not (tmp_path / "r" / "samples.h5").exists()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("crank: 0.4 ", "crank: 2*rocker ", "constants.crank: '2*rocker' is not a number"),
+        ("crank: 0.4 ", "crank: crank + 0.1 ", "constants.crank: 'crank + 0.1' is not a number"),
+        ("crank: 0.4 ", "pi: 3\n  crank: 0.4 ", "constants.pi: cannot be the name of a constant"),
+        ("crank: 0.4 ", "2nd: 3\n  crank: 0.4 ", "constants.2nd: cannot be the name of a constant"),
+    ],
+)
+def test_constants_use_those_above_them_only(invoke, tmp_path, old, new, says):
+    _, (code, _, err) = build(invoke, tmp_path, text=FOUR_BAR.read_text().replace(old, new, 1))
+    assert code == 2
+    assert says in err
+    assert err.count("Error:") == 1
+
+
+def test_hinges_closed_the_wrong_way_round(invoke, tmp_path):
+    text = FOUR_BAR.read_text().replace(
+        "type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]",
+        "type: revolute, bodies: [wrist, rocker], at: [[0, 0, 0], [{xyz: [rocker, 0, 0]}, {rx: pi}]]",
+    )
+    text = text.replace(
+        "    closures:",
+        "      - {name: slide, parent: coupler, joint: prismatic, at: [coupler, 0, 0], massless: true}\n"
+        "      - {name: wrist, parent: slide, joint: universal, massless: true}\n    closures:",
+    )
+    _, (code, _, err) = build(invoke, tmp_path, text=text)
+    assert code == 2
+    assert "closes with its two z axes against each other" in err
+
+
+def test_images_that_leave_the_limits_are_no_symmetry(invoke, tmp_path):
+    overrides = ["trajectories.count=1", "trajectories.starts=1", "trajectories.max_iterations=5"]
+    options = [part for o in overrides for part in ("--set", o)]
+    config = CONFIGS / "five_bar.yaml"
+    code, _, _ = invoke("build-model", config, "--results", tmp_path, "--quiet")
+    assert code == 0
+    code, _, _ = invoke("optimize-trajectories", config, "--results", tmp_path, "--quiet", *options)
+    assert code == 0
+    wrong = "sampling.symmetries=[[-q_right, -q_left]]"
+    code, _, err = invoke(
+        "sample", config, "--results", tmp_path, "--quiet", *options, "--set", wrong
+    )
+    assert code == 2
+    assert err.startswith(f"Error: --set {wrong}: sampling.symmetries: the image")
+    assert not (tmp_path / "samples.h5").exists()
+
+
+def test_a_mechanism_without_mass(invoke, tmp_path):
+    text = FOUR_BAR.read_text()
+    for name in ("crank", "coupler", "rocker"):
+        text = text.replace(f"{{name: {name},", f"{{massless: true, name: {name},")
+    text = text[: text.index("    crank: {m:")] + text[text.index("nominal_torque") :]
+    text = text.replace("slender_rods:\n", "slender_rods: {}\n")
+    _, (code, _, err) = build(invoke, tmp_path, text=text)
+    assert code == 2
+    assert "are all massless" in err
+
+
+def test_groups_and_the_sizes_they_leave(invoke, tmp_path):
+    groups = (
+        "reduction.groups=[{name: a, parameters: [m_coupler, Izz_crank, mx_crank]}, "
+        "{name: b, parameters: [my_crank, Izz_coupler, mx_coupler]}, "
+        "{name: c, parameters: [my_coupler, Izz_rocker, mx_rocker, my_rocker]}]"
+    )
+    overrides = [groups, "trajectories.count=1", "trajectories.starts=1", "selected.n=2",
+                 "selected.torque_error=null", "report.formats=[svg]"]  # fmt: skip
+    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
+    assert code == 2
+    assert "selected.n is 2, but with groups forward-selection has subsets of" in err
+    before = (tmp_path / "r" / "reduction.h5").read_bytes()
+    stop = "reduction.stop.parameters=1"
+    _, (code, _, err) = build(invoke, tmp_path, *overrides[:3], stop, stage="reduce")
+    assert code == 2
+    assert "the smallest subset has" in err
+    assert (tmp_path / "r" / "reduction.h5").read_bytes() == before
+    overrides[3] = "selected.n=10"
+    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
+    assert (code, err) == (0, "")
+
+
+def test_a_tied_group_has_the_value_that_fits_all_its_members(invoke, tmp_path):
+    overrides = [
+        "reduction.groups=[{name: rods, bodies: [coupler, rocker], kinds: [Izz], tied: true}]",
+        "trajectories.count=1",
+        "trajectories.starts=1",
+        "report.formats=[svg]",
+        "selected.n=9",
+        "selected.torque_error=null",
+        "validation.accept.torque_error_validation=10",
+    ]
+    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
+    assert (code, err) == (0, "")
+    with (
+        h5py.File(tmp_path / "r" / "reduction.h5") as file,
+        h5py.File(tmp_path / "r" / "samples.h5") as samples,
+    ):
+        names = [name.decode() for name in file["parameters/names"]]
+        standard = [name.decode() for name in samples["parameters/names"]]
+        assert "Izz_rods" in names
+        assert "Izz_coupler" not in names
+        W, tau = samples["estimation/W"][:], samples["estimation/tau"][:].ravel()
+        kept = file["forward-selection/order"][:3].tolist()
+        columns = []
+        for k in kept:
+            members = ["Izz_coupler", "Izz_rocker"] if names[k] == "Izz_rods" else [names[k]]
+            columns.append(sum(W[:, standard.index(member)] for member in members))
+        values, *_ = np.linalg.lstsq(np.column_stack(columns), tau, rcond=None)
+        error = np.linalg.norm(tau - np.column_stack(columns) @ values) / np.linalg.norm(tau)
+        assert file["forward-selection/parameters/3"][:] == pytest.approx(values, rel=1e-6)
+        assert file["forward-selection/torque_error"][2] == pytest.approx(error, rel=1e-6)
