@@ -30,7 +30,7 @@ def case(request):
         constraints,
     )  # fmt: skip
     settings = joint_settings(config, wanted.period, wanted.harmonics)
-    settings = dataclasses.replace(settings, starts=1, polished=1, max_iterations=40)
+    settings = dataclasses.replace(settings, starts=1, polished=1, max_iterations=20)
     return excitation, settings, constraints
 
 
