@@ -225,4 +225,6 @@ def _percent(share: float | None) -> str:
         return "infinite"
     if share < 1e-6:
         return "0 %"
+    if share < 1e-4:
+        return "< 0.01 %"
     return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"

@@ -194,12 +194,17 @@ def _per_joint(config: Config) -> Iterator[Problem]:
         if isinstance(values, list) and len(values) not in (1, n):
             yield (
                 path,
-                f"has {len(values)} values, but {config.robot} has {n} joints. Give one per joint, "
-                f"or one for all, in {unit}",
+                f"has {len(values)} values, but {config.robot} has {n} {_what_moves(config)}. Give "
+                f"one for each, or one for all, in {unit}",
             )
     for k, pose in enumerate(config.report.poses or []):
         if len(pose) not in (1, n):
             yield ("report", "poses", k), f"has {len(pose)} values, but there are {n} joints"
+
+
+def _what_moves(config: Config) -> str:
+    tree = config.description.tree
+    return "independent coordinates" if tree is not None and tree.closures else "joints"
 
 
 def _limits(config: Config) -> Iterator[Problem]:

@@ -25,7 +25,6 @@ from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import scaling as scalings
 
 Criterion = Callable[[FloatArray, float], tuple[float, FloatArray]]
-States = tuple[FloatArray, FloatArray, FloatArray]
 
 
 @dataclass(frozen=True)
@@ -68,17 +67,22 @@ class Excitation:
     criterion: Criterion
     scaling: Scaling
 
-    def weighted(self, states: States, positions: Follower) -> FloatArray:
+    def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
         """W with every row divided by its joint's nominal torque."""
-        z, dz, ddz = states
-        return self.observation.forward(positions(z), dz, ddz) * self._row_weights(z.shape[0])
+        return self.observation.forward(q, dz, ddz) * self._row_weights(q.shape[0])
 
     def _row_weights(self, points: int) -> FloatArray:
         return np.tile(1 / self.nominal_torque, points)[:, None]
 
-    def condition_numbers(self, states: States, positions: Follower) -> dict[str, float]:
-        """The condition number in every scaling, by singular values."""
-        W = self.weighted(states, positions)
+    def condition_numbers(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> dict[str, float]:
+        """The condition number in every scaling, by singular values.
+
+        Args:
+            q: Generalised coordinates along a motion, (n_points, n_q).
+            dz: Velocities of the independent ones, (n_points, n_dof).
+            ddz: Accelerations, same shape.
+        """
+        W = self.weighted(q, dz, ddz)
         return {
             name: condition_from_matrix(scaling(W, self.beta, np.inf)[0])
             for name, scaling in scalings.items()

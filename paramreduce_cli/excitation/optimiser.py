@@ -17,7 +17,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.errors import ConfigError, DataError, ParamreduceError
 from paramreduce_cli.excitation.feasibility import (
+    FINER,
     drawn_inside,
     feasible_start,
     fine_basis,
@@ -117,19 +119,26 @@ def optimise_trajectory(
         candidates.append(candidate)
     candidates.sort(key=lambda candidate: candidate.value)
     chosen = candidates[: settings.polished]
+    results: list[tuple[_Candidate, FloatArray, float]] = []
+    failures: list[ParamreduceError] = []
     for candidate in chosen:
         descend(candidate, plan.polishing, TIGHT)
-    results = [search.result(candidate) for candidate in chosen]
-    best = min(range(len(chosen)), key=lambda k: search.kappa(results[k]))
-    iterations = sum(candidate.iterations for candidate in candidates)
+        try:
+            series = search.result(candidate)
+            results.append((candidate, series, search.kappa(series)))
+        except ParamreduceError as error:  # one of several may fail
+            failures.append(error)
+    if not results:
+        raise ConfigError(f"trajectories.position_limits: {failures[0]}") from failures[0]
+    best, series, _ = min(results, key=lambda result: result[2])
     return describe(
         excitation,
         settings,
-        results[best],
-        kappa_start=chosen[best].kappa_start,
+        series,
+        kappa_start=best.kappa_start,
         cpu_seconds=time.process_time() - started,
-        iterations=iterations,
-        status=chosen[best].status,
+        iterations=sum(candidate.iterations for candidate in candidates),
+        status=best.status,
     )
 
 
@@ -140,7 +149,6 @@ class _Search:
         self._excitation, self._settings = excitation, settings
         self._basis = settings_basis(settings)
         self._limits = LimitMap(settings.limits, self._basis, settings.mapping)
-        self._positions = Follower(excitation.coordinates)
         mechanism = excitation.coordinates.mechanism
         self._bounded = bool(excitation.quantities.constraints) or mechanism.loops is not None
         self.plan = BOUNDED if self._bounded else FREE
@@ -148,7 +156,8 @@ class _Search:
         self._mixing = np.eye(mechanism.n_dof)
         if self._bounded:
             self._rest = resting_position(excitation, settings.limits, self._limits.margin)
-            R = excitation.coordinates.tangent(self._positions(self._rest[None]))[0]
+            q = excitation.coordinates.positions(self._rest[None], None)
+            R = excitation.coordinates.tangent(q)[0]
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
 
@@ -166,7 +175,11 @@ class _Search:
         level = self.plan.screening[0]
         free = feasible_start(free, still, self._objective(level))
         series, _ = limits.admissible(self._mixing @ free, level.limits)
-        return _Candidate(free, self.kappa(series), np.inf, None)
+        try:
+            kappa = self.kappa(series)
+        except DataError:  # closed on the grid, but not between its points
+            kappa = np.inf
+        return _Candidate(free, kappa, np.inf, None)
 
     def descend(self, candidate: _Candidate, level: Level, rule: dict) -> None:
         """Take a candidate through one level."""
@@ -185,8 +198,9 @@ class _Search:
         candidate.status = end.status
 
     def _objective(self, level: Level) -> FreeObjective:
+        positions = Follower(self._excitation.coordinates)
         return FreeObjective(
-            self._excitation, self._basis, self._limits, level, self._positions, self._mixing
+            self._excitation, self._basis, self._limits, level, positions, self._mixing
         )
 
     def result(self, candidate: _Candidate) -> FloatArray:
@@ -201,8 +215,21 @@ class _Search:
 
     def kappa(self, series: FloatArray) -> float:
         """The condition number that the settings ask for."""
-        states = self._basis.states(series)
-        return self._excitation.condition_numbers(states, self._positions)[self._settings.scaling]
+        _, q = fine_positions(self._excitation, self._settings, series)
+        _, dz, ddz = self._basis.states(series)
+        return self._excitation.condition_numbers(q[::FINER], dz, ddz)[self._settings.scaling]
+
+
+def fine_positions(
+    excitation: Excitation, settings: Settings, series: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Times and generalised coordinates on the grid on which bounds are checked.
+
+    Raises:
+        DataError: The loops cannot be closed along it.
+    """
+    fine = fine_basis(settings.period, settings.harmonics, settings.points)
+    return fine.time, excitation.coordinates.positions(fine.states(series)[0], None)
 
 
 def settings_basis(settings: Settings) -> FourierBasis:
@@ -228,16 +255,12 @@ def describe(
     Raises:
         DataError: The loops cannot be closed along it.
     """
-    basis = settings_basis(settings)
-    states = basis.states(coefficients)
-    positions = Follower(excitation.coordinates)
-    variants = excitation.condition_numbers(states, positions)
-    fine = fine_basis(settings.period, settings.harmonics, settings.points)
-    q = positions(fine.states(coefficients)[0])
-    excitation.coordinates.check_motion(fine.time, q)
+    z, dz, ddz = settings_basis(settings).states(coefficients)
+    times, q = fine_positions(excitation, settings, coefficients)
+    excitation.coordinates.check_motion(times, q)
+    variants = excitation.condition_numbers(q[::FINER], dz, ddz)
     quantities = excitation.quantities.values(q)
     limits = settings.limits
-    z, dz, ddz = states
     shares = [
         np.abs(z - (z.max(axis=0) + z.min(axis=0)) / 2) / limits.reach,
         np.abs(dz) / limits.velocity,

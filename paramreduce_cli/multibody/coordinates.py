@@ -7,6 +7,7 @@ corrections are not small against the step: a solution stays on its assembly mod
 
 from __future__ import annotations
 
+import contextlib
 from functools import cached_property
 
 import casadi as ca
@@ -24,7 +25,9 @@ _CLOSED = 1e-6
 _CORRECTIONS = 6
 _LARGEST_CORRECTION = 0.3
 """Share of a step that Newton may correct; more, and it might fall on another assembly mode."""
-_SHORTEST_STEP = 1 / 128
+_LONGEST_STEP = 0.6
+"""Sum of the largest moves of independent and dependent coordinates in one step, rad or m."""
+_SHORTEST_STEP = 1 / 512
 _SINGULAR = 1e-5
 """Distance to singularity that counts as none."""
 _JUMP = 0.5
@@ -96,30 +99,35 @@ class Coordinates:
         Raises:
             DataError: The loops cannot be closed at a sample.
         """
-        if self.mechanism.loops is None:
-            return z, dz, ddz
         q = self.positions(z, start)
-        dq, ddq = self._rates(q, dz, ddz)
-        return q, dq, ddq
+        return (q, *self.rates(q, dz, ddz))
 
-    def positions(self, z: FloatArray, *starts: FloatArray | None) -> FloatArray:
+    def positions(self, z: FloatArray, start: FloatArray | None) -> FloatArray:
         """Generalised coordinates of consecutive samples of a motion, (n_samples, n_q).
 
         Args:
             z: Independent coordinates, (n_samples, n_dof), rad or m.
-            starts: Generalised coordinates to start from, tried in turn, each (n_q,) or
-                (n_samples, n_q); the assembly for None.
+            start: Generalised coordinates to start from: one for each sample, (n_samples, n_q),
+                or one that the motion is followed from, (n_q,); the assembly for None.
 
         Raises:
             DataError: The loops cannot be closed at a sample.
         """
-        for start in starts:
-            near = start is not None and start.ndim == 2
-            q, reached = self.follow(z, start) if near else self._march(z, start)
-            if (reached == 1).all():
-                break
+        if self.mechanism.loops is None:
+            return z
+        near = start is not None and start.ndim == 2
+        q, reached = self.follow(z, start) if near else self._march(z, start)
         self._check_reached(z, reached)
         return q
+
+    def rates(
+        self, q: FloatArray, dz: FloatArray, ddz: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Dq and ddq, each (n_samples, n_q), at q (n_samples, n_q) from dz and ddz (n_samples, n_dof)."""
+        if self.mechanism.loops is None:
+            return dz, ddz
+        dq, ddq = self._rates(q, dz, ddz)
+        return dq, ddq
 
     def _march(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
         """Follow a motion in time: a straight way to far samples might lead to other modes.
@@ -268,7 +276,7 @@ class Coordinates:
         size = np.abs(predicted).max(axis=1, initial=0.0) + np.abs(dz).max(axis=1)
         total = np.zeros_like(predicted)
         good = np.zeros(q.shape[0], dtype=bool)
-        todo: IntArray = np.flatnonzero(np.isfinite(predicted).all(axis=1))
+        todo: IntArray = np.flatnonzero(size <= _LONGEST_STEP)
         for _ in range(_CORRECTIONS):
             gap, correction = self._newton(new[todo])
             with np.errstate(invalid="ignore"):
@@ -308,11 +316,20 @@ class Follower:
         if self._coordinates.mechanism.loops is None:
             return z
         if self._last is None or not np.array_equal(self._last[0], z):
-            kept = self._kept.get(z.shape[0])
-            q = self._coordinates.positions(z, *([None] if kept is None else [kept, None]))
-            self._coordinates.check_side(z, q)
-            self._last = (z, q)
+            self._last = (z, self._found(z))
         return self._last[1]
+
+    def _found(self, z: FloatArray) -> FloatArray:
+        """From the positions that were kept; if that leads elsewhere, anew from the assembly."""
+        kept = self._kept.get(z.shape[0])
+        if kept is not None:
+            with contextlib.suppress(DataError):
+                q = self._coordinates.positions(z, kept)
+                self._coordinates.check_side(z, q)
+                return q
+        q = self._coordinates.positions(z, None)
+        self._coordinates.check_side(z, q)
+        return q
 
     def keep(self) -> None:
         """Start from the positions found last from now on, because they are good ones."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, FloatArray
@@ -30,6 +31,8 @@ class StateBlock:
     dz: FloatArray
     ddz: FloatArray
     tau: FloatArray | None = None
+    way: FloatArray | None = None
+    """Positions z on a grid several times finer, on which loops are followed, (m n_samples, n_dof)."""
 
 
 class ObservedSet:
@@ -40,6 +43,7 @@ class ObservedSet:
         n_samples: How many samples it yields in all.
         dynamics: Of the mechanism.
         phi: Standard parameters, for torques that were not measured.
+        source: What the states are, for messages.
     """
 
     def __init__(
@@ -48,7 +52,9 @@ class ObservedSet:
         n_samples: int,
         dynamics: Dynamics,
         phi: FloatArray,
+        source: str,
     ) -> None:
+        self._source = source
         self.states = states
         self.n_samples = n_samples
         self._coordinates = Coordinates(dynamics.mechanism)
@@ -61,20 +67,39 @@ class ObservedSet:
         Raises:
             DataError: The loops cannot be closed throughout a trajectory.
         """
-        trajectory, last = -1, (np.zeros(0), np.zeros((0, self._dynamics.mechanism.n_q)))
+        before: tuple[FloatArray, FloatArray] | None = None
+        trajectory = -1
         for s in self.states():
             if s.trajectory != trajectory:
-                trajectory, last = s.trajectory, (last[0][:0], last[1][:0])
-            start = last[1][-1] if last[1].size else None
-            q, dq, ddq = self._coordinates.states(s.z, s.dz, s.ddz, start)
-            self._coordinates.check_motion(
-                np.concatenate([last[0], s.time]), np.concatenate([last[1], q])
-            )
-            last = (s.time[-1:], q[-1:])
+                trajectory, before = s.trajectory, None
+            try:
+                q, before = self._followed(s, before)
+            except DataError as error:
+                raise DataError(f"{self._source}, trajectory {trajectory + 1}: {error}") from error
+            dq, ddq = self._coordinates.rates(q, s.dz, s.ddz)
             K = self._dynamics.regressor(q, dq, ddq)
             tau = K @ self._phi if s.tau is None else s.tau
             W = K.reshape(-1, K.shape[2])
             yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, q, dq, ddq, W)
+
+    def _followed(
+        self, s: StateBlock, before: tuple[FloatArray, FloatArray] | None
+    ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
+        """Generalised coordinates of a block, and where it ends, to go on from there."""
+        if self._dynamics.mechanism.loops is None:
+            return s.z, (s.time[-1:], s.z[-1:])
+        way = s.z if s.way is None else s.way
+        finer = way.shape[0] // s.z.shape[0]
+        steps = np.arange(way.shape[0]) / finer
+        time = np.interp(steps, np.arange(s.time.size), s.time)
+        q = self._coordinates.positions(way, None if before is None else before[1][0])
+        if before is None:
+            self._coordinates.check_motion(time, q)
+        else:
+            self._coordinates.check_motion(
+                np.concatenate([before[0], time]), np.concatenate([before[1], q])
+            )
+        return q[::finer], (time[-1:], q[-1:])
 
     def factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint."""

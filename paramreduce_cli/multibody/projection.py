@@ -87,11 +87,11 @@ class Projection:
         return ca.vertcat(dependent, independent)[order, :]
 
     def distance(self, q: ca.MX) -> ca.MX:
-        """Distance to singularity n / (|Phi_d| |Phi_d^-1|) in Frobenius norms.
+        """Distance to singularity n / (|Phi_q| |Phi_d^-1|) in Frobenius norms, n equations.
 
         0 where the dependent coordinates are not determined, 1 at best; smooth.
         """
-        jacobian = self._jacobian(q)[:, self._d]
+        jacobian = self._jacobian(q)
         n = len(self._d)
         inverse = self.solve(q, ca.MX(ca.DM.eye(n)))
         return n / ca.sqrt(ca.sumsqr(jacobian) * ca.sumsqr(inverse))

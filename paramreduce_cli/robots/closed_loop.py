@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from paramreduce_cli.records import BASE, Body, Closure, FloatArray, Loops, Mechanism
 
@@ -17,6 +18,8 @@ Motion = tuple[Literal["revolute", "prismatic"], FloatArray]
 """A kind of motion and the direction of its axis, (3,)."""
 
 _X, _Y, _Z = np.eye(3)
+_NO_TURN = 1e-12
+"""What is printed as zero, rad or m."""
 
 
 def joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[Motion]:
@@ -108,7 +111,7 @@ def mechanism_from_bodies(
             tuple(names.index(name) for name in independent),
             np.array([float(values.get(name, 0.0)) for name in names]),
         )
-    table = _table(rows)
+    table = _table(rows, closures)
     return Mechanism(robot, tuple(bodies), np.asarray(gravity, dtype=float), {}, table, loops)
 
 
@@ -151,20 +154,39 @@ def rotation_to(axis: FloatArray) -> FloatArray:
     return result
 
 
-def _table(rows: Sequence[TreeBody]) -> tuple[tuple[str, ...], ...]:
-    header = ("body", "parent", "joint", "axes", "at", "coordinates")
-    table = [header]
+def _table(
+    rows: Sequence[TreeBody], closures: Sequence[LoopClosure]
+) -> tuple[tuple[str, ...], ...]:
+    table = [("body", "on", "joint", "axes", "at", "coordinates")]
     for row in rows:
-        axes = "; ".join(" ".join(f"{v:.4g}" for v in axis) for axis in row.axes)
-        at = " ".join(f"{v:.4g}" for v in row.placement[:3, 3])
+        axes = [axis for _, axis in joint_motions(row.joint, row.axes)]
         table.append(
             (
                 row.name + (" (massless)" if row.massless else ""),
                 row.parent or "base",
                 row.joint,
-                axes or "-",
-                at,
+                "; ".join(_numbers(axis) for axis in axes) if len(axes) < 3 else "x y z",
+                _placement_text(row.placement),
                 " ".join(row.coordinates),
             )
         )
+    for closure in closures:
+        bodies = " - ".join(name or "base" for name in closure.bodies)
+        kind = f"{closure.kind} {closure.length:g}" if closure.length else closure.kind
+        places = "; ".join(_placement_text(frame) for frame in closure.frames)
+        table.append((closure.name, bodies, f"closure: {kind}", "", places, ""))
     return tuple(table)
+
+
+def _placement_text(placement: FloatArray) -> str:
+    """Where a frame is, and about which axis and by how much it is turned."""
+    text = _numbers(placement[:3, 3])
+    turn = Rotation.from_matrix(placement[:3, :3]).as_rotvec()
+    angle = float(np.linalg.norm(turn))
+    if angle < _NO_TURN:
+        return text
+    return f"{text}, turned {angle:.4g} about {_numbers(turn / angle)}"
+
+
+def _numbers(values: Sequence[float] | FloatArray) -> str:
+    return " ".join(f"{value:.4g}" for value in np.where(np.abs(values) < _NO_TURN, 0.0, values))

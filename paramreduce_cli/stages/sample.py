@@ -9,6 +9,7 @@ import numpy as np
 
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
+from paramreduce_cli.excitation.feasibility import FINER
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.symmetry import Symmetry, completed, symmetries
 from paramreduce_cli.multibody.coordinates import Coordinates
@@ -100,7 +101,11 @@ def _observed(
     if recording is not None:
         _warn_of_still_joints(model, recording)
         return ObservedSet(
-            lambda: _recorded_blocks(recording), recording.time.size, dynamics, model.values
+            lambda: _recorded_blocks(recording),
+            recording.time.size,
+            dynamics,
+            model.values,
+            recording.source,
         )
     if trajectories is None:
         raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
@@ -110,21 +115,31 @@ def _observed(
         series = completed(series, images)
         _check_images(config, model, series, trajectories.period)
     period = trajectories.period
+    finer = 1
+    if model.mechanism.loops is not None:
+        finer = -(-FINER * config.trajectories.points // points)
     return ObservedSet(
-        lambda: _series_blocks(series, period, points),
+        lambda: _series_blocks(series, period, points, finer),
         len(series) * points,
         dynamics,
         model.values,
+        f"{name} set",
     )
 
 
-def _series_blocks(series: list[FloatArray], period: float, points: int) -> Iterator[StateBlock]:
-    times = sample_times(period, points)
+def _series_blocks(
+    series: list[FloatArray], period: float, points: int, finer: int
+) -> Iterator[StateBlock]:
+    """Blocks of every series, with positions on a finer grid on which loops are followed."""
+    times, finer_times = sample_times(period, points), sample_times(period, finer * points)
     for index, coefficients in enumerate(series):
         harmonics = (coefficients.shape[1] - 1) // 2
         for start in range(0, points, BLOCK_SAMPLES):
-            basis = fourier_basis(period, harmonics, times[start : start + BLOCK_SAMPLES])
-            yield StateBlock(index, basis.time, *basis.states(coefficients))
+            stop = start + BLOCK_SAMPLES
+            states = fourier_basis(period, harmonics, times[start:stop]).states(coefficients)
+            between = fourier_basis(period, harmonics, finer_times[finer * start : finer * stop])
+            way = between.states(coefficients)[0] if finer > 1 else None
+            yield StateBlock(index, times[start:stop], *states, way=way)
 
 
 def _recorded_blocks(r: Recording) -> Iterator[StateBlock]:

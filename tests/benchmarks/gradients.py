@@ -25,11 +25,10 @@ class Differences:
     def __init__(self, excitation, basis, limits, level):
         self._excitation, self._basis = excitation, basis
         self._limits, self._level = limits, level
-        self._positions = Follower(excitation.coordinates)
 
     def value(self, x):
         coefficients, _ = self._limits.admissible(x.reshape(6, 9), self._level.limits)
-        W = self._excitation.weighted(self._basis.states(coefficients), self._positions)
+        W = self._excitation.weighted(*self._basis.states(coefficients))
         scaled, _ = self._excitation.scaling(W, self._excitation.beta, self._level.maxima)
         eigenvalues = scipy.linalg.eigvalsh(scaled.T @ scaled, check_finite=False)
         return self._excitation.criterion(eigenvalues, self._level.sharpness)[0]

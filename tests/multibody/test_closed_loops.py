@@ -154,7 +154,7 @@ def test_adjoint_of_observations_through_the_position_problem(name):
     rng = np.random.default_rng(0)
     W_bar = rng.normal(size=(6 * mechanism.n_dof, 5))
     bars = observation.adjoint(q, *states[1:], W_bar)
-    step = 1e-6
+    step = 1e-7
     for k, bar in enumerate(bars):
         direction = rng.normal(size=bar.shape)
 
