@@ -84,3 +84,29 @@ def test_outside_the_bounds_there_is_no_value(case):
     value, gradient = objective(far)
     assert np.isnan(value)
     assert np.isnan(gradient).all()
+
+
+def test_a_crank_that_turns_fully_is_followed_all_the_way(tmp_path):
+    """A massless coupler: one equation, whole turns, and many random starts far apart."""
+    text = (CONFIGS / "four_bar.yaml").read_text()
+    kept = [line for line in text.splitlines() if "{name: coupler," not in line]
+    text = "\n".join(line for line in kept if not line.strip().startswith("coupler: {m:"))
+    text = text.replace(
+        "type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]",
+        "type: distance, length: coupler, bodies: [crank, rocker], at: [[crank, 0, 0], [rocker, 0, 0]]",
+    ).replace("q_coupler: -pi/3, ", "")
+    path = tmp_path / "distance.yaml"
+    path.write_text(text)
+    config = load_config(path)
+    model = build_model(config)
+    excitation = excitation_of(
+        model.mechanism, model.base, model.nominal_torque, "condition-number", "weighted"
+    )
+    settings = joint_settings(config, 2 * np.pi, 3)
+    settings = dataclasses.replace(settings, starts=3, polished=2, max_iterations=40)
+    for seed in range(2):
+        found = optimise_trajectory(excitation, settings, [seed])
+        assert np.isfinite(found.kappa)
+        assert found.reach[0] > 0.9
+    distance = Coordinates(model.mechanism).distance(model.mechanism.loops.assembly[None])[0]
+    assert 0 < distance < 1
