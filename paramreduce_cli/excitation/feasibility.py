@@ -13,7 +13,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
-from paramreduce_cli.multibody.coordinates import Follower
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.records import FloatArray
 
 FINER = 4

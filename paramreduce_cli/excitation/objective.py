@@ -18,8 +18,9 @@ from paramreduce_cli.excitation.criteria import condition_from_matrix
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.scaling import Pullback, Scaling
-from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import ObservationFunction
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import scaling as scalings

@@ -29,7 +29,7 @@ from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, samp
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
 from paramreduce_cli.excitation.limits import JointLimits, LimitMap, Mapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
-from paramreduce_cli.multibody.coordinates import Follower
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.records import FloatArray, Trajectory
 
 
@@ -129,6 +129,8 @@ def optimise_trajectory(
         except ParamreduceError as error:  # one of several may fail
             failures.append(error)
     if not results:
+        if isinstance(failures[0], ConfigError):
+            raise failures[0]
         raise ConfigError(f"trajectories.position_limits: {failures[0]}") from failures[0]
     best, series, _ = min(results, key=lambda result: result[2])
     return describe(
@@ -143,7 +145,7 @@ def optimise_trajectory(
 
 
 class _Search:
-    """The search for one trajectory: the grid, the limits, and where the mechanism was last."""
+    """The search for one trajectory: its grid, limits, resting position and plan."""
 
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings

@@ -7,7 +7,6 @@ corrections are not small against the step: a solution stays on its assembly mod
 
 from __future__ import annotations
 
-import contextlib
 from functools import cached_property
 
 import casadi as ca
@@ -54,31 +53,36 @@ class Coordinates:
         self._dependent = list(mechanism.dependent)
 
     @cached_property
+    def _projection(self) -> Projection:
+        return Projection(self.mechanism)
+
+    def _compiled(self, *outputs: ca.MX) -> BatchFunction:
+        """A function of q."""
+        return BatchFunction([self._projection.q], list(outputs), once=self._once)
+
+    @cached_property
     def _newton(self) -> BatchFunction:
-        projection = Projection(self.mechanism)
-        q = projection.q
-        gap = projection.equations(q)
-        correction = -projection.solve(q, gap)
-        return BatchFunction([q], [gap, correction], once=self._once)
+        loop = self._projection
+        gap = loop.equations(loop.q)
+        return self._compiled(gap, -loop.solve(loop.q, gap))
 
     @cached_property
     def _tangent(self) -> BatchFunction:
-        projection = Projection(self.mechanism)
-        q = projection.q
-        return BatchFunction([q], [projection.tangent(q).T], once=self._once)
+        return self._compiled(self._projection.tangent(self._projection.q).T)
 
     @cached_property
     def _distance(self) -> BatchFunction:
-        projection = Projection(self.mechanism)
-        q = projection.q
-        return BatchFunction([q], [projection.distance(q)], once=self._once)
+        return self._compiled(self._projection.distance(self._projection.q))
+
+    @cached_property
+    def _jacobian(self) -> BatchFunction:
+        return self._compiled(self._projection.dependent_jacobian(self._projection.q).T)
 
     @cached_property
     def _rates(self) -> BatchFunction:
-        projection = Projection(self.mechanism)
-        q = projection.q
+        q = self._projection.q
         dz, ddz = (ca.MX.sym(name, self.mechanism.n_dof) for name in ("dz", "ddz"))
-        outputs = list(projection.rates(q, dz, ddz))
+        outputs = list(self._projection.rates(q, dz, ddz))
         return BatchFunction([q, dz, ddz], outputs, once=self._once)
 
     def states(
@@ -123,7 +127,13 @@ class Coordinates:
     def rates(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Dq and ddq, each (n_samples, n_q), at q (n_samples, n_q) from dz and ddz (n_samples, n_dof)."""
+        """Velocities dq and accelerations ddq, each (n_samples, n_q).
+
+        Args:
+            q: Generalised coordinates, (n_samples, n_q).
+            dz: Velocities of the independent ones, (n_samples, n_dof).
+            ddz: Accelerations, same shape.
+        """
         if self.mechanism.loops is None:
             return dz, ddz
         dq, ddq = self._rates(q, dz, ddz)
@@ -254,13 +264,6 @@ class Coordinates:
         assert self.mechanism.loops is not None
         return float(self._side(self.mechanism.loops.assembly[None])[0])
 
-    @cached_property
-    def _jacobian(self) -> BatchFunction:
-        projection = Projection(self.mechanism)
-        return BatchFunction(
-            [projection.q], [projection.dependent_jacobian(projection.q).T], once=self._once
-        )
-
     def distance(self, q: FloatArray) -> FloatArray:
         """Distance to singularity of loops, 0 to 1, (n_samples,); see :class:`Projection`."""
         return np.nan_to_num(self._distance(q)[0][:, 0], nan=0.0)
@@ -290,49 +293,3 @@ class Coordinates:
             if not todo.size:
                 break
         return new, good
-
-
-class Follower:
-    """Positions along a motion that changes a little from call to call.
-
-    Each call starts from the positions kept last for as many samples, and stays on the side of
-    singular configurations that the assembly is on.
-
-    Args:
-        coordinates: Of the mechanism.
-    """
-
-    def __init__(self, coordinates: Coordinates) -> None:
-        self._coordinates = coordinates
-        self._kept: dict[int, FloatArray] = {}
-        self._last: tuple[FloatArray, FloatArray] | None = None
-
-    def __call__(self, z: FloatArray) -> FloatArray:
-        """Generalised coordinates, (n_samples, n_q), at z (n_samples, n_dof).
-
-        Raises:
-            DataError: The loops cannot be closed at a sample without passing a singularity.
-        """
-        if self._coordinates.mechanism.loops is None:
-            return z
-        if self._last is None or not np.array_equal(self._last[0], z):
-            self._last = (z, self._found(z))
-        return self._last[1]
-
-    def _found(self, z: FloatArray) -> FloatArray:
-        """From the positions that were kept; if that leads elsewhere, anew from the assembly."""
-        kept = self._kept.get(z.shape[0])
-        if kept is not None:
-            with contextlib.suppress(DataError):
-                q = self._coordinates.positions(z, kept)
-                self._coordinates.check_side(z, q)
-                return q
-        q = self._coordinates.positions(z, None)
-        self._coordinates.check_side(z, q)
-        return q
-
-    def keep(self) -> None:
-        """Start from the positions found last from now on, because they are good ones."""
-        if self._last is not None:
-            q = self._last[1]
-            self._kept[q.shape[0]] = q

@@ -68,7 +68,7 @@ class Projection:
         return -self.solve(q, ca.densify(self._jacobian(q)[:, self._z]))
 
     def rates(self, q: ca.MX, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Dq and ddq, each (n_q,)."""
+        """Velocities dq and accelerations ddq, each (n_q,)."""
         tangent = self.tangent(q)
         dq = self._whole(tangent @ dz, dz)
         return dq, self._whole(tangent @ ddz + self.drift(q, dq), ddz)

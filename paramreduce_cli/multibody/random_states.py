@@ -62,7 +62,8 @@ def _wandered(
 
 
 def _extent(mechanism: Mechanism) -> float:
-    """A length that is typical of the mechanism, m."""
-    if mechanism.loops is None:
-        return max((abs(length) for length in mechanism.lengths.values()), default=1.0)
-    return float(np.ptp(body_poses(mechanism, mechanism.loops.assembly)[:, :3, 3], axis=0).max())
+    """A length that is typical of the mechanism, m; one if its bodies are all in one place."""
+    if mechanism.lengths:
+        return max(abs(length) for length in mechanism.lengths.values())
+    q = np.zeros(mechanism.n_q) if mechanism.loops is None else mechanism.loops.assembly
+    return float(np.ptp(body_poses(mechanism, q)[:, :3, 3], axis=0).max()) or 1.0

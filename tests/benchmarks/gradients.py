@@ -12,7 +12,7 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.multibody.coordinates import Follower
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import joint_settings
 

@@ -12,7 +12,8 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.description import described_constraints

@@ -7,8 +7,9 @@ from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import JointLimits, LimitMap
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
 from paramreduce_cli.multibody.base_parameters import base_parameters, preference_order
-from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 
 NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])

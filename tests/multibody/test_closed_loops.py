@@ -10,8 +10,9 @@ from oracles.lagrange import Lagrange, forward_dynamics, tangent
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.multibody.coordinates import Coordinates, Follower
+from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.random_states import random_states
