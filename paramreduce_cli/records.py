@@ -333,12 +333,12 @@ class BySize:
 
 
 @dataclass(frozen=True)
-class Ordering(BySize):
+class Subsets(BySize):
     """What one heuristic found: a subset of parameters for every n."""
 
     heuristic: str
-    order: IntArray
-    """Column indices, the first n of which are the subset of size n."""
+    subsets: tuple[IntArray, ...]
+    """Column indices of each subset, in the order in which they were taken; (n,) each."""
     torque_error: FloatArray
     """Weighted Euclidean error on the estimation set of each subset, (m,)."""
     torque_error_1: FloatArray
@@ -355,12 +355,42 @@ class Ordering(BySize):
 
     def subset(self, n: int) -> IntArray:
         """The columns of the subset of size n, (n,)."""
-        return self.order[:n]
+        row = self.row(n)
+        if row is None:
+            raise KeyError(n)
+        return self.subsets[row]
+
+    @property
+    def order(self) -> IntArray | None:
+        """Column indices, the first n of which are the subset of size n; None if not nested."""
+        longest = self.subsets[-1]
+        nested = all(np.array_equal(s, longest[: s.size]) for s in self.subsets)
+        return longest if nested else None
+
+
+@dataclass(frozen=True)
+class Proofs(BySize):
+    """How far the best subset of each size is proven; arrays have one row per size."""
+
+    subsets: tuple[IntArray, ...]
+    """Column indices of the best subset found of each size."""
+    torque_error: FloatArray
+    """Of these, (m,)."""
+    lower_bound: FloatArray
+    """Torque error that no subset of the size is below, (m,)."""
+    status: tuple[str, ...]
+    """`optimal`, `best-found`, or `uncertified` where double precision is not enough."""
+    seconds: FloatArray
+    """Time spent on each size in all runs, (m,)."""
+    nodes: IntArray
+    """Nodes of the search tree that were visited, (m,)."""
+    logs: tuple[IntArray, ...]
+    """Where each unfinished search stopped, to go on from there."""
 
 
 @dataclass(frozen=True)
 class Reduction:
-    """The orderings of all heuristics on one estimation set."""
+    """The subsets of all heuristics on one estimation set."""
 
     names: tuple[str, ...]
     """Of the columns: the standard parameters, a tied group being one column."""
@@ -370,7 +400,10 @@ class Reduction:
     rank: int
     factor: FloatArray
     """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
-    orderings: Mapping[str, Ordering]
+    heuristics: Mapping[str, Subsets]
+    """By name, `HEURISTIC@CRITERION` where the criterion is not the torque error."""
+    proofs: Proofs | None
+    """Of the best subsets by torque, where they were looked for."""
 
     def standard(self, subset: IntArray, values: FloatArray) -> FloatArray:
         """Standard parameters of a reduced model, zero where one is not kept, (n_standard,)."""

@@ -1,80 +1,73 @@
-"""Backward Elimination [Ros2019], Algorithm 1."""
+"""Backward Elimination [Ros2019], Algorithm 1, from one base set or from several."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import islice
+
 import numpy as np
 
-from paramreduce_cli.multibody.base_parameters import DEPENDENT
-from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.reduction.problem import (
-    FULL_PRECISION,
-    SelectionProblem,
-    first_of_the_best,
-)
+from paramreduce_cli.multibody.base_parameters import DEPENDENT, independent_columns
+from paramreduce_cli.records import IntArray
+from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.task import Found, Task, by_size, completed, nested
 from paramreduce_cli.registry import heuristic
 
 
 @heuristic("backward-elimination")
-def backward_elimination(problem: SelectionProblem) -> IntArray:
-    """Remove, one by one, the parameter whose loss raises the torque error least.
+def backward_elimination(task: Task) -> Found:
+    """Remove, one by one, the parameter whose loss costs least.
 
     As long as columns are dependent many removals are free. Which of them comes first decides
     what can be reached later, so it is not left to chance: of the free ones the parameter goes
-    that causes the smallest torques in the fit of least norm, whose unknowns are the torques
-    that the parameters cause. From there the loss of parameter i costs
-    phi_i^2 / ((W'W)^-1)_ii. Costs of groups are per parameter; costs that are round-off are
-    ties, and ties remove the least preferred.
-
-    Returns:
-        All candidates, the last removed first, (n_candidates,).
+    that causes the smallest torques in the fit of least norm. Further base sets to start from are
+    the preferred one, then random ones; each size keeps the best subset of all starts. Ties
+    remove the least preferred.
     """
-    left = problem.units()
-    lengths = np.linalg.norm(problem.W, axis=0)
-    X = problem.W / np.where(lengths > 0, lengths, 1.0)
-    smallest = (FULL_PRECISION * np.linalg.norm(problem.chi)) ** 2
-    tail: list[int] = []
+    objective, effort = task.objective, task.effort
+    orders = [
+        _eliminated(objective, start)
+        for start in islice(_starts(objective, effort.seed), effort.base_sets)
+    ]
+    if len(orders) == 1 and not effort.continue_with_swaps:
+        return nested(task, orders[0])
+    best: dict[int, tuple[float, Units]] = {}
+    for order in orders:
+        for k in range(1, len(order) + 1):
+            kept = order[:k]
+            n = objective.width(kept)
+            if n > task.limit:
+                break
+            found = (kept, objective.score(kept))
+            if effort.continue_with_swaps:
+                found = objective.improved(kept)
+            if n not in best or found[1] < best[n][0]:
+                best[n] = (found[1], found[0])
+    return by_size(objective, {n: kept for n, (_, kept) in best.items()})
+
+
+def _starts(objective: Objective, seed: int) -> Iterator[Units]:
+    """All units, then those of base sets."""
+    everything = tuple(range(len(objective.units)))
+    yield everything
+    yield _base(objective, np.arange(len(everything)))
+    random = np.random.default_rng(seed)
+    while True:
+        yield _base(objective, random.permutation(len(everything)))
+
+
+def _base(objective: Objective, order: IntArray) -> Units:
+    """Units taken in an order, those left out that depend on the others altogether."""
+    columns = objective.columns(tuple(order.tolist()))
+    independent = independent_columns(objective.problem.W, columns, DEPENDENT)
+    return tuple(sorted(objective.units_of(np.array(independent))))
+
+
+def _eliminated(objective: Objective, start: Units) -> Units:
+    """All units, the last removed first; those that are not in the start come last."""
+    left, tail = start, completed(objective, start)[len(start) :]
     while left:
-        costs = _costs(X, problem.chi, left)
-        costs[costs < smallest] = 0.0
-        last = len(left) - 1 - first_of_the_best(-costs[::-1])
-        tail = [*left.pop(last).tolist(), *tail]
-    return np.array(tail, dtype=np.int64)
-
-
-def _costs(X: FloatArray, chi: FloatArray, units: list[IntArray]) -> FloatArray:
-    """What each unit's removal costs per column, (n_units,).
-
-    By how much the squared error rises; where removals are free, the squared torques of the
-    free units in the fit of least norm, and infinity for the others.
-    """
-    columns = np.concatenate(units)
-    sizes = np.array([unit.size for unit in units])
-    parts = np.split(np.arange(columns.size), np.cumsum(sizes)[:-1])
-    U, s, Vt = np.linalg.svd(X[:, columns], full_matrices=True)
-    rank = int(np.sum(s > DEPENDENT * s[0]))
-    phi = Vt[:rank].T @ ((U[:, :rank].T @ chi) / s[:rank])
-    null = Vt[rank:].T
-    if rank < columns.size:
-        free = [np.linalg.matrix_rank(null[part], tol=1e-6) == part.size for part in parts]
-        if any(free):
-            own = [
-                float(phi[p] @ phi[p]) if f else np.inf for p, f in zip(parts, free, strict=True)
-            ]
-            return np.array(own) / sizes
-        return np.array([_rise(X[:, columns], chi, part) for part in parts]) / sizes
-    inverse = (Vt.T / s**2) @ Vt
-    if (sizes == 1).all():
-        alone: FloatArray = phi**2 / np.diag(inverse)
-        return alone
-    rises = [phi[p] @ np.linalg.solve(inverse[np.ix_(p, p)], phi[p]) for p in parts]
-    return np.array(rises) / sizes
-
-
-def _rise(X: FloatArray, chi: FloatArray, part: IntArray) -> float:
-    """Rise of the squared error without some columns, by fitting twice."""
-
-    def squared_error(kept: FloatArray) -> float:
-        left = chi - kept @ np.linalg.lstsq(kept, chi, rcond=DEPENDENT)[0] if kept.size else chi
-        return float(left @ left)
-
-    return squared_error(np.delete(X, part, axis=1)) - squared_error(X)
+        fewer = objective.without_least(left)
+        (gone,) = set(left) - set(fewer)
+        left, tail = without(left, gone), (gone, *tail)
+    return tail

@@ -1,40 +1,50 @@
-"""Forward Selection [Ros2019], Algorithm 2."""
+"""Forward Selection [Ros2019], Algorithms 2 and 3."""
 
 from __future__ import annotations
 
-import numpy as np
-
-from paramreduce_cli.records import IntArray
-from paramreduce_cli.reduction.problem import (
-    FULL_PRECISION,
-    SelectionProblem,
-    first_of_the_best,
-)
-from paramreduce_cli.reduction.remainder import Remainder
+from paramreduce_cli.reduction.objective import without
+from paramreduce_cli.reduction.task import Found, Task, by_size, completed, nested
 from paramreduce_cli.registry import heuristic
 
 
 @heuristic("forward-selection")
-def forward_selection(problem: SelectionProblem) -> IntArray:
-    """Add, one by one, the parameter that lowers the torque error most.
+def forward_selection(task: Task) -> Found:
+    """Add, one by one, the parameter that is worth most.
 
-    For a column x of which r is left after projecting out the subset, adding it lowers the
-    squared error by (r . e)^2 / (r . r), e being what is left of the torques; for a group it is
-    what its columns explain together, per column. Once nothing is
-    left but round-off, the column of which the largest share is left comes next, so that the
+    By torques that is the one that lowers the error most: for a column of which r is left after
+    projecting out the subset, the squared error falls by (r . e)^2 / (r . r), e being what is left
+    of the torques; for a group it is what its columns explain together, per column. Once nothing
+    is left but round-off, the column of which the largest share is left comes next, so that the
     order goes on to a well-conditioned base; dependent columns follow in order of preference.
-
-    Returns:
-        All candidates, (n_candidates,).
     """
-    remainder = Remainder(problem)
-    while remainder.columns.size:
-        lengths = remainder.squared_lengths()
-        if not lengths.any():
+    objective = task.objective
+    order: tuple[int, ...] = ()
+    while objective.width(order) < task.limit:
+        longer = objective.with_best(order)
+        if longer == order:
             break
-        if np.linalg.norm(remainder.chi) > FULL_PRECISION * remainder.chi_length:
-            scores = remainder.gains()
-        else:
-            scores = remainder.relative_squared_lengths()
-        remainder.take(first_of_the_best(scores))
-    return remainder.take_the_rest()
+        order = longer
+    return nested(task, completed(objective, order))
+
+
+@heuristic("forward-selection-2")
+def forward_selection_2(task: Task) -> Found:
+    """Add the best parameter, remove the one added in the pass before, and add the best again.
+
+    The first pass only adds. (As [Ros2019] prints Algorithm 3 it lacks the second addition, which
+    its text describes.) Subsets are not nested.
+    """
+    objective = task.objective
+    kept = objective.with_best(())
+    subsets = [kept]
+    while objective.width(kept) < task.limit:
+        longer = objective.with_best(kept)
+        if longer == kept:
+            break
+        renewed = objective.with_best(without(longer, kept[-1]))
+        # With groups the parameter that comes back may be wider or narrower.
+        kept = renewed if objective.width(renewed) > objective.width(kept) else longer
+        subsets.append(kept)
+    rest = completed(objective, kept)
+    subsets += [rest[:k] for k in range(len(kept) + 1, len(rest) + 1)]
+    return by_size(objective, [s for s in subsets if objective.width(s) <= task.limit])

@@ -12,13 +12,14 @@ from paramreduce_cli.reduction.problem import SelectionProblem
 class Remainder:
     """What is left of the candidate columns and of chi once some columns are taken.
 
-    Columns stand in order of preference, those of a group together; scores are per unit, a
-    column or a group. Taking one removes its directions from all others by modified
+    Scores are per unit, a column or a group, those that are left in order of preference. Taking one removes its directions from all others by modified
     Gram-Schmidt, each new direction itself orthogonalised twice.
     """
 
     def __init__(self, problem: SelectionProblem) -> None:
         units = problem.units()
+        self.units: IntArray = np.arange(len(units))
+        """The units left, by their numbers in order of preference."""
         self.columns: IntArray = np.concatenate(units)
         self._sizes = np.array([unit.size for unit in units])
         self.X: FloatArray = problem.W[:, self.columns].copy()
@@ -26,7 +27,6 @@ class Remainder:
         self.chi_length = float(np.linalg.norm(problem.chi))
         self._lengths = np.linalg.norm(self.X, axis=0)
         self._basis = np.empty((self.X.shape[0], 0))
-        self.order: list[int] = []
 
     def squared_lengths(self) -> FloatArray:
         """Of what is left of each unit per column, zero where it is dependent, (n_units,)."""
@@ -56,16 +56,17 @@ class Remainder:
         return result
 
     def take(self, unit: int) -> None:
-        """Add the columns of a unit to the subset."""
-        start = int(self._starts()[unit])
-        for _ in range(int(self._sizes[unit])):
+        """Add the columns of a unit, by its number, to the subset."""
+        place = int(np.searchsorted(self.units, unit))
+        start = int(self._starts()[place])
+        for _ in range(int(self._sizes[place])):
             self._take_column(start)
-        self._sizes = np.delete(self._sizes, unit)
+        self._sizes = np.delete(self._sizes, place)
+        self.units = np.delete(self.units, place)
 
     def _take_column(self, position: int) -> None:
         direction = self.X[:, position]
         dependent = np.linalg.norm(direction) <= DEPENDENT * self._lengths[position]
-        self.order.append(int(self.columns[position]))
         self._drop(position)
         if dependent:
             return
@@ -75,10 +76,6 @@ class Remainder:
         self.X -= np.outer(direction, direction @ self.X)
         self.chi -= direction * (direction @ self.chi)
         self._basis = np.column_stack([self._basis, direction])
-
-    def take_the_rest(self) -> IntArray:
-        """Append all that is left, in order of preference, and return the whole order."""
-        return np.array([*self.order, *self.columns.tolist()], dtype=np.int64)
 
     def _starts(self) -> IntArray:
         return np.concatenate([[0], np.cumsum(self._sizes)[:-1]]).astype(np.int64)

@@ -1,0 +1,209 @@
+"""The best subset of every size, with proofs."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from paramreduce_cli.records import IntArray, Progress, Proofs
+from paramreduce_cli.reduction.branch_and_bound import Search, UnitProblem, unit_problem
+from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.problem import FULL_PRECISION
+from paramreduce_cli.reduction.swap import swap
+from paramreduce_cli.reduction.task import Found, Task, by_size
+from paramreduce_cli.registry import heuristic
+
+OPTIMAL, BEST_FOUND, UNCERTIFIED = "optimal", "best-found", "uncertified"
+_SLICE = 20_000
+"""Nodes between two looks at the clock."""
+
+
+@heuristic("best-subset")
+def best_subset(task: Task) -> Found:
+    """Find the best subset of every size by branch and bound, and prove it.
+
+    Starts from what the swap search finds. When time or nodes run out, or on Ctrl-C, the best
+    subset found and a lower bound of the error stand; a later run goes on from there.
+    """
+    proofs = _Proofs(task)
+    proofs.run()
+    return Found(by_size(task.objective, proofs.subsets()).subsets, proofs.record())
+
+
+@dataclass
+class _Proof:
+    """What is known of one size; errors are squared shares of chi."""
+
+    n: int
+    subset: IntArray
+    squared_error: float
+    squared_bound: float = 0.0
+    status: str = BEST_FOUND
+    seconds: float = 0.0
+    nodes: int = 0
+    log: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+
+class _Proofs:
+    """Searches for the sizes one after the other, as many at a time as there are threads."""
+
+    def __init__(self, task: Task) -> None:
+        self._task = task
+        self._objective: Objective = task.objective
+        self._problem: UnitProblem = unit_problem(task.objective.problem)
+        place = {int(column): k for k, column in enumerate(self._problem.columns)}
+        self._place = place
+        self._proofs: dict[int, _Proof] = {}
+        for columns in swap(task).subsets:
+            self._start(self._numbered(columns))
+        if task.previous is not None:
+            self._remember(task.previous)
+        self._spread()
+
+    def _numbered(self, columns: IntArray) -> IntArray:
+        return np.array([self._place[int(c)] for c in columns], dtype=np.int64)
+
+    def _squared_error(self, subset: IntArray) -> float:
+        return self._objective.score(self._units(subset)) ** 2
+
+    def _units(self, subset: IntArray) -> Units:
+        return self._objective.units_of(self._problem.columns[subset])
+
+    def _start(self, subset: IntArray) -> None:
+        error = self._squared_error(subset)
+        self._proofs[subset.size] = _Proof(subset.size, subset, error)
+
+    def _remember(self, previous: Proofs) -> None:
+        """Take over what an earlier run has found and proven."""
+        for k, n in enumerate(previous.n.tolist()):
+            proof = self._proofs.get(n)
+            if proof is None:
+                continue
+            subset = self._numbered(previous.subsets[k])
+            error = self._squared_error(subset)
+            if error < proof.squared_error:
+                proof.subset, proof.squared_error = subset, error
+            proof.squared_bound = float(previous.lower_bound[k]) ** 2
+            proof.status, proof.log = previous.status[k], previous.logs[k]
+            proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
+
+    def run(self) -> None:
+        """Search until all is proven, or time or nodes run out, or the user has enough."""
+        deadline = time.monotonic() + self._task.effort.time_limit
+        waiting = iter([p for p in self._proofs.values() if self._open(p)])
+        with ThreadPoolExecutor(self._task.effort.jobs) as pool:
+            running: dict[Future[None], tuple[_Proof, Search]] = {}
+            try:
+                self._go_on(pool, running, waiting, deadline)
+            except KeyboardInterrupt:
+                self._task.interrupted()
+                wait(running)
+        for proof, search in running.values():
+            self._take_over(proof, search)
+        self._spread()
+
+    def _go_on(
+        self,
+        pool: ThreadPoolExecutor,
+        running: dict[Future[None], tuple[_Proof, Search]],
+        waiting: Iterator[_Proof],
+        deadline: float,
+    ) -> None:
+        while True:
+            while len(running) < self._task.effort.jobs and time.monotonic() < deadline:
+                proof = next(waiting, None)
+                if proof is None:
+                    break
+                search = Search(
+                    self._problem, proof.n, proof.squared_error, proof.subset, log=proof.log
+                )
+                running[pool.submit(self._slice, proof, search)] = (proof, search)
+            if not running:
+                return
+            done, _ = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                proof, search = running.pop(future)
+                future.result()
+                if search.finished or self._spent(search) or time.monotonic() >= deadline:
+                    self._take_over(proof, search)
+                    self._show()
+                else:
+                    running[pool.submit(self._slice, proof, search)] = (proof, search)
+
+    def _slice(self, proof: _Proof, search: Search) -> None:
+        started = time.perf_counter()
+        limit = self._task.effort.node_limit
+        most = _SLICE if limit is None else min(_SLICE, limit - search.nodes)
+        search.advance(most)
+        proof.seconds += time.perf_counter() - started
+
+    def _spent(self, search: Search) -> bool:
+        limit = self._task.effort.node_limit
+        return limit is not None and search.nodes >= limit
+
+    def _open(self, proof: _Proof) -> bool:
+        return proof.status == BEST_FOUND and proof.squared_error > FULL_PRECISION**2
+
+    def _show(self) -> None:
+        proven = [p.n for p in self._proofs.values() if not self._open(p)]
+        remark = f"{len(proven)} of {len(self._proofs)} sizes"
+        self._task.progress(Progress("best-subset", len(proven), len(self._proofs), remark))
+
+    def _take_over(self, proof: _Proof, search: Search) -> None:
+        """Note how far a search has come."""
+        if search.squared_error < proof.squared_error and search.subset.size:
+            # A subset may need fewer columns than there are places.
+            full = self._filled(search.subset, proof.n)
+            if full is not None:
+                proof.subset, proof.squared_error = full, self._squared_error(full)
+        proof.nodes += search.nodes
+        certain = self._problem.certifiable and not search.doubtful
+        if certain:
+            proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
+        proof.log = np.zeros(0, np.int64) if search.finished else search.log
+        if search.finished or not certain:
+            proof.status = OPTIMAL if certain else UNCERTIFIED
+        if proof.status == OPTIMAL:
+            proof.squared_bound = proof.squared_error
+
+    def _filled(self, subset: IntArray, n: int) -> IntArray | None:
+        """A subset with further units until it has n columns; None if none fit."""
+        kept = self._units(subset)
+        for unit in range(len(self._objective.units)):
+            longer = (*kept, unit)
+            if unit not in kept and self._objective.width(longer) <= n:
+                kept = longer
+        columns = self._objective.columns(kept)
+        return self._numbered(columns) if columns.size == n else None
+
+    def _spread(self) -> None:
+        """What holds for one size holds for its neighbours: a bound for all smaller ones, and
+        where nothing is left to explain there is nothing to prove."""
+        bound = 0.0
+        for n in sorted(self._proofs, reverse=True):
+            proof = self._proofs[n]
+            if proof.squared_error <= FULL_PRECISION**2:
+                proof.status = OPTIMAL
+            proof.squared_bound = bound = max(bound, proof.squared_bound)
+
+    def subsets(self) -> dict[int, Units]:
+        """The best subset found of every size."""
+        return {n: self._units(proof.subset) for n, proof in self._proofs.items()}
+
+    def record(self) -> Proofs:
+        """All proofs by size."""
+        proofs = [self._proofs[n] for n in sorted(self._proofs)]
+        return Proofs(
+            n=np.array([p.n for p in proofs]),
+            subsets=tuple(self._problem.columns[p.subset] for p in proofs),
+            torque_error=np.sqrt([p.squared_error for p in proofs]),
+            lower_bound=np.sqrt([p.squared_bound for p in proofs]),
+            status=tuple(p.status for p in proofs),
+            seconds=np.array([p.seconds for p in proofs]),
+            nodes=np.array([p.nodes for p in proofs], dtype=np.int64),
+            logs=tuple(p.log for p in proofs),
+        )

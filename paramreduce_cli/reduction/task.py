@@ -1,0 +1,86 @@
+"""What a heuristic is asked for, and what it answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from paramreduce_cli.records import IntArray, Progress, Proofs
+from paramreduce_cli.reduction.objective import Objective, Units
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How hard to search."""
+
+    base_sets: int = 1
+    """Base sets from which parameters are eliminated backwards."""
+    continue_with_swaps: bool = False
+    """Whether the subsets of backward elimination are improved by exchanges."""
+    kicks: int = 8
+    """Random changes of a subset from which the swap search starts again."""
+    seed: int = 0
+    time_limit: float = 60.0
+    """Of proofs, s."""
+    node_limit: int | None = None
+    """Of the proof of one size; unlike time it stops every machine at the same place."""
+    jobs: int = 1
+    """Threads that search for proofs."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """A criterion to select by, and how far to go."""
+
+    objective: Objective
+    largest: int | None = None
+    """Number of columns at which to stop; all if None."""
+    effort: Effort = Effort()
+    previous: Proofs | None = None
+    """What an earlier run has proven on the same data."""
+    progress: Callable[[Progress], None] = lambda _: None
+    interrupted: Callable[[], None] = lambda: None
+    """Told that a KeyboardInterrupt was met and heeded."""
+
+    @property
+    def limit(self) -> int:
+        """Largest number of columns."""
+        total = int(self.objective.widths.sum())
+        return total if self.largest is None else min(total, self.largest)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Subsets by growing number of columns, each in the order in which it was taken."""
+
+    subsets: tuple[IntArray, ...]
+    proofs: Proofs | None = None
+    warnings: tuple[str, ...] = field(default=())
+
+
+Heuristic = Callable[[Task], Found]
+
+
+def nested(task: Task, order: Units) -> Found:
+    """The subsets that an order of all units passes through."""
+    objective, subsets = task.objective, []
+    for k in range(1, len(order) + 1):
+        columns = objective.columns(order[:k])
+        if columns.size > task.limit:
+            break
+        subsets.append(columns)
+    return Found(tuple(subsets))
+
+
+def completed(objective: Objective, kept: Units) -> Units:
+    """A subset with all other units after it, in order of preference."""
+    return (*kept, *(u for u in range(len(objective.units)) if u not in kept))
+
+
+def by_size(objective: Objective, subsets: Mapping[int, Units] | Iterable[Units]) -> Found:
+    """One subset for every number of columns."""
+    values = subsets.values() if isinstance(subsets, Mapping) else subsets
+    columns = [objective.columns(kept) for kept in values if kept]
+    return Found(tuple(sorted(columns, key=lambda c: int(np.size(c)))))

@@ -1,0 +1,153 @@
+"""The Euclidean torque error as a criterion, in closed form."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.multibody.base_parameters import DEPENDENT
+from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.problem import (
+    FULL_PRECISION,
+    SelectionProblem,
+    first_of_the_best,
+)
+from paramreduce_cli.reduction.remainder import Remainder
+
+
+class TorqueObjective(Objective):
+    """Least squares of the torques: scores are errors as shares of them."""
+
+    def __init__(self, problem: SelectionProblem) -> None:
+        super().__init__(problem)
+        lengths = np.linalg.norm(problem.W, axis=0)
+        self._X = problem.W / np.where(lengths > 0, lengths, 1.0)
+        self._total = float(np.linalg.norm(problem.chi))
+        self._taken: tuple[Units, Remainder] = ((), Remainder(problem))
+
+    def score(self, kept: Units) -> float:
+        """Torque error of the least-squares fit."""
+        X = self._X[:, self.columns(kept)]
+        solution = np.linalg.lstsq(X, self.problem.chi, rcond=DEPENDENT)[0]
+        return float(np.linalg.norm(self.problem.chi - X @ solution)) / self._total
+
+    def gains(self, kept: Units) -> FloatArray:
+        """By how much the squared error falls; once nothing but round-off is left of the torques,
+        the share of a unit that is independent of the subset."""
+        remainder = self._remainder(kept)
+        if np.linalg.norm(remainder.chi) > FULL_PRECISION * remainder.chi_length:
+            values = remainder.gains()
+        else:
+            values = remainder.relative_squared_lengths()
+        values = np.where(remainder.squared_lengths() > 0, values, -np.inf)
+        result = np.full(len(self.units), -np.inf)
+        result[remainder.units] = values
+        return result
+
+    def losses(self, kept: Units) -> FloatArray:
+        """By how much the squared error rises. Where removals are free, the squared torques of the
+        free units in the fit of least norm, whose unknowns are the torques that the parameters
+        cause; costs that are round-off are ties."""
+        ordered = sorted(kept)
+        result = np.full(len(self.units), np.inf)
+        costs = _removal_costs(self._X, self.problem.chi, [self.units[u] for u in ordered])
+        costs[costs < (FULL_PRECISION * self._total) ** 2] = 0.0
+        result[ordered] = costs
+        return result
+
+    def exchanged(self, kept: Units) -> Units:
+        """By the closed form of the error after an exchange; groups one by one."""
+        if self.widths.max() > 1:
+            return self._exchanged_one_by_one(kept)
+        improvement = self._improvements(kept)
+        if improvement is None or not np.any(improvement > 0):
+            return kept
+        best = first_of_the_best(improvement.ravel())
+        place, unit = divmod(best, len(self.units))
+        return (*without(kept, kept[place]), unit)
+
+    def _improvements(self, kept: Units) -> FloatArray | None:
+        """Fall of the squared error for every exchange, (n_kept, n_units); None if dependent.
+
+        With r and e what the subset leaves of another column and of chi, b the subset's
+        coefficients in either and P = (X'X)^-1: without column i these become r + b_i u and
+        e + b_i u with |u|^2 = 1 / P_ii, orthogonal to r and e.
+        """
+        columns = self.columns(kept)
+        if columns.size > self._X.shape[0]:
+            return None
+        Q, R = np.linalg.qr(self._X[:, columns])
+        diagonal = np.abs(np.diag(R))
+        if diagonal.min() <= DEPENDENT:
+            return None
+        own = self._X[:, self.columns(tuple(range(len(self.units))))]
+        projected = Q.T @ np.column_stack([own, self.problem.chi])
+        left = np.column_stack([own, self.problem.chi]) - Q @ projected
+        inverse = np.linalg.inv(R)
+        b = inverse @ projected
+        P = np.einsum("ij,ij->i", inverse, inverse)[:, None]
+        squares = np.einsum("ij,ij->j", left[:, :-1], left[:, :-1])[None, :] + b[:, :-1] ** 2 / P
+        products = (left[:, -1] @ left[:, :-1])[None, :] + b[:, :-1] * b[:, -1:] / P
+        squares[:, list(kept)] = np.inf
+        gains: FloatArray = products**2 / np.maximum(squares, DEPENDENT**2)
+        result: FloatArray = np.where(squares > DEPENDENT**2, gains - b[:, -1:] ** 2 / P, -np.inf)
+        return result
+
+    def _exchanged_one_by_one(self, kept: Units) -> Units:
+        best, found = self.score(kept), kept
+        for unit in kept:
+            rest = without(kept, unit)
+            gains = self.gains(rest)
+            gains[self.widths != self.widths[unit]] = -np.inf
+            gains[unit] = -np.inf
+            if np.any(gains > -np.inf):
+                other = (*rest, first_of_the_best(gains))
+                score = self.score(other)
+                if score < best:
+                    best, found = score, other
+        return found
+
+    def _remainder(self, kept: Units) -> Remainder:
+        """What is left by a subset; quick where it extends the one asked for before."""
+        taken, remainder = self._taken
+        if kept[: len(taken)] != taken:
+            taken, remainder = (), Remainder(self.problem)
+        for unit in kept[len(taken) :]:
+            remainder.take(unit)
+        self._taken = (kept, remainder)
+        return remainder
+
+
+def _removal_costs(X: FloatArray, chi: FloatArray, units: list[IntArray]) -> FloatArray:
+    """What each unit's removal costs per column, (n_units,); infinite where others are free."""
+    columns = np.concatenate(units)
+    sizes = np.array([unit.size for unit in units])
+    parts = np.split(np.arange(columns.size), np.cumsum(sizes)[:-1])
+    U, s, Vt = np.linalg.svd(X[:, columns], full_matrices=True)
+    rank = int(np.sum(s > DEPENDENT * s[0]))
+    phi = Vt[:rank].T @ ((U[:, :rank].T @ chi) / s[:rank])
+    null = Vt[rank:].T
+    if rank < columns.size:
+        free = [np.linalg.matrix_rank(null[part], tol=1e-6) == part.size for part in parts]
+        if any(free):
+            own = [
+                float(phi[p] @ phi[p]) if f else np.inf for p, f in zip(parts, free, strict=True)
+            ]
+            return np.array(own) / sizes
+        return np.array([_rise(X[:, columns], chi, part) for part in parts]) / sizes
+    inverse = (Vt.T / s**2) @ Vt
+    if (sizes == 1).all():
+        alone: FloatArray = phi**2 / np.diag(inverse)
+        return alone
+    rises = [phi[p] @ np.linalg.solve(inverse[np.ix_(p, p)], phi[p]) for p in parts]
+    return np.array(rises) / sizes
+
+
+def _rise(X: FloatArray, chi: FloatArray, part: IntArray) -> float:
+    """Rise of the squared error without some columns, by fitting twice."""
+
+    def squared_error(kept: FloatArray) -> float:
+        left = chi - kept @ np.linalg.lstsq(kept, chi, rcond=DEPENDENT)[0] if kept.size else chi
+        return float(left @ left)
+
+    return squared_error(np.delete(X, part, axis=1)) - squared_error(X)
