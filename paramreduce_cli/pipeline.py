@@ -39,7 +39,13 @@ class Stage:
     @property
     def artifacts(self) -> list[StageInput]:
         """The inputs that other stages make."""
-        return [entry for entry in self.inputs if entry.type in ARTIFACTS]
+        own = self.output
+        return [e for e in self.inputs if e.type in ARTIFACTS and e.type is not own]
+
+    @property
+    def previous(self) -> StageInput | None:
+        """Where the stage takes what it has made before, to go on from there."""
+        return next((entry for entry in self.inputs if entry.type is self.output), None)
 
 
 def describe_stage(name: str, function: Callable[..., Any]) -> Stage:

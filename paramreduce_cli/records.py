@@ -444,6 +444,22 @@ class Selected:
     values: FloatArray
     expressions: tuple[str, ...]
     """Each approximate base parameter as a linear expression of standard ones."""
+    reason: str
+    """One sentence that says why it was taken."""
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the selection would be on other data; arrays have one row per variant of the data."""
+
+    variants: tuple[str, ...]
+    """What each one is."""
+    chosen: BoolArray
+    """(n_variants, n_columns)"""
+    values: FloatArray
+    """Approximate base parameters, not a number where not chosen, (n_variants, n_columns)."""
+    torque_error: FloatArray
+    """Of each subset on its own data, (n_variants,)."""
 
 
 @dataclass(frozen=True)
@@ -455,6 +471,10 @@ class Validation:
     """Operation counts and mass-matrix figures of the full model, by name."""
     nominal_acceleration: FloatArray
     selected: Selected
+    pareto: tuple[tuple[str, int], ...]
+    """Heuristic and n of every model that no other one beats in all respects."""
+    stability: Stability | None
+    """Of the selected subset, where it was asked for."""
     accepted: bool
     verdict: str
     """One sentence that says why."""
@@ -497,3 +517,5 @@ class Run:
     parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
     """Finished parts of an artifact that is not whole yet, kept across interruptions."""
     progress: Callable[[Progress], None] = lambda _: None
+    interrupted: Callable[[], None] = lambda: None
+    """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""

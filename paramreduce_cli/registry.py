@@ -66,10 +66,22 @@ class Registry:
 
 heuristic = Registry("heuristic", "paramreduce_cli.reduction")
 criterion = Registry("criterion", "paramreduce_cli.excitation")
+selection_criterion = Registry("criterion", "paramreduce_cli.reduction")
 scaling = Registry("scaling", "paramreduce_cli.excitation")
 figure = Registry("figure", "paramreduce_cli.report")
 table = Registry("table", "paramreduce_cli.report")
 _stages = Registry("stage", "paramreduce_cli.stages")
+
+
+def torque_only(function: F) -> F:
+    """Declare a heuristic that makes sense for the torque error alone."""
+    function.torque_only = True  # type: ignore[attr-defined]
+    return function
+
+
+def selects_by_torque_only(function: Callable[..., Any]) -> bool:
+    """Whether a heuristic was declared so."""
+    return getattr(function, "torque_only", False)
 
 
 def stage(function: F) -> F:

@@ -32,7 +32,6 @@ from paramreduce_cli.artifacts.store import (
 )
 from paramreduce_cli.config import Config, section_text
 from paramreduce_cli.pipeline import (
-    ARTIFACTS,
     Stage,
     StageInput,
     brought_files,
@@ -49,6 +48,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
+    Trajectories,
 )
 
 
@@ -131,6 +131,7 @@ class Runner:
         progress: Told of long work.
         samples: A samples.h5 brought by the user instead of the folder's own.
         remark: Told of things the user should know.
+        interrupted: Told that a stage has met Ctrl-C and ends early, but whole.
     """
 
     config: Config | None
@@ -139,6 +140,7 @@ class Runner:
     progress: Callable[[Progress], None] = lambda _: None
     samples: Path | None = None
     remark: Callable[[str], None] = lambda _: None
+    interrupted: Callable[[], None] = lambda: None
 
     def run(self, stage: Stage, *, force: bool = False) -> Outcome:
         """Run one stage, unless its artifact is up to date.
@@ -155,13 +157,24 @@ class Runner:
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
         inputs = _Inputs(self.config)
-        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type is not Run}
+        lent = (Run, stage.output)
+        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
+        if stage.previous is not None:
+            arguments[stage.previous.name] = None if force else self._previous(stage)
         parts = self._lend_run(stage, arguments, inputs)
         record = stage.function(**arguments)
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
             parts.clear()
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
+
+    def _previous(self, stage: Stage) -> Any:
+        """What this version of the stage has made before, None if there is nothing to go on from."""
+        stamp = self.store.stamp(stage.output)
+        if stamp is None or (stamp.schema, stamp.versions) != (SCHEMA, versions()):
+            return None
+        path = self.store.path(stage.output)
+        return load_file(path, stage.output, self._robot, stage.name)[0]
 
     def is_current(self, stage: Stage) -> bool:
         """Whether a stage's artifact was made by this version from just these inputs."""
@@ -184,7 +197,7 @@ class Runner:
     def _input_digests(self, stage: Stage) -> dict[str, str]:
         inputs = _Inputs(self.config)
         for entry in stage.inputs:
-            if entry.type in ARTIFACTS:
+            if entry in stage.artifacts:
                 stamp = self.store.stamp(entry.type)
                 if stamp is not None:
                     inputs.digests[file_of(entry.type)] = stamp.digest
@@ -265,12 +278,15 @@ class Runner:
         asked = next((entry.name for entry in stage.inputs if entry.type is Run), None)
         if asked is None:
             return None
+        if stage.output is not Trajectories:
+            arguments[asked] = Run(self.jobs, {}, self.progress, self.interrupted)
+            return None
         # A part may be used again only if nothing that could change it has changed.
         inputs.section("trajectories")
         path = self.store.path(stage.output)
         stamp = self._stamp(stage, inputs, time.perf_counter())
         parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
-        arguments[asked] = Run(self.jobs, parts, self.progress)
+        arguments[asked] = Run(self.jobs, parts, self.progress, self.interrupted)
         return parts
 
     def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:

@@ -21,9 +21,11 @@ from paramreduce_cli.records import (
     Loops,
     Mechanism,
     Model,
-    Ordering,
+    Proofs,
     Reduction,
     Selected,
+    Stability,
+    Subsets,
     Trajectories,
     Trajectory,
     Validation,
@@ -205,43 +207,82 @@ def save_reduction(writer: Writer, reduction: Reduction) -> None:
     writer.dataset("nominal_torque", reduction.nominal_torque)
     writer.dataset("rank", reduction.rank)
     writer.dataset("factor", reduction.factor)
-    writer.dataset("heuristics", list(reduction.orderings))
-    for name, ordering in reduction.orderings.items():
-        writer.dataset(f"{name}/order", ordering.order)
-        writer.dataset(f"{name}/n", ordering.n)
+    writer.dataset("heuristics", list(reduction.heuristics))
+    for name, found in reduction.heuristics.items():
+        if found.order is not None:
+            writer.dataset(f"{name}/order", found.order)
+        writer.dataset(f"{name}/n", found.n)
         for key in _ERRORS:
-            writer.dataset(f"{name}/{key}", getattr(ordering, key))
-        for n, values, beta in zip(ordering.n, ordering.parameters, ordering.beta, strict=True):
-            writer.dataset(f"{name}/parameters/{n}", values)
-            writer.dataset(f"{name}/beta/{n}", beta)
-        writer.timing(f"{name}/seconds", ordering.seconds)
+            writer.dataset(f"{name}/{key}", getattr(found, key))
+        for k, n in enumerate(found.n):
+            if found.order is None:
+                writer.dataset(f"{name}/subsets/{n}", found.subsets[k])
+            writer.dataset(f"{name}/parameters/{n}", found.parameters[k])
+            writer.dataset(f"{name}/beta/{n}", found.beta[k])
+        writer.timing(f"{name}/seconds", found.seconds)
+    if reduction.proofs is not None:
+        _save_proofs(writer, reduction.proofs)
+
+
+def _save_proofs(writer: Writer, proofs: Proofs) -> None:
+    for key in ("n", "torque_error", "lower_bound", "nodes"):
+        writer.dataset(f"proofs/{key}", getattr(proofs, key))
+    writer.dataset("proofs/status", list(proofs.status))
+    for n, subset, log in zip(proofs.n, proofs.subsets, proofs.logs, strict=True):
+        writer.dataset(f"proofs/subsets/{n}", subset)
+        writer.dataset(f"proofs/logs/{n}", log)
+    writer.timing("proofs/seconds", proofs.seconds)
 
 
 def load_reduction(reader: Reader) -> Reduction:
     """reduction.h5"""
-    orderings = {}
-    for name in reader.texts("heuristics"):
-        sizes = reader.array(f"{name}/n", 1)
-        orderings[name] = Ordering(
-            heuristic=name,
-            order=reader.array(f"{name}/order", 1),
-            n=sizes,
-            torque_error=reader.array(f"{name}/torque_error", 1),
-            torque_error_1=reader.array(f"{name}/torque_error_1", 1),
-            torque_error_inf=reader.array(f"{name}/torque_error_inf", 1),
-            parameters=tuple(reader.array(f"{name}/parameters/{n}", 1) for n in sizes),
-            beta=tuple(reader.array(f"{name}/beta/{n}", 2) for n in sizes),
-            minimum_norm=reader.array(f"{name}/minimum_norm", 1).astype(bool),
-            seconds=float(reader.array(f"{name}/seconds")),
-        )
     return Reduction(
         names=reader.texts("parameters/names"),
         expansion=reader.array("parameters/expansion", 2),
         nominal_torque=reader.array("nominal_torque", 1),
         rank=int(reader.array("rank")),
         factor=reader.array("factor", 2),
-        orderings=orderings,
+        heuristics={name: _load_subsets(reader, name) for name in reader.texts("heuristics")},
+        proofs=_load_proofs(reader) if "proofs/n" in reader else None,
     )
+
+
+def _load_subsets(reader: Reader, name: str) -> Subsets:
+    sizes = reader.array(f"{name}/n", 1)
+    if f"{name}/order" in reader:
+        order = reader.array(f"{name}/order", 1)
+        subsets = tuple(order[:n] for n in sizes)
+    else:
+        subsets = tuple(reader.array(f"{name}/subsets/{n}", 1) for n in sizes)
+    return Subsets(
+        heuristic=name,
+        subsets=subsets,
+        n=sizes,
+        torque_error=reader.array(f"{name}/torque_error", 1),
+        torque_error_1=reader.array(f"{name}/torque_error_1", 1),
+        torque_error_inf=reader.array(f"{name}/torque_error_inf", 1),
+        parameters=tuple(reader.array(f"{name}/parameters/{n}", 1) for n in sizes),
+        beta=tuple(reader.array(f"{name}/beta/{n}", 2) for n in sizes),
+        minimum_norm=reader.array(f"{name}/minimum_norm", 1).astype(bool),
+        seconds=float(reader.array(f"{name}/seconds")),
+    )
+
+
+def _load_proofs(reader: Reader) -> Proofs:
+    sizes = reader.array("proofs/n", 1)
+    return Proofs(
+        n=sizes,
+        subsets=tuple(reader.array(f"proofs/subsets/{n}", 1) for n in sizes),
+        torque_error=reader.array("proofs/torque_error", 1),
+        lower_bound=reader.array("proofs/lower_bound", 1),
+        status=reader.texts("proofs/status"),
+        seconds=reader.array("proofs/seconds", 1),
+        nodes=reader.array("proofs/nodes", 1),
+        logs=tuple(reader.array(f"proofs/logs/{n}", 1) for n in sizes),
+    )
+
+
+_STABILITY = ("chosen", "values", "torque_error")
 
 
 def save_validation(writer: Writer, validation: Validation) -> None:
@@ -259,9 +300,22 @@ def save_validation(writer: Writer, validation: Validation) -> None:
     writer.dataset("selected/parameters", selected.parameters)
     writer.dataset("selected/values", selected.values)
     writer.dataset("selected/expressions", selected.expressions)
+    writer.dataset("selected/reason", selected.reason)
+    writer.dataset("pareto/heuristic", np.array([name for name, _ in validation.pareto], dtype=str))
+    writer.dataset("pareto/n", np.array([n for _, n in validation.pareto], dtype=np.int64))
+    if validation.stability is not None:
+        writer.dataset("stability/variants", list(validation.stability.variants))
+        for key in _STABILITY:
+            writer.dataset(f"stability/{key}", getattr(validation.stability, key))
     writer.dataset("accepted", validation.accepted)
     writer.dataset("verdict", validation.verdict)
     writer.dataset("remarks", np.array(validation.remarks, dtype=str))
+
+
+def _load_stability(reader: Reader) -> Stability:
+    arrays = {key: reader.array(f"stability/{key}") for key in _STABILITY}
+    arrays["chosen"] = arrays["chosen"].astype(bool)
+    return Stability(variants=reader.texts("stability/variants"), **arrays)
 
 
 def load_validation(reader: Reader) -> Validation:
@@ -287,7 +341,15 @@ def load_validation(reader: Reader) -> Validation:
             parameters=reader.texts("selected/parameters"),
             values=reader.array("selected/values", 1),
             expressions=reader.texts("selected/expressions"),
+            reason=reader.text("selected/reason"),
         ),
+        pareto=tuple(
+            (name, int(n))
+            for name, n in zip(
+                reader.texts("pareto/heuristic"), reader.array("pareto/n", 1), strict=True
+            )
+        ),
+        stability=_load_stability(reader) if "stability/variants" in reader else None,
         accepted=bool(reader.array("accepted")),
         verdict=reader.text("verdict"),
         remarks=reader.texts("remarks"),

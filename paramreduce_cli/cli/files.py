@@ -21,7 +21,7 @@ from paramreduce_cli.config.schema import NAME
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.multibody.relations import approximate_expressions
-from paramreduce_cli.records import Ordering, Reduction, Report
+from paramreduce_cli.records import Reduction, Report, Subsets
 from paramreduce_cli.report.comparison import (
     QUANTITIES,
     TOLERANCES,
@@ -99,24 +99,24 @@ def inspect(file: Path, chosen: str | None) -> None:
 def _say_model(file: Path, chosen: str) -> None:
     reduction, _ = load_file(file, Reduction, None, "reduce")
     name, _, number = chosen.partition(":")
-    ordering = reduction.orderings.get(name)
-    row = ordering.row(int(number)) if ordering is not None and number.isdigit() else None
-    if ordering is None or row is None:
-        known = ", ".join(f"{k}:{_sizes(o)}" for k, o in reduction.orderings.items())
+    found = reduction.heuristics.get(name)
+    row = found.row(int(number)) if found is not None and number.isdigit() else None
+    if found is None or row is None:
+        known = ", ".join(f"{k}:{_sizes(s)}" for k, s in reduction.heuristics.items())
         raise ConfigError(f"--model {chosen}: there is {known}.")
     n = int(number)
-    kept = ordering.subset(n)
-    texts = approximate_expressions(reduction.names, kept, ordering.beta[row])
-    flag = ", minimum-norm fit beyond the rank" if ordering.minimum_norm[row] else ""
-    say(f"{name}, n = {n}, torque error {ordering.torque_error[row]:.6g}{flag}")
-    for value, text in zip(ordering.parameters[row], texts, strict=True):
+    kept = found.subset(n)
+    texts = approximate_expressions(reduction.names, kept, found.beta[row])
+    flag = ", minimum-norm fit beyond the rank" if found.minimum_norm[row] else ""
+    say(f"{name}, n = {n}, torque error {found.torque_error[row]:.6g}{flag}")
+    for value, text in zip(found.parameters[row], texts, strict=True):
         say(f"{value: .9e}  =  {text}")
 
 
-def _sizes(ordering: Ordering) -> str:
-    if ordering.n[-1] == ordering.n.size:
-        return f"1...{ordering.n[-1]}"
-    return "|".join(map(str, ordering.n))
+def _sizes(found: Subsets) -> str:
+    if found.n[-1] == found.n.size:
+        return f"1...{found.n[-1]}"
+    return "|".join(map(str, found.n))
 
 
 @click.command(name="compare")

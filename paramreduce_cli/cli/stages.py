@@ -14,7 +14,7 @@ import rich.table
 
 from paramreduce_cli.artifacts.report_files import load_json
 from paramreduce_cli.artifacts.store import Store, file_of, load_file
-from paramreduce_cli.cli.terminal import err, out, progress_bars, remark, say
+from paramreduce_cli.cli.terminal import err, interruption, out, progress_bars, remark, say
 from paramreduce_cli.config import Config, load_config, placed_errors
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import Stage, stages_to_run
@@ -76,7 +76,9 @@ def stage_command(stage: Stage) -> click.Command:
         store = _store(loaded, results)
         placed = placed_errors(config, overrides)
         with placed, store.locked(), progress_bars(quiet) as progress:
-            runner = Runner(loaded, store, jobs or _cores(), progress, samples, remark)
+            runner = Runner(
+                loaded, store, jobs or _cores(), progress, samples, remark, interruption.heeded
+            )
             outcome = runner.run(stage, force=force)
         if not quiet:
             _say_outcome(outcome)
@@ -168,7 +170,9 @@ def run(
     with placed_errors(config, overrides), store.locked():
         for stage in stages_to_run(loaded):
             with progress_bars(quiet) as progress:
-                runner = Runner(loaded, store, jobs or _cores(), progress, remark=remark)
+                runner = Runner(
+                    loaded, store, jobs or _cores(), progress, None, remark, interruption.heeded
+                )
                 outcome = runner.run(stage, force=force)
             if not quiet:
                 _say_outcome(outcome)

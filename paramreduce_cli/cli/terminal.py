@@ -68,6 +68,10 @@ class Interruption:
         self._met = True
         raise KeyboardInterrupt
 
+    def heeded(self) -> None:
+        """Go on after an interruption that has ended a search, not the work."""
+        self._met = False
+
     def check(self) -> None:
         """Raise an interruption that was met but did not get through."""
         if self._met and threading.current_thread() is threading.main_thread():

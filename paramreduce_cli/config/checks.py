@@ -240,7 +240,10 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
 
 def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
     total = len(config.body_names()) * len(PARAMETER_KINDS)
-    if config.selected.heuristic not in config.reduction.heuristics:
+    for k, name in enumerate(config.reduction.heuristics):
+        if name in config.reduction.heuristics[:k]:
+            yield ("reduction", "heuristics", k), f"{name} stands there twice"
+    if config.selected.heuristic not in (None, *config.reduction.heuristics):
         yield (
             ("selected", "heuristic"),
             f"{config.selected.heuristic} does not run; it must be one of reduction.heuristics: "

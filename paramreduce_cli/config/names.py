@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
-from paramreduce_cli.registry import Registry
+from paramreduce_cli.registry import (
+    Registry,
+    heuristic,
+    selection_criterion,
+    selects_by_torque_only,
+)
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
@@ -30,7 +35,7 @@ def unknown(what: str, name: str, known: Iterable[str]) -> str:
 class registered:  # noqa: N801 - reads as a type in annotations
     """Annotation for text that must be a name in a registry."""
 
-    def __init__(self, registry: Registry) -> None:
+    def __init__(self, registry: Registry | HeuristicsByCriterion) -> None:
         self._registry = registry
 
     def __get_pydantic_core_schema__(
@@ -47,3 +52,18 @@ class registered:  # noqa: N801 - reads as a type in annotations
         if name not in self._registry:
             raise ValueError(unknown(self._registry.kind, name, self._registry))
         return name
+
+
+class HeuristicsByCriterion:
+    """Names of heuristics, alone (by torque) or as HEURISTIC@CRITERION."""
+
+    kind = "heuristic"
+
+    def __iter__(self) -> Iterator[str]:
+        yield from heuristic
+        for name, function in heuristic.items():
+            if not selects_by_torque_only(function):
+                yield from (f"{name}@{by}" for by in selection_criterion if by != "torque")
+
+    def __contains__(self, name: object) -> bool:
+        return name in list(self)

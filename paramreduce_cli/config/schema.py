@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from paramreduce_cli import registry
 from paramreduce_cli.config.description import Description, Direction, Vector
-from paramreduce_cli.config.names import registered
+from paramreduce_cli.config.names import HeuristicsByCriterion, registered
 from paramreduce_cli.config.numbers import Number, Whole
 from paramreduce_cli.config.section import (
     NAME,
@@ -27,7 +27,7 @@ from paramreduce_cli.config.section import (
 )
 from paramreduce_cli.records import PARAMETER_KINDS
 
-Heuristic = Annotated[str, registered(registry.heuristic)]
+Heuristic = Annotated[str, registered(HeuristicsByCriterion())]
 Criterion = Annotated[str, registered(registry.criterion)]
 Scaling = Annotated[str, registered(registry.scaling)]
 ParameterKind = Literal["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
@@ -253,15 +253,61 @@ class Stop(Section):
     """Number of parameters."""
 
 
+class BackwardElimination(Section):
+    """Backward elimination."""
+
+    base_sets: Count = 1
+    """Base sets to start from: least torques, the preferred one, then random ones; each size keeps the best subset."""
+    swaps: bool = False
+    """Whether its subsets are improved by exchanges."""
+
+
+class Swap(Section):
+    """The swap search."""
+
+    kicks: Annotated[Whole, Field(ge=0, le=10_000)] = 8
+    """Random changes of each subset from which it starts again."""
+    seed: Seed = 0
+    """Of the random changes, and of base sets."""
+
+
+class BestSubset(Section):
+    """The search for proven subsets."""
+
+    time_limit: Annotated[Number, Field(ge=0)] = 60.0
+    """For all sizes together, s; what is not proven then is reported with a lower bound, and the next run goes on."""
+    node_limit: Count | None = None
+    """Nodes of the search tree for each size: ends at the same place on every machine."""
+
+
+class OperationsCriterion(Section):
+    """The criterion `operations`."""
+
+    torque_error: Positive = 0.01
+    """Torque error on the estimation set up to which operations are minimised; higher ones are penalised."""
+
+
 class ReductionSection(Section):
     """How parameters are selected."""
 
     heuristics: Annotated[list[Heuristic], Field(min_length=1)] = [
         "qr",
         "forward-selection",
+        "forward-selection-2",
+        "floating",
         "backward-elimination",
+        "swap",
+        "best-subset",
     ]
-    """Which heuristics run."""
+    """Which heuristics run; HEURISTIC@CRITERION selects by acceleration or operations instead of torque."""
+    backward_elimination: BackwardElimination = BackwardElimination()
+    """Backward elimination."""
+    swap: Swap = Swap()
+    """Swap search."""
+    best_subset: BestSubset = BestSubset()
+    """Search for proven subsets."""
+    operations: OperationsCriterion = OperationsCriterion()
+    """Selection by the cost of evaluating the model."""
     weighting: Literal["nominal-torque", "none"] = "nominal-torque"
     """Weight of each joint in fitting and scoring alike."""
     groups: list[GroupSection] = []
@@ -271,20 +317,29 @@ class ReductionSection(Section):
 
 
 class SelectedSection(Section):
-    """The reduced model that validate judges and report shows."""
+    """The reduced model that validate judges and report shows: by its size, or the smallest that keeps to tolerances on both sets."""
 
-    heuristic: Heuristic = "forward-selection"
-    """Whose subset."""
+    heuristic: Heuristic | None = None
+    """Whose subset; of all heuristics the best one if left out."""
     n: Count | None = None
-    """Number of parameters; or give torque_error."""
+    """Number of parameters."""
     torque_error: Positive | None = None
-    """Take the smallest subset whose torque error on the estimation set is at most this."""
+    """Largest torque error, a share; 0.01 if nothing is given."""
+    acceleration_error: Positive | None = None
+    """Largest acceleration error, a share."""
+    operations: Positive | None = None
+    """Most operations of the inverse dynamics."""
 
     @model_validator(mode="after")
     def _one(self) -> SelectedSection:
-        if self.n is not None and self.torque_error is not None:
-            raise ValueError("give n or torque_error, not both")
+        if self.n is not None and self.tolerances():
+            raise ValueError(f"give n or {', '.join(self.tolerances())}, not both")
         return self
+
+    def tolerances(self) -> dict[str, float]:
+        """The tolerances given, by key."""
+        keys = ("torque_error", "acceleration_error", "operations")
+        return {key: value for key in keys if (value := getattr(self, key)) is not None}
 
 
 class Acceptance(Section):
@@ -311,8 +366,12 @@ class ValidationSection(Section):
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
     operations: Literal["generalised", "independent"] = "generalised"
     """Of closed loops: count d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b handed in."""
+    stability: bool = True
+    """Whether the selection is repeated with each trajectory left out and with fewer samples."""
     condition_factor: Annotated[Number, Field(gt=1)] = 10.0
-    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than the full model's."""
+    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than the full model's, or its smallest eigenvalue this much smaller."""
+    error_factor: Annotated[Number, Field(gt=1)] = 2.0
+    """Estimation and validation errors are said to part where one is this much larger than the other."""
 
 
 class ReportSection(Section):

@@ -153,6 +153,7 @@ class Dynamics:
         same: Mapping[int, int] = MappingProxyType({}),
         signs_free: bool = True,
         independent: bool = False,
+        direct: bool = True,
     ) -> tuple[int, int]:
         """Operations of IDM and [M | delta] when only some parameters are kept.
 
@@ -162,18 +163,19 @@ class Dynamics:
             signs_free: See :mod:`paramreduce_cli.expressions.operations`.
             independent: Whether d_z and [M_zz | delta_z] are counted, with R and b handed in,
                 instead of d_q and [M_qq | delta_q]; on an open tree they are the same.
+            direct: Whether [M | delta] is counted too.
 
         Returns:
-            Counts of the IDM and of the DDM functions.
+            Counts of the IDM and of the DDM functions, zero for what is not counted.
         """
         dropped = np.setdiff1d(np.arange(self.n_parameters), kept)
         programs = self._independent_programs if independent else self._programs
-        counts = []
-        for program in programs:
+        counts = [0, 0]
+        for k, program in enumerate(programs if direct else programs[:1]):
             start = program.input_offsets[-1]
             zero = [start + int(k) for k in dropped]
             tied = {start + k: start + other for k, other in same.items()}
-            counts.append(program.count(zero, same=tied, signs_free=signs_free))
+            counts[k] = program.count(zero, same=tied, signs_free=signs_free)
         return counts[0], counts[1]
 
     @cached_property

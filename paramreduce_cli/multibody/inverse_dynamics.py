@@ -3,7 +3,8 @@
 The recursion of [Luh1980] in body frames, with first moments and inertias about the frame
 origins, so that the torques are linear in the standard parameters [Khosla1985]. The matrix
 U = skew(w') + skew(w)^2 is formed once a body and serves both force and moment
-[Khalil1987].
+[Khalil1987]. The mass of a body whose origin is on its hinge's axis moves as a point of the
+body before, so its force is formed there and is not turned back and forth.
 """
 
 from __future__ import annotations
@@ -60,6 +61,8 @@ class BodyMotion:
     omega_dot: Vector
     acceleration: Vector
     """Of the origin, less gravity."""
+    before: Vector
+    """Acceleration of the joint's place on the body before, in that one's components."""
     U: Matrix
     """skew(omega_dot) + skew(omega)^2"""
 
@@ -83,11 +86,32 @@ def inverse_dynamics(
     moving = body_motions(mechanism, motions(mechanism, q), dq, ddq, gravity=gravity)
     forces: list[Vector] = []
     moments: list[Vector] = []
-    for inertia, motion in zip(body_inertias(mechanism, phi), moving, strict=True):
-        force, moment = inertial_wrench(inertia, motion)
+    loads = [ZERO] * len(moving)
+    for i, inertia in enumerate(body_inertias(mechanism, phi)):
+        force, moment = inertial_wrench(inertia, moving[i])
+        place = _hinge_that_carries(mechanism, moving, i)
+        if place is None:
+            force = add(force, scale(inertia.m, moving[i].acceleration))
+        else:
+            loads[place] = add(loads[place], scale(inertia.m, moving[place].before))
         forces.append(force)
         moments.append(moment)
-    return transmit(mechanism, [m.joint for m in moving], forces, moments)
+    return transmit(mechanism, [m.joint for m in moving], forces, moments, loads)
+
+
+def _hinge_that_carries(mechanism: Mechanism, moving: list[BodyMotion], body: int) -> int | None:
+    """The hinge nearest to the base whose place is a body's origin; None if it has none."""
+    found = None
+    while _turns_in_place(moving[body].joint) and mechanism.bodies[body].parent != BASE:
+        found = body
+        if any(not component.is_zero() for component in moving[body].joint.origin):
+            break
+        body = mechanism.bodies[body].parent
+    return found
+
+
+def _turns_in_place(joint: JointMotion) -> bool:
+    return joint.body.joint == "revolute" and all(part.is_zero() for part in joint.arm())
 
 
 def body_motions(
@@ -105,6 +129,7 @@ def body_motions(
             before = result[body.parent]
             omega, omega_dot = before.omega, before.omega_dot
             acceleration = add(before.acceleration, apply(before.U, joint.origin))
+        place = acceleration
         omega, omega_dot, acceleration = map(joint.to_body, (omega, omega_dot, acceleration))
         axis = joint.axis()
         if body.joint == "revolute":
@@ -116,7 +141,7 @@ def body_motions(
             acceleration = add(acceleration, scale(ddq[i], axis))
             acceleration = add(acceleration, scale(2 * dq[i], cross(omega, axis)))
         result.append(
-            BodyMotion(joint, omega, omega_dot, acceleration, _u_matrix(omega, omega_dot))
+            BodyMotion(joint, omega, omega_dot, acceleration, place, _u_matrix(omega, omega_dot))
         )
     return result
 
@@ -146,11 +171,11 @@ def _u_matrix(omega: Vector, omega_dot: Vector) -> Matrix:
 def inertial_wrench(inertia: BodyInertia, motion: BodyMotion) -> tuple[Vector, Vector]:
     """Force and moment about the frame origin that keep the body on its motion.
 
-    The moment is I w' + w x (I w) + d x a with the products of w taken from U.
+    The force is without that of the mass at the origin, m a. The moment is I w' + w x (I w) + d x a with the products of w taken from U.
     """
     U, rate, omega = motion.U, motion.omega_dot, motion.omega
     (xx, xy, xz), (_, yy, yz), (_, _, zz) = inertia.tensor
-    force = add(scale(inertia.m, motion.acceleration), apply(U, inertia.moment))
+    force = apply(U, inertia.moment)
     spin = (
         xx * rate[0] + (zz - yy) * (omega[1] * omega[2]) - xy * U[2][0] + xz * U[1][0]
         + yz * (U[1][1] - U[2][2]),
@@ -163,7 +188,11 @@ def inertial_wrench(inertia: BodyInertia, motion: BodyMotion) -> tuple[Vector, V
 
 
 def transmit(
-    mechanism: Mechanism, joints: list[JointMotion], forces: list[Vector], moments: list[Vector]
+    mechanism: Mechanism,
+    joints: list[JointMotion],
+    forces: list[Vector],
+    moments: list[Vector],
+    loads: list[Vector],
 ) -> list[ca.SX]:
     """Add up wrenches from the tips inwards and project them on the joint axes.
 
@@ -172,6 +201,7 @@ def transmit(
         joints: One per body.
         forces: On each body, in its own components; overwritten.
         moments: About each body's origin, in its own components; overwritten.
+        loads: At each joint's place on the body before, in that one's components.
 
     Returns:
         One torque or force per joint.
@@ -187,7 +217,7 @@ def transmit(
             tau[i] = dot(axis, forces[i])
         parent = joint.body.parent
         if parent != BASE:
-            force = joint.to_parent(forces[i])
+            force = add(joint.to_parent(forces[i]), loads[i])
             moment = add(joint.to_parent(moments[i]), cross(joint.origin, force))
             forces[parent] = add(forces[parent], force)
             moments[parent] = add(moments[parent], moment)

@@ -178,6 +178,23 @@ def combined_factor(factors: FloatArray, nominal_torque: FloatArray | None) -> F
     return _square(result)
 
 
+def thinned_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
+    """Every so many samples of each trajectory."""
+    trajectory, start = -1, 0
+    for block in blocks:
+        if block.trajectory != trajectory:
+            trajectory, start = block.trajectory, 0
+        n, n_dof = block.tau.shape
+        picked = np.arange(-start % every, n, every)
+        start += n
+        rows = (picked[:, None] * n_dof + np.arange(n_dof)).ravel()
+        states = {
+            key: getattr(block, key)[picked]
+            for key in ("time", "z", "dz", "ddz", "tau", "q", "dq", "ddq")
+        }
+        yield Block(trajectory=trajectory, W=block.W[rows], **states)
+
+
 def standard_deviation(arrays: Iterable[FloatArray]) -> FloatArray:
     """Of the columns over all arrays together, merged pair by pair [Chan1983]."""
     count, mean, spread = 0, np.zeros(0), np.zeros(0)

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 import time
-from collections.abc import Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -15,14 +15,21 @@ from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.swap import swap
 from paramreduce_cli.reduction.task import Found, Task, by_size
-from paramreduce_cli.registry import heuristic
+from paramreduce_cli.registry import heuristic, torque_only
 
 OPTIMAL, BEST_FOUND, UNCERTIFIED = "optimal", "best-found", "uncertified"
 _SLICE = 20_000
 """Nodes between two looks at the clock."""
+_FIRST_ROUND, _GROWTH = 30_000, 8
+"""Nodes for each size in the first round, and how many times more in each further one."""
+_UNLIMITED = 10**15
+_SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
+"""Of the best error, that are tried as lower bounds where the optimum is not proven."""
+_NODES_PER_SHARE = 30_000
 
 
 @heuristic("best-subset")
+@torque_only
 def best_subset(task: Task) -> Found:
     """Find the best subset of every size by branch and bound, and prove it.
 
@@ -58,6 +65,7 @@ class _Proofs:
         place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._place = place
         self._proofs: dict[int, _Proof] = {}
+        self._spent: dict[int, int] = {}
         for columns in swap(task).subsets:
             self._start(self._numbered(columns))
         if task.previous is not None:
@@ -92,66 +100,77 @@ class _Proofs:
             proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
 
     def run(self) -> None:
-        """Search until all is proven, or time or nodes run out, or the user has enough."""
+        """Search until all is proven, or time or nodes run out, or the user has enough.
+
+        In rounds of growing effort, so that what is easily proven does not wait for the rest.
+        """
+        stop = threading.Event()
         deadline = time.monotonic() + self._task.effort.time_limit
-        waiting = iter([p for p in self._proofs.values() if self._open(p)])
+        budget = _FIRST_ROUND
+        limit = self._task.effort.node_limit or _UNLIMITED
         with ThreadPoolExecutor(self._task.effort.jobs) as pool:
-            running: dict[Future[None], tuple[_Proof, Search]] = {}
             try:
-                self._go_on(pool, running, waiting, deadline)
+                while budget < _GROWTH * limit and time.monotonic() < deadline and self._open():
+                    self._round(pool, min(budget, limit), deadline, stop)
+                    budget *= _GROWTH
+                self._raise_bounds(pool, stop)
             except KeyboardInterrupt:
+                stop.set()
                 self._task.interrupted()
-                wait(running)
-        for proof, search in running.values():
-            self._take_over(proof, search)
         self._spread()
 
-    def _go_on(
-        self,
-        pool: ThreadPoolExecutor,
-        running: dict[Future[None], tuple[_Proof, Search]],
-        waiting: Iterator[_Proof],
-        deadline: float,
+    def _open(self) -> list[_Proof]:
+        return [
+            p
+            for _, p in sorted(self._proofs.items())
+            if p.status == BEST_FOUND and p.squared_error > FULL_PRECISION**2
+        ]
+
+    def _round(
+        self, pool: ThreadPoolExecutor, budget: int, deadline: float, stop: threading.Event
     ) -> None:
-        while True:
-            while len(running) < self._task.effort.jobs and time.monotonic() < deadline:
-                proof = next(waiting, None)
-                if proof is None:
-                    break
-                search = Search(
-                    self._problem, proof.n, proof.squared_error, proof.subset, log=proof.log
-                )
-                running[pool.submit(self._slice, proof, search)] = (proof, search)
-            if not running:
-                return
-            done, _ = wait(running, return_when=FIRST_COMPLETED)
-            for future in done:
-                proof, search = running.pop(future)
-                future.result()
-                if search.finished or self._spent(search) or time.monotonic() >= deadline:
-                    self._take_over(proof, search)
-                    self._show()
-                else:
-                    running[pool.submit(self._slice, proof, search)] = (proof, search)
+        """Search for every size that is open up to a number of nodes in all."""
 
-    def _slice(self, proof: _Proof, search: Search) -> None:
+        def work(proof: _Proof) -> None:
+            search = self._search(proof)
+            self._advance(search, budget - self._spent.get(proof.n, 0), deadline, stop)
+            self._spent[proof.n] = self._spent.get(proof.n, 0) + search.nodes
+            self._take_over(proof, search)
+
+        for _ in as_completed([pool.submit(work, proof) for proof in self._open()]):
+            done = len(self._proofs) - len(self._open())
+            remark = f"{done} of {len(self._proofs)} sizes"
+            self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
+
+    def _search(self, proof: _Proof, factor: float = 1.0) -> Search:
+        log = proof.log if factor == 1.0 else None
+        return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
+
+    def _advance(self, search: Search, nodes: int, deadline: float, stop: threading.Event) -> None:
         started = time.perf_counter()
-        limit = self._task.effort.node_limit
-        most = _SLICE if limit is None else min(_SLICE, limit - search.nodes)
-        search.advance(most)
-        proof.seconds += time.perf_counter() - started
+        while not search.finished and search.nodes < nodes and not stop.is_set():
+            if time.monotonic() > deadline:
+                break
+            search.advance(min(_SLICE, nodes - search.nodes))
+        search.seconds = time.perf_counter() - started
 
-    def _spent(self, search: Search) -> bool:
-        limit = self._task.effort.node_limit
-        return limit is not None and search.nodes >= limit
+    def _raise_bounds(self, pool: ThreadPoolExecutor, stop: threading.Event) -> None:
+        """Prove at least that the error cannot be a fraction of the best one.
 
-    def _open(self, proof: _Proof) -> bool:
-        return proof.status == BEST_FOUND and proof.squared_error > FULL_PRECISION**2
+        A search for much smaller errors ends much sooner.
+        """
 
-    def _show(self) -> None:
-        proven = [p.n for p in self._proofs.values() if not self._open(p)]
-        remark = f"{len(proven)} of {len(self._proofs)} sizes"
-        self._task.progress(Progress("best-subset", len(proven), len(self._proofs), remark))
+        def work(proof: _Proof) -> None:
+            known = np.sqrt(proof.squared_bound / proof.squared_error)
+            for share in (share for share in _SHARES if share > known):
+                search = self._search(proof, factor=share**2)
+                self._advance(search, _NODES_PER_SHARE, np.inf, stop)
+                proof.seconds += search.seconds
+                if not search.finished or search.doubtful or not self._problem.certifiable:
+                    return
+                proof.squared_bound = max(proof.squared_bound, search.bound)
+
+        list(pool.map(work, self._open()))
 
     def _take_over(self, proof: _Proof, search: Search) -> None:
         """Note how far a search has come."""
@@ -161,6 +180,7 @@ class _Proofs:
             if full is not None:
                 proof.subset, proof.squared_error = full, self._squared_error(full)
         proof.nodes += search.nodes
+        proof.seconds += search.seconds
         certain = self._problem.certifiable and not search.doubtful
         if certain:
             proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
@@ -182,7 +202,8 @@ class _Proofs:
 
     def _spread(self) -> None:
         """What holds for one size holds for its neighbours: a bound for all smaller ones, and
-        where nothing is left to explain there is nothing to prove."""
+        where nothing is left to explain there is nothing to prove.
+        """
         bound = 0.0
         for n in sorted(self._proofs, reverse=True):
             proof = self._proofs[n]

@@ -102,6 +102,7 @@ class Search:
         self._state = self._root(problem, places, squared_error, subset)
         self.finished = False
         self.nodes = 0
+        self.seconds = 0.0
         if log is not None and log.size:
             kernel.repeat(self._state, self._data, log.astype(np.int64))
 
@@ -162,10 +163,21 @@ class Search:
         searched = self.squared_error * self._data.factor
         if self.finished:
             return searched
+        state = self._state
+        level = max(int(state.progress[self._kernel.LEVEL]), 0)
+        waiting = (self._bound_of_exclusion(k) for k in range(level))
+        return min(searched, float(state.errors[level, self._kernel.BOUND]), *waiting)
+
+    def _bound_of_exclusion(self, level: int) -> float:
+        """Of the branch that a level has still to take."""
         kernel, state = self._kernel, self._state
-        level = max(int(state.progress[kernel.LEVEL]), 0)
-        waiting = (float(state.errors[k, kernel.BOUND]) for k in range(level + 1))
-        return min(searched, *waiting)
+        sheet, numbers = state.sheets[level], state.numbers[level]
+        n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
+        free = numbers[kernel.FIRST : kernel.FIRST + numbers[kernel.FREE]]
+        own = np.flatnonzero(self._data.unit[free] == numbers[kernel.BRANCH])
+        apart = np.sum(sheet[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
+        rises = np.where(apart, sheet[-1, own] ** 2 / sheet[n + own, own], 0.0)
+        return float(state.errors[level, kernel.BOUND] + rises.max())
 
     @property
     def log(self) -> IntArray:

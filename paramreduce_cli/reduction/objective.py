@@ -8,12 +8,18 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.fitting import Fit, fit
-from paramreduce_cli.reduction.problem import TIE, SelectionProblem, first_of_the_best
+from paramreduce_cli.reduction.problem import (
+    FULL_PRECISION,
+    TIE,
+    SelectionProblem,
+    first_of_the_best,
+)
 
 Units = tuple[int, ...]
 
@@ -24,6 +30,9 @@ class Objective(ABC):
     Args:
         problem: The weighted least-squares problem that torques are fitted with.
     """
+
+    negligible = FULL_PRECISION
+    """Scores not above this cannot be improved."""
 
     def __init__(self, problem: SelectionProblem) -> None:
         self.problem = problem
@@ -51,6 +60,11 @@ class Objective(ABC):
 
         The subset itself where none is promising.
         """
+
+    @property
+    def largest(self) -> int:
+        """Number of columns beyond which nothing is to be gained."""
+        return int(self.widths.sum())
 
     @property
     def cheap(self) -> Objective | None:
@@ -102,4 +116,19 @@ def without(kept: Units, unit: int) -> Units:
     return tuple(u for u in kept if u != unit)
 
 
-MakeObjective = Callable[..., Objective]
+class Means(ABC):
+    """What criteria may need besides the least-squares problem."""
+
+    error_limit: float
+    """Torque error under which the cost is minimised."""
+
+    @abstractmethod
+    def accelerations(self, most: int) -> Any:
+        """AccelerationData of at most so many samples of the estimation set."""
+
+    @abstractmethod
+    def cost(self, kept: IntArray) -> int:
+        """Operations of a model that keeps these columns."""
+
+
+MakeObjective = Callable[[SelectionProblem, Means], Objective]

@@ -5,10 +5,11 @@ from __future__ import annotations
 from paramreduce_cli.reduction.problem import first_of_the_best
 from paramreduce_cli.reduction.remainder import Remainder
 from paramreduce_cli.reduction.task import Found, Task, completed, nested
-from paramreduce_cli.registry import heuristic
+from paramreduce_cli.registry import heuristic, torque_only
 
 
 @heuristic("qr")
+@torque_only
 def qr(task: Task) -> Found:
     """Order columns by how much of them is independent of those before.
 

@@ -10,7 +10,7 @@ from paramreduce_cli.records import IntArray
 from paramreduce_cli.reduction.backward_elimination import backward_elimination
 from paramreduce_cli.reduction.forward_selection import forward_selection, forward_selection_2
 from paramreduce_cli.reduction.objective import Objective, Units
-from paramreduce_cli.reduction.problem import FULL_PRECISION, TIE
+from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.reduction.qr import qr
 from paramreduce_cli.reduction.task import Effort, Found, Task, by_size
 from paramreduce_cli.registry import heuristic
@@ -25,15 +25,17 @@ def swap(task: Task) -> Found:
 
     Starts are the subsets of forward selection, backward elimination and QR, those of the
     neighbouring sizes with a parameter more or less, and random changes of the best subset. A
-    criterion that is costly to evaluate starts from what the swap search finds by torque.
+    criterion that is costly to evaluate starts from what the swap search finds by torque, and
+    from its own forward selection.
     """
-    search = _Search(task.objective, task.limit)
+    search = _Search(task.objective, task.smallest, task.limit)
     cheap = task.objective.cheap
     if cheap is None:
         for start in (forward_selection, forward_selection_2, backward_elimination, qr):
             search.offer_all(start(replace(task, effort=Effort())).subsets)
     else:
         search.offer_all(swap(replace(task, objective=cheap)).subsets)
+        search.offer_all(forward_selection(task).subsets)
     search.neighbours()
     if cheap is None:
         search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed))
@@ -45,12 +47,13 @@ class _Search:
 
     Args:
         objective: What is minimised.
+        smallest: Number of columns.
         limit: Largest number of columns.
     """
 
-    def __init__(self, objective: Objective, limit: int) -> None:
+    def __init__(self, objective: Objective, smallest: int, limit: int) -> None:
         self.objective = objective
-        self.limit = limit
+        self.smallest, self.limit = smallest, limit
         self.best: dict[int, Units] = {}
         self._scores: dict[int, float] = {}
         self._seen: set[frozenset[int]] = set()
@@ -58,14 +61,14 @@ class _Search:
     def offer_all(self, subsets: tuple[IntArray, ...]) -> None:
         """Improve subsets of columns and keep the best."""
         for subset in subsets:
-            if len(subset) <= self.limit:
+            if self.smallest <= len(subset) <= self.limit:
                 self.offer(self.objective.units_of(subset))
 
     def offer(self, kept: Units) -> bool:
         """Improve a subset by exchanges; whether it is better than the best of its size."""
         n = self.objective.width(kept)
         known = self._scores.get(n, np.inf)
-        if known <= FULL_PRECISION or frozenset(kept) in self._seen:
+        if known <= self.objective.negligible or frozenset(kept) in self._seen:
             return False
         self._seen.add(frozenset(kept))
         kept, score = self.objective.improved(kept)
@@ -89,7 +92,11 @@ class _Search:
         return n < wide <= self.limit and self.offer(longer)
 
     def _offer_shorter(self, n: int) -> bool:
-        return len(self.best[n]) > 1 and self.offer(self.objective.without_least(self.best[n]))
+        kept = self.best[n]
+        if len(kept) == 1:
+            return False
+        shorter = self.objective.without_least(kept)
+        return self.objective.width(shorter) >= self.smallest and self.offer(shorter)
 
     def kick(self, times: int, random: np.random.Generator) -> None:
         """Replace a few parameters by random ones and improve that."""

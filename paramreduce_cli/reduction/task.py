@@ -37,6 +37,8 @@ class Task:
     objective: Objective
     largest: int | None = None
     """Number of columns at which to stop; all if None."""
+    smallest: int = 1
+    """Numbers of columns below this are not wanted, but may be passed through."""
     effort: Effort = Effort()
     previous: Proofs | None = None
     """What an earlier run has proven on the same data."""
@@ -47,8 +49,8 @@ class Task:
     @property
     def limit(self) -> int:
         """Largest number of columns."""
-        total = int(self.objective.widths.sum())
-        return total if self.largest is None else min(total, self.largest)
+        most = self.objective.largest
+        return most if self.largest is None else min(most, self.largest)
 
 
 @dataclass(frozen=True)

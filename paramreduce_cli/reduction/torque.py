@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from paramreduce_cli.multibody.base_parameters import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.objective import Means, Objective, Units, without
 from paramreduce_cli.reduction.problem import (
     FULL_PRECISION,
     SelectionProblem,
     first_of_the_best,
 )
 from paramreduce_cli.reduction.remainder import Remainder
+from paramreduce_cli.registry import selection_criterion
+
+
+@selection_criterion("torque")
+def torque(problem: SelectionProblem, means: Means) -> Objective:
+    """The Euclidean error of the torques."""
+    return TorqueObjective(problem)
 
 
 class TorqueObjective(Objective):
@@ -33,7 +42,8 @@ class TorqueObjective(Objective):
 
     def gains(self, kept: Units) -> FloatArray:
         """By how much the squared error falls; once nothing but round-off is left of the torques,
-        the share of a unit that is independent of the subset."""
+        the share of a unit that is independent of the subset.
+        """
         remainder = self._remainder(kept)
         if np.linalg.norm(remainder.chi) > FULL_PRECISION * remainder.chi_length:
             values = remainder.gains()
@@ -47,7 +57,8 @@ class TorqueObjective(Objective):
     def losses(self, kept: Units) -> FloatArray:
         """By how much the squared error rises. Where removals are free, the squared torques of the
         free units in the fit of least norm, whose unknowns are the torques that the parameters
-        cause; costs that are round-off are ties."""
+        cause; costs that are round-off are ties.
+        """
         ordered = sorted(kept)
         result = np.full(len(self.units), np.inf)
         costs = _removal_costs(self._X, self.problem.chi, [self.units[u] for u in ordered])
@@ -58,13 +69,43 @@ class TorqueObjective(Objective):
     def exchanged(self, kept: Units) -> Units:
         """By the closed form of the error after an exchange; groups one by one."""
         if self.widths.max() > 1:
-            return self._exchanged_one_by_one(kept)
+            out, into, error = min(
+                self._one_by_one(kept), key=lambda exchange: exchange[2], default=(-1, -1, np.inf)
+            )
+            return (*without(kept, out), into) if error < self.score(kept) else kept
         improvement = self._improvements(kept)
         if improvement is None or not np.any(improvement > 0):
             return kept
         best = first_of_the_best(improvement.ravel())
         place, unit = divmod(best, len(self.units))
         return (*without(kept, kept[place]), unit)
+
+    def promising_exchanges(self, kept: Units, most: int) -> list[Units]:
+        """The subsets after the exchanges that improve most, or worsen least."""
+        improvement = self._improvements(kept) if self.widths.max() == 1 else None
+        if improvement is None:
+            found = sorted(self._one_by_one(kept), key=lambda exchange: exchange[2])[:most]
+            return [(*without(kept, out), into) for out, into, _ in found]
+        order = np.argsort(-improvement, axis=None, kind="stable")[:most]
+        pairs = [divmod(int(k), len(self.units)) for k in order]
+        return [
+            (*without(kept, kept[place]), unit)
+            for place, unit in pairs
+            if improvement[place, unit] > -np.inf
+        ]
+
+    def exchanges_within(self, kept: Units, limit: float) -> list[tuple[int, int, float]]:
+        """Exchanges that leave at most this error: the unit out, the one in, the error."""
+        improvement = self._improvements(kept) if self.widths.max() == 1 else None
+        if improvement is None:
+            return [exchange for exchange in self._one_by_one(kept) if exchange[2] <= limit]
+        now = (self.score(kept) * self._total) ** 2
+        errors = np.sqrt(np.maximum(now - improvement, 0.0)) / self._total
+        places, units = np.nonzero(errors <= limit)
+        return [
+            (kept[place], int(unit), float(errors[place, unit]))
+            for place, unit in zip(places, units, strict=True)
+        ]
 
     def _improvements(self, kept: Units) -> FloatArray | None:
         """Fall of the squared error for every exchange, (n_kept, n_units); None if dependent.
@@ -88,24 +129,22 @@ class TorqueObjective(Objective):
         P = np.einsum("ij,ij->i", inverse, inverse)[:, None]
         squares = np.einsum("ij,ij->j", left[:, :-1], left[:, :-1])[None, :] + b[:, :-1] ** 2 / P
         products = (left[:, -1] @ left[:, :-1])[None, :] + b[:, :-1] * b[:, -1:] / P
-        squares[:, list(kept)] = np.inf
-        gains: FloatArray = products**2 / np.maximum(squares, DEPENDENT**2)
-        result: FloatArray = np.where(squares > DEPENDENT**2, gains - b[:, -1:] ** 2 / P, -np.inf)
+        possible = squares > DEPENDENT**2
+        possible[:, list(kept)] = False
+        gains = products**2 / np.where(possible, squares, 1.0)
+        result: FloatArray = np.where(possible, gains - b[:, -1:] ** 2 / P, -np.inf)
         return result
 
-    def _exchanged_one_by_one(self, kept: Units) -> Units:
-        best, found = self.score(kept), kept
+    def _one_by_one(self, kept: Units) -> Iterator[tuple[int, int, float]]:
+        """For every unit the best of its width in its place, and the error."""
         for unit in kept:
             rest = without(kept, unit)
             gains = self.gains(rest)
             gains[self.widths != self.widths[unit]] = -np.inf
             gains[unit] = -np.inf
             if np.any(gains > -np.inf):
-                other = (*rest, first_of_the_best(gains))
-                score = self.score(other)
-                if score < best:
-                    best, found = score, other
-        return found
+                into = first_of_the_best(gains)
+                yield unit, into, self.score((*rest, into))
 
     def _remainder(self, kept: Units) -> Remainder:
         """What is left by a subset; quick where it extends the one asked for before."""

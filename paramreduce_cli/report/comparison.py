@@ -135,23 +135,45 @@ def _text(value: float | None) -> str:
 
 
 def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
-    """Orders are the same up to ties: another subset with the same error is no difference."""
-    yield from _exact("heuristics", sorted(a["reduction"]), sorted(b["reduction"]))
-    for name in a["reduction"]:
-        if name not in b["reduction"] or name not in b["validation"]:
+    """Subsets are the same up to ties: another subset with the same error is no difference."""
+    yield from _exact("heuristics", sorted(a["validation"]), sorted(b["validation"]))
+    for name in a["validation"].keys() & b["validation"].keys():
+        first, second = (dict(_named_subsets(s["reduction"][name])) for s in (a, b))
+        errors = [
+            {row["n"]: row["torque_error"]["estimation"] for row in s["validation"][name]}
+            for s in (a, b)
+        ]
+        yield from _exact(f"sizes of subsets, {name}", list(first), list(second))
+        for n in first.keys() & second.keys():
+            x, y = set(first[n]), set(second[n])
+            if x != y:
+                holds = _TIE.holds(errors[0].get(n), errors[1].get(n))
+                yield Difference(
+                    f"subset, {name}, n = {n}",
+                    " ".join(sorted(x - y)),
+                    " ".join(sorted(y - x)),
+                    holds,
+                )
+
+
+def _named_subsets(found: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
+    for k, n in enumerate(found["n"]):
+        yield n, found["subsets"][k] if found["order"] is None else found["order"][:n]
+
+
+def _proofs(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    """What is proven in both must agree; how much is proven depends on the machine."""
+    others = {proof["n"]: proof for proof in b["reduction"]["proofs"]}
+    for x in a["reduction"]["proofs"]:
+        y = others.get(x["n"])
+        if y is None or x["status"] != "optimal":
             continue
-        x, y = a["reduction"][name]["order"], b["reduction"][name]["order"]
-        yield from _exact(f"parameters ordered, {name}", len(x), len(y))
-        others = {row["n"]: row for row in b["validation"][name]}
-        for row_a in a["validation"][name]:
-            n = row_a["n"]
-            if n > min(len(x), len(y)) or n not in others or set(x[:n]) == set(y[:n]):
-                continue
-            row_b = others[n]
-            p, q = (row["torque_error"]["estimation"] for row in (row_a, row_b))
-            yield Difference(
-                f"order, {name}, n = {n}", x[n - 1], y[n - 1], tolerated=_TIE.holds(p, q)
-            )
+        p, q = x["torque_error"], y["torque_error"]
+        what = f"proven error, n = {x['n']}"
+        if y["status"] != "optimal":
+            yield Difference(what, _text(p), f"{_text(q)}, {y['status']}", tolerated=True)
+        elif p != q:
+            yield Difference(what, _text(p), _text(q), tolerances["torque_error"].holds(p, q))
 
 
 def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
@@ -169,6 +191,7 @@ QUANTITIES: dict[str, Quantity] = {
     "model": _model,
     "kappa": _kappa,
     "order": _order,
+    "proofs": _proofs,
     "torque_error": _numbers("torque_error"),
     "acceleration_error": _numbers("acceleration_error"),
     "operations": _numbers("operations"),

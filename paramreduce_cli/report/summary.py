@@ -8,9 +8,11 @@ import numpy as np
 
 from paramreduce_cli.records import (
     HeuristicValidation,
+    IntArray,
     Model,
     Provenance,
     Reduction,
+    Subsets,
     Trajectories,
     Trajectory,
     Validation,
@@ -42,30 +44,87 @@ def summary_of(
         },
         "trajectories": _trajectories(trajectories),
         "reduction": {
-            name: {
-                "order": [reduction.names[k] for k in ordering.order],
-                "n": ordering.n,
-                "torque_error_1": ordering.torque_error_1,
-                "torque_error_inf": ordering.torque_error_inf,
-                "minimum_norm_from": _first(ordering.minimum_norm),
-                "seconds": ordering.seconds,
-            }
-            for name, ordering in reduction.orderings.items()
+            **{name: _subsets(reduction, found) for name, found in reduction.heuristics.items()},
+            "proofs": _proofs(reduction),
+            "pareto": [_pareto(reduction, validation, *model) for model in validation.pareto],
         },
         "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,
+            "reason": selected.reason,
             "parameters": dict(zip(selected.parameters, selected.values, strict=True)),
             "accepted": validation.accepted,
             "verdict": validation.verdict,
             **next(row for row in _rows(chosen) if row["n"] == selected.n),
         },
+        "stability": _stability(reduction, validation),
         "remarks": list(validation.remarks),
     }
     plain: dict[str, Any] = _plain(data)
     return plain
+
+
+def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
+    def named(columns: IntArray) -> list[str]:
+        return [reduction.names[k] for k in columns]
+
+    nested = found.order is not None
+    return {
+        "order": named(found.order) if found.order is not None else None,
+        "subsets": None if nested else [named(subset) for subset in found.subsets],
+        "n": found.n,
+        "torque_error_1": found.torque_error_1,
+        "torque_error_inf": found.torque_error_inf,
+        "minimum_norm_from": _first(found.minimum_norm),
+        "seconds": found.seconds,
+    }
+
+
+def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
+    proofs = reduction.proofs
+    if proofs is None:
+        return []
+    return [
+        {
+            "n": n,
+            "torque_error": proofs.torque_error[k],
+            "lower_bound": proofs.lower_bound[k],
+            "status": proofs.status[k],
+            "seconds": proofs.seconds[k],
+        }
+        for k, n in enumerate(proofs.n)
+    ]
+
+
+def _pareto(reduction: Reduction, validation: Validation, heuristic: str, n: int) -> dict[str, Any]:
+    result = validation.heuristics[heuristic]
+    row = result.row(n)
+    subset = reduction.heuristics[heuristic].subset(n)
+    return {
+        "heuristic": heuristic,
+        "parameters": [reduction.names[k] for k in subset],
+        "n": n,
+        "torque_error": result.torque_error_estimation[row],
+        "acceleration_error": result.acceleration_error_estimation[row],
+        "operations": {
+            "inverse": result.operations_inverse[row],
+            "direct": result.operations_direct[row],
+        },
+    }
+
+
+def _stability(reduction: Reduction, validation: Validation) -> dict[str, Any] | None:
+    found = validation.stability
+    if found is None:
+        return None
+    often = found.chosen.mean(axis=0)
+    return {
+        "variants": list(found.variants),
+        "torque_error": found.torque_error,
+        "share_chosen": {reduction.names[k]: often[k] for k in np.flatnonzero(often)},
+    }
 
 
 def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:

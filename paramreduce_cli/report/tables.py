@@ -197,17 +197,69 @@ def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
 @table("parameter-ordering")
 def parameter_ordering(data: ReportData) -> Table:
     """The order in which each heuristic takes the parameters."""
-    orderings = data.reduction.orderings
-    longest = max(o.order.size for o in orderings.values())
+    found = data.reduction.heuristics
+    orders = {name: f.order for name, f in found.items() if f.order is not None}
     names = data.reduction.names
+    longest = max((order.size for order in orders.values()), default=0)
     rows = [
         (
-            str(n + 1),
-            *(names[o.order[n]] if n < o.order.size else "" for o in orderings.values()),
+            str(k + 1),
+            *(names[order[k]] if k < order.size else "" for order in orders.values()),
         )
-        for n in range(longest)
+        for k in range(longest)
     ]
-    return Table("Parameter ordering", ("no.", *orderings), tuple(rows))
+    return Table("Parameter ordering", ("no.", *orders), tuple(rows))
+
+
+@table("selected-subsets")
+def selected_subsets(data: ReportData) -> Table:
+    """What every heuristic takes at the selected number of parameters."""
+    n, names = data.validation.selected.n, data.reduction.names
+    rows = []
+    for name, found in data.reduction.heuristics.items():
+        row = found.row(n)
+        if row is not None:
+            kept = " ".join(names[k] for k in sorted(found.subsets[row]))
+            rows.append((name, percent(float(found.torque_error[row])), kept))
+    return Table(f"Subsets of {n} parameters", ("heuristic", "ε_τ E", "parameters"), tuple(rows))
+
+
+@table("proofs")
+def proofs(data: ReportData) -> Table:
+    """How good the best subsets are proven to be, for every number of parameters."""
+    found = data.reduction.proofs
+    header = ("n", "ε_τ", "no subset below", "gap", "status", "nodes", "s")
+    if found is None:
+        return Table("Proofs: best-subset was not run", header, ())
+    rows = []
+    for k, n in enumerate(found.n):
+        error, bound = float(found.torque_error[k]), float(found.lower_bound[k])
+        gap = "0" if found.status[k] == "optimal" else percent(1 - bound / error if error else 0.0)
+        rows.append(
+            (
+                str(n), f"{100 * error:.4g} %", f"{100 * bound:.4g} %", gap, found.status[k],
+                str(found.nodes[k]), f"{found.seconds[k]:.2f}",
+            )
+        )  # fmt: skip
+    return Table("Proofs of the best subsets", header, tuple(rows))
+
+
+@table("pareto-front")
+def pareto_front(data: ReportData) -> Table:
+    """Models that no other one beats in all respects."""
+    header = ("heuristic", "n", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "d", "M, δ")
+    rows = []
+    for name, n in data.validation.pareto:
+        r = data.validation.heuristics[name]
+        k = r.row(n)
+        errors = (
+            r.torque_error_estimation, r.torque_error_validation,
+            r.acceleration_error_estimation, r.acceleration_error_validation,
+        )  # fmt: skip
+        counts = (r.operations_inverse, r.operations_direct)
+        cells = (*(percent(float(e[k])) for e in errors), *(str(int(c[k])) for c in counts))
+        rows.append((name, str(n), *cells))
+    return Table("Pareto front", header, tuple(rows))
 
 
 @table("summary")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -13,31 +14,48 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import ReductionSection, Stop
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.multibody.base_parameters import (
-    affecting_columns,
     independent_columns,
-    preference_order,
 )
-from paramreduce_cli.multibody.observation import combined_factor, standard_deviation
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.observation import (
+    combined_factor,
+    standard_deviation,
+    thinned_blocks,
+)
 from paramreduce_cli.records import (
     FloatArray,
     IntArray,
     Model,
-    Ordering,
+    Proofs,
     Reduction,
+    Run,
     Samples,
+    Subsets,
 )
-from paramreduce_cli.reduction.fitting import Fit, NormErrors, fit, torque_errors
-from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
+from paramreduce_cli.reduction.acceleration_objective import AccelerationData
+from paramreduce_cli.reduction.fitting import Fit, NormErrors, torque_errors
+from paramreduce_cli.reduction.grouping import GroupedColumns
+from paramreduce_cli.reduction.objective import Means
 from paramreduce_cli.reduction.problem import SelectionProblem
+from paramreduce_cli.reduction.task import Effort, Task
 from paramreduce_cli.registry import stage
+from paramreduce_cli.stages.counting import count_operations
+from paramreduce_cli.stages.problem import merged_factor, selection_problem, tied_columns
 
 
 @stage
-def reduce(config: Config | None, model: Model | None, samples: Samples) -> Reduction:
-    """Order the parameters with each heuristic and fit every subset.
+def reduce(
+    config: Config | None,
+    model: Model | None,
+    samples: Samples,
+    previous: Reduction | None,
+    run: Run,
+) -> Reduction:
+    """Select parameters with each heuristic, for every number of them.
 
     Works on any samples.h5, also one that a user brings: without a model all columns that
-    are not zero take part.
+    are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
+    same command goes on from there.
     """
     wanted = config.reduction if config is not None else ReductionSection()
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
@@ -46,32 +64,26 @@ def reduce(config: Config | None, model: Model | None, samples: Samples) -> Redu
             "samples of this one, or give no CONFIG."
         )
     weights = _weights(wanted, samples)
-    columns = grouped_columns(samples.names, _groups(wanted))
-    factor = _merged(combined_factor(samples.estimation.factors(), weights), columns)
-    problem = _problem(factor, samples.estimation.n_samples * weights.size, model, columns)
+    columns = tied_columns(wanted, samples.names)
+    factor = merged_factor(combined_factor(samples.estimation.factors(), weights), columns)
+    problem = selection_problem(factor, model, columns)
+    rows = samples.estimation.n_samples * weights.size
+    if rows < problem.candidates.size:
+        raise DataError(
+            f"{rows} rows are too few for {problem.candidates.size} parameters; bring more samples."
+        )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
-    found = {name: _ordered(problem, name, wanted.stop) for name in wanted.heuristics}
-    orderings = _with_norms(found, samples, columns, weights)
-    return Reduction(columns.names, columns.expansion, weights, rank, factor, orderings)
-
-
-def _groups(wanted: ReductionSection) -> list[Group]:
-    return [
-        Group(name, tuple(members), section.tied)
-        for section in wanted.groups
-        for name, members in section.groups().items()
-    ]
-
-
-def _merged(factor: FloatArray, columns: GroupedColumns) -> FloatArray:
-    """The triangular factor of [W T | chi], T adding up the columns of tied groups."""
-    if len(columns.names) == columns.expansion.shape[0]:
-        return factor
-    merged: FloatArray = np.linalg.qr(
-        np.column_stack([factor[:, :-1] @ columns.expansion, factor[:, -1]]), mode="r"
-    )  # type: ignore[assignment]
-    return merged
+    if previous is not None and not np.array_equal(previous.factor, factor):
+        previous = None
+    means = _Means(config, model, samples, columns)
+    found, proofs = {}, None
+    for name in wanted.heuristics:
+        task = _task(problem, name, wanted, means, previous, run)
+        found[name], made = _selected(task, name, wanted.stop)
+        proofs = made if made is not None else proofs
+    heuristics = _with_norms(found, samples, columns, weights)
+    return Reduction(columns.names, columns.expansion, weights, rank, factor, heuristics, proofs)
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
@@ -89,28 +101,6 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
     return weights
 
 
-def _problem(
-    factor: FloatArray, rows: int, model: Model | None, columns: GroupedColumns
-) -> SelectionProblem:
-    W, chi = factor[:, :-1], factor[:, -1]
-    if not np.isfinite(factor).all():
-        raise DataError("the observation matrix holds numbers too large to calculate with.")
-    if not np.any(chi):
-        raise DataError("the torques of the estimation set are all zero: nothing to explain.")
-    affecting = affecting_columns(W)
-    if model is not None:
-        affecting = model.affecting @ columns.expansion > 0
-    candidates = np.flatnonzero(affecting)
-    if candidates.size == 0:
-        raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
-    if rows < candidates.size:
-        raise DataError(
-            f"{rows} rows are too few for {candidates.size} parameters; bring more samples."
-        )
-    preference = preference_order(columns.names)
-    return SelectionProblem(W, chi, candidates, preference, columns.groups)
-
-
 def _remark_on_rank(rank: int, model: Model | None, columns: GroupedColumns) -> None:
     tied = len(columns.names) < columns.expansion.shape[0]
     if model is not None and not tied and rank < model.base.columns.size:
@@ -122,66 +112,137 @@ def _remark_on_rank(rank: int, model: Model | None, columns: GroupedColumns) -> 
         )
 
 
-@dataclass(frozen=True)
-class _Found:
-    """What a heuristic found: an order and the fits of its subsets."""
+class _Means(Means):
+    """What criteria ask for, made from the stage's inputs when they do."""
 
-    order: IntArray
-    n: IntArray
+    def __init__(
+        self, config: Config | None, model: Model | None, samples: Samples, columns: GroupedColumns
+    ) -> None:
+        section = config.reduction if config is not None else ReductionSection()
+        self.error_limit = section.operations.torque_error
+        self._config, self._model = config, model
+        self._samples, self._columns = samples, columns
+
+    def _modelled(self, criterion: str) -> tuple[Config, Model]:
+        if self._config is None or self._model is None:
+            raise DataError(f"the criterion {criterion} needs a model; give a CONFIG.")
+        return self._config, self._model
+
+    @cached_property
+    def _dynamics(self) -> Dynamics:
+        return Dynamics(self._modelled("of the heuristics")[1].mechanism)
+
+    def accelerations(self, most: int) -> AccelerationData:
+        """Samples spread evenly over the estimation set."""
+        self._modelled("acceleration")
+        nominal = self._samples.nominal_acceleration
+        if nominal is None:
+            raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
+        every = max(1, -(-self._samples.estimation.n_samples // most))
+        blocks = list(thinned_blocks(self._samples.estimation.blocks(), every))
+        q, dq, ddz, tau = (
+            np.concatenate([getattr(block, key) for block in blocks])
+            for key in ("q", "dq", "ddz", "tau")
+        )
+        A, B = self._dynamics.direct_regressor(q, dq)
+        expansion = self._columns.expansion
+        return AccelerationData(A @ expansion, B @ expansion, tau, ddz, nominal)
+
+    def cost(self, kept: IntArray) -> int:
+        """Operations of the inverse dynamics by plain recursion."""
+        config, model = self._modelled("operations")
+        return count_operations(
+            self._dynamics,
+            model.affecting,
+            self._columns.expansion[:, kept],
+            independent=config.validation.operations == "independent",
+            direct=False,
+        )[0]
+
+
+@dataclass(frozen=True)
+class _Selected:
+    """What a heuristic found: subsets and their fits."""
+
+    subsets: tuple[IntArray, ...]
     fits: list[Fit]
     seconds: float
 
 
-def _ordered(problem: SelectionProblem, name: str, stop: Stop) -> _Found:
+def _task(
+    problem: SelectionProblem,
+    name: str,
+    wanted: ReductionSection,
+    means: Means,
+    previous: Reduction | None,
+    run: Run,
+) -> Task:
+    criterion = name.partition("@")[2] or "torque"
+    return Task(
+        objective=registry.selection_criterion[criterion](problem, means),
+        largest=wanted.stop.parameters,
+        effort=Effort(
+            base_sets=wanted.backward_elimination.base_sets,
+            continue_with_swaps=wanted.backward_elimination.swaps,
+            kicks=wanted.swap.kicks,
+            seed=wanted.swap.seed,
+            time_limit=wanted.best_subset.time_limit,
+            node_limit=wanted.best_subset.node_limit,
+            jobs=run.jobs,
+        ),
+        previous=previous.proofs if previous is not None else None,
+        progress=run.progress,
+        interrupted=run.interrupted,
+    )
+
+
+def _selected(task: Task, name: str, stop: Stop) -> tuple[_Selected, Proofs | None]:
     started = time.perf_counter()
-    order = registry.heuristic[name](problem)
+    found = registry.heuristic[name.partition("@")[0]](task)
     seconds = time.perf_counter() - started
-    sizes = problem.sizes(order)
-    fits = [fit(problem, order[:n]) for n in sizes]
-    kept = _kept(sizes, fits, stop)
-    return _Found(order[: sizes[kept - 1]], sizes[:kept], fits[:kept], seconds)
+    if not found.subsets:
+        smallest = int(task.objective.widths.min())
+        raise ConfigError(
+            f"reduction.stop.parameters is {stop.parameters}, but with groups the smallest subset "
+            f"has {smallest} parameters. Raise it."
+        )
+    fits = [task.objective.fit(subset) for subset in found.subsets]
+    kept = _kept(fits, stop)
+    return _Selected(found.subsets[:kept], fits[:kept], seconds), found.proofs
 
 
-def _kept(sizes: IntArray, fits: list[Fit], stop: Stop) -> int:
-    """How many subsets the stopping rule leaves: the smaller of its two limits."""
-    kept = len(fits)
-    if stop.parameters is not None:
-        kept = min(kept, int(np.sum(sizes <= stop.parameters)))
-        if kept == 0:
-            raise ConfigError(
-                f"reduction.stop.parameters is {stop.parameters}, but with groups the smallest subset "
-                f"has {sizes[0]} parameters. Raise it."
-            )
-    if stop.torque_error is not None:
-        good = (k for k, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
-        kept = min(kept, next(good, len(fits)))
-    return kept
+def _kept(fits: list[Fit], stop: Stop) -> int:
+    """How many subsets a limit of the error leaves."""
+    if stop.torque_error is None:
+        return len(fits)
+    good = (k for k, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
+    return next(good, len(fits))
 
 
 def _with_norms(
-    found: dict[str, _Found], samples: Samples, columns: GroupedColumns, weights: FloatArray
-) -> dict[str, Ordering]:
+    found: dict[str, _Selected], samples: Samples, columns: GroupedColumns, weights: FloatArray
+) -> dict[str, Subsets]:
     """One pass over the samples for the 1- and infinity norms of all models together."""
     models = [
-        columns.expansion[:, entry.order[:n]] @ f.parameters
+        columns.expansion[:, subset] @ f.parameters
         for entry in found.values()
-        for n, f in zip(entry.n, entry.fits, strict=True)
+        for subset, f in zip(entry.subsets, entry.fits, strict=True)
     ]
     errors = torque_errors(samples.estimation.blocks(), np.column_stack(models), weights)
-    orderings = {}
+    heuristics = {}
     start = 0
     for name, entry in found.items():
-        part = slice(start, start + entry.n.size)
-        orderings[name] = _ordering(name, entry, errors, part)
-        start += entry.n.size
-    return orderings
+        part = slice(start, start + len(entry.subsets))
+        heuristics[name] = _subsets(name, entry, errors, part)
+        start = part.stop
+    return heuristics
 
 
-def _ordering(name: str, found: _Found, errors: NormErrors, part: slice) -> Ordering:
-    return Ordering(
+def _subsets(name: str, found: _Selected, errors: NormErrors, part: slice) -> Subsets:
+    return Subsets(
         heuristic=name,
-        order=found.order,
-        n=found.n,
+        subsets=found.subsets,
+        n=np.array([subset.size for subset in found.subsets]),
         torque_error=np.array([f.torque_error for f in found.fits]),
         torque_error_1=errors.one[part],
         torque_error_inf=errors.infinity[part],

@@ -76,8 +76,8 @@ def _gather(
     validation: Validation,
 ) -> ReportData:
     selected = validation.selected
-    ordering = reduction.orderings[selected.heuristic]
-    column = reduction.standard(ordering.subset(selected.n), selected.values)
+    subset = reduction.heuristics[selected.heuristic].subset(selected.n)
+    column = reduction.standard(subset, selected.values)
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), column, reduction.nominal_torque)
     return ReportData(

@@ -197,7 +197,8 @@ def _orthonormal(
     columns: FloatArray, chi: FloatArray, subset: IntArray, count: int
 ) -> tuple[FloatArray, FloatArray, float]:
     """Directions of a subset's columns, what they leave of chi, and the squared length that was
-    left of the last column."""
+    left of the last column.
+    """
     left, last = chi.copy(), 0.0
     basis, known = np.empty((count, chi.size)), 0
     for k in range(count):

@@ -1,0 +1,130 @@
+"""Which of many judged models to take, and which of them are worth a look."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray, HeuristicValidation, Proofs
+from paramreduce_cli.reduction.problem import TIE
+
+Choice = tuple[str, int]
+"""A heuristic, and the row of one of its subsets."""
+
+_ON_BOTH_SETS = {
+    "torque_error": ("torque_error_estimation", "torque_error_validation"),
+    "acceleration_error": ("acceleration_error_estimation", "acceleration_error_validation"),
+    "operations": ("operations_inverse",),
+}
+_OBJECTIVES = (
+    "n",
+    "torque_error_estimation",
+    "acceleration_error_estimation",
+    "operations_inverse",
+    "operations_direct",
+)
+
+
+def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> FloatArray:
+    """Largest ratio of what a tolerance is on to the tolerance, over both sets, (m,).
+
+    Args:
+        result: Of one heuristic.
+        tolerances: By `torque_error`, `acceleration_error` and `operations`.
+    """
+    ratios = [
+        np.asarray(getattr(result, name), dtype=float) / limit
+        for key, limit in tolerances.items()
+        for name in _ON_BOTH_SETS[key]
+    ]
+    worst: FloatArray = np.max(ratios, axis=0)
+    return worst
+
+
+def smallest_within(
+    results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]
+) -> Choice | None:
+    """The model with the fewest parameters that keeps to all tolerances on both sets.
+
+    Of several with as many parameters the one with the smallest torque error on the estimation
+    set, of equal ones the last heuristic's; None if there is none.
+    """
+    good = [
+        (name, int(row))
+        for name, result in results.items()
+        for row in np.flatnonzero(excess(result, tolerances) <= 1)
+    ]
+    return _smallest_then_best(results, good)
+
+
+def nearest_to(
+    results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]
+) -> Choice:
+    """The model that misses the tolerances least."""
+    worst = {name: excess(result, tolerances) for name, result in results.items()}
+    name = min(worst, key=lambda name: float(worst[name].min()))
+    return name, int(np.argmin(worst[name]))
+
+
+def best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Choice | None:
+    """The model of n parameters with the smallest torque error on the estimation set.
+
+    Of equal ones the last heuristic's; None if no heuristic has such a model.
+    """
+    rows = {name: result.row(n) for name, result in results.items()}
+    return _smallest_then_best(
+        results, [(name, row) for name, row in rows.items() if row is not None]
+    )
+
+
+def _smallest_then_best(
+    results: Mapping[str, HeuristicValidation], choices: Sequence[Choice]
+) -> Choice | None:
+    if not choices:
+        return None
+    n = min(int(results[name].n[row]) for name, row in choices)
+    small = [(name, row) for name, row in choices if results[name].n[row] == n]
+    errors = np.array([results[name].torque_error_estimation[row] for name, row in small])
+    return small[int(np.flatnonzero(errors <= errors.min() * (1 + TIE))[-1])]
+
+
+def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> int:
+    """Sizes below n that are proven to have a larger error on the estimation set, from n down.
+
+    Returns:
+        The smallest size k such that no subset of k, ..., n - 1 parameters keeps to the error; n
+        where nothing is proven. As more parameters never have a larger error, one is as good as
+        all.
+    """
+    row = proofs.row(n - 1)
+    return 1 if row is not None and proofs.lower_bound[row] > torque_error else n
+
+
+def pareto_front(results: Mapping[str, HeuristicValidation]) -> list[Choice]:
+    """Models that no other one beats in something without losing in something else.
+
+    Compared are the number of parameters, both errors on the estimation set and both operation
+    counts; models with errors of a hundred per cent are left out. Of equal models the first stays.
+    """
+    choices = list(_choices(results))
+    if not choices:
+        return []
+    values = np.array(
+        [[float(getattr(results[h], key)[row]) for key in _OBJECTIVES] for h, row in choices]
+    )
+    front = []
+    for k, own in enumerate(values):
+        no_worse = (values <= own).all(axis=1)
+        better = no_worse & (values < own).any(axis=1)
+        equal_before = (no_worse & (values == own).all(axis=1))[:k]
+        if not better.any() and not equal_before.any():
+            front.append(choices[k])
+    order = np.argsort([results[h].n[row] for h, row in front], kind="stable")
+    return [front[k] for k in order]
+
+
+def _choices(results: Mapping[str, HeuristicValidation]) -> Iterator[Choice]:
+    for name, result in results.items():
+        sensible = (result.torque_error_estimation < 1) & (result.acceleration_error_estimation < 1)
+        yield from ((name, int(row)) for row in np.flatnonzero(sensible))

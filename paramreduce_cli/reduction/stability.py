@@ -1,0 +1,39 @@
+"""How much a selection depends on the data: which parameters other data would choose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray, IntArray, Stability
+from paramreduce_cli.reduction.fitting import fit
+from paramreduce_cli.reduction.problem import SelectionProblem
+
+
+def stability(
+    problem: SelectionProblem,
+    factors: Mapping[str, FloatArray],
+    select: Callable[[SelectionProblem], IntArray],
+) -> Stability:
+    """Select again on other data.
+
+    Args:
+        problem: Whose candidates, preference and groups stay.
+        factors: Triangular factors of the weighted [W | chi], by what the data are.
+        select: The subset of a problem.
+    """
+    n = problem.W.shape[1]
+    chosen = np.zeros((len(factors), n), dtype=bool)
+    values = np.full((len(factors), n), np.nan)
+    errors = np.zeros(len(factors))
+    for k, factor in enumerate(factors.values()):
+        other = SelectionProblem(
+            factor[:, :-1], factor[:, -1], problem.candidates, problem.preference, problem.groups
+        )
+        subset = select(other)
+        fitted = fit(other, subset)
+        chosen[k, subset] = True
+        values[k, subset] = fitted.parameters
+        errors[k] = fitted.torque_error
+    return Stability(tuple(factors), chosen, values, errors)

@@ -1,0 +1,55 @@
+"""The selection problem of an estimation set; shared by the stages."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.config.schema import ReductionSection
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.multibody.base_parameters import affecting_columns, preference_order
+from paramreduce_cli.records import FloatArray, Model
+from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
+from paramreduce_cli.reduction.problem import SelectionProblem
+
+
+def tied_columns(wanted: ReductionSection, names: tuple[str, ...]) -> GroupedColumns:
+    """The columns among which is chosen."""
+    groups = [
+        Group(name, tuple(members), section.tied)
+        for section in wanted.groups
+        for name, members in section.groups().items()
+    ]
+    return grouped_columns(names, groups)
+
+
+def merged_factor(factor: FloatArray, columns: GroupedColumns) -> FloatArray:
+    """The triangular factor of [W T | chi], T adding up the columns of tied groups."""
+    if len(columns.names) == columns.expansion.shape[0]:
+        return factor
+    merged: FloatArray = np.linalg.qr(
+        np.column_stack([factor[:, :-1] @ columns.expansion, factor[:, -1]]), mode="r"
+    )  # type: ignore[assignment]
+    return merged
+
+
+def selection_problem(
+    factor: FloatArray, model: Model | None, columns: GroupedColumns
+) -> SelectionProblem:
+    """The least-squares problem behind a triangular factor of [W | chi].
+
+    Raises:
+        DataError: There is nothing to choose from, or nothing to explain.
+    """
+    W, chi = factor[:, :-1], factor[:, -1]
+    if not np.isfinite(factor).all():
+        raise DataError("the observation matrix holds numbers too large to calculate with.")
+    if not np.any(chi):
+        raise DataError("the torques of the estimation set are all zero: nothing to explain.")
+    affecting = affecting_columns(W)
+    if model is not None:
+        affecting = model.affecting @ columns.expansion > 0
+    candidates = np.flatnonzero(affecting)
+    if candidates.size == 0:
+        raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
+    preference = preference_order(columns.names)
+    return SelectionProblem(W, chi, candidates, preference, columns.groups)

@@ -1,0 +1,110 @@
+"""Whether the selected model is accepted, and what the user should know of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from paramreduce_cli.config.schema import Acceptance, ValidationSection
+from paramreduce_cli.records import BoolArray, HeuristicValidation, Selected
+
+_NEGLIGIBLE = 1e-6
+"""Errors below this are not compared: there a model is exact but for round-off."""
+
+
+def verdict(
+    limits: Acceptance, selected: Selected, result: HeuristicValidation
+) -> tuple[bool, str]:
+    """Whether the selected model keeps to the limits of the config, and the sentence for it."""
+    met: list[str] = []
+    missed: list[str] = []
+    for key in type(limits).model_fields:
+        limit = getattr(limits, key)
+        if limit is None:
+            continue
+        value = float(getattr(result, key)[result.row(selected.n)])
+        share = "error" in key
+        text = f"{key.replace('_', ' ')} {_shown(value, share)} (limit {_shown(limit, share)})"
+        (met if value <= limit else missed).append(text)
+    who = f"{selected.heuristic} with {selected.n} parameters"
+    if missed:
+        return False, f"{who} is not accepted: {', '.join(missed)}."
+    if met:
+        return True, f"{who} is accepted: {', '.join(met)}."
+    return True, f"{who} is not judged: validation.accept sets no limits."
+
+
+def _shown(value: float, share: bool) -> str:
+    return f"{100 * value:.3g} %" if share else f"{value:g}"
+
+
+def remarks(
+    section: ValidationSection,
+    heuristics: Mapping[str, HeuristicValidation],
+    full: Mapping[str, int | float],
+    selected: Selected,
+) -> Iterator[str]:
+    """Where reduced models should not be trusted."""
+    for name, result in heuristics.items():
+        chosen = result.row(selected.n) if name == selected.heuristic else None
+        unsafe = _unsafe(section, full, result)
+        if unsafe.any():
+            last = int(result.n[np.flatnonzero(unsafe)[-1]])
+            yield (
+                f"{name}: direct dynamics is not safe to use everywhere up to n = {last}; there the "
+                "mass matrix loses positive definiteness on the samples, or comes more than "
+                f"{section.condition_factor:g} times nearer to singular than the full model's."
+            )
+        if chosen is not None and unsafe[chosen]:
+            yield (
+                f"The selected model ({name}, n = {selected.n}) is not safe for direct dynamics: use "
+                "its inverse dynamics only."
+            )
+        for what in ("torque", "acceleration"):
+            apart = _apart(section, result, what)
+            if apart.any():
+                sizes = ", ".join(_ranges(result.n[apart].tolist()))
+                yield (
+                    f"{name}: {what} errors on the two sets differ more than "
+                    f"{section.error_factor:g} times at n = {sizes}."
+                )
+            if chosen is not None and apart[chosen]:
+                yield (
+                    f"The selected model ({name}, n = {selected.n}) has {what} errors on the two sets "
+                    "that part: use more trajectories, or more parameters."
+                )
+
+
+def _unsafe(
+    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
+) -> BoolArray:
+    smallest = result.mass_matrix_smallest_eigenvalue
+    factor = section.condition_factor
+    near = smallest <= max(0.0, full["mass_matrix_smallest_eigenvalue"] / factor)
+    unsafe: BoolArray = near | (
+        result.mass_matrix_condition > factor * full["mass_matrix_condition"]
+    )
+    return unsafe
+
+
+def _apart(section: ValidationSection, result: HeuristicValidation, what: str) -> BoolArray:
+    one = np.asarray(getattr(result, f"{what}_error_estimation"))
+    two = np.asarray(getattr(result, f"{what}_error_validation"))
+    smaller, larger = np.minimum(one, two), np.maximum(one, two)
+    apart: BoolArray = (larger > section.error_factor * smaller) & (
+        (smaller > _NEGLIGIBLE) & (larger < 1)
+    )
+    return apart
+
+
+def _ranges(numbers: list[int]) -> Iterator[str]:
+    """Runs of consecutive numbers as text."""
+    start = previous = numbers[0]
+    for number in [*numbers[1:], None]:
+        if number is not None and number == previous + 1:
+            previous = number
+            continue
+        yield f"{start}" if start == previous else f"{start}...{previous}"
+        if number is not None:
+            start = previous = number
