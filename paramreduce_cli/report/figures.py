@@ -36,12 +36,18 @@ _STYLE = {
     "pdf.fonttype": 42,
 }
 _JOINT_COLOURS = ("#0b6e99", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f", "#7a6a53", "#4d7c8a")
-_HEURISTIC_COLOURS = ("#7d8590", "#0b62c4", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f")
+_HEURISTIC_COLOURS = (
+    "#7d8590", "#0b62c4", "#5fa3d9", "#8e5bb5", "#d9730d", "#e0a526", "#2f8f5b", "#c2384f", "#7a6a53",
+    "#0b8f8f",
+)  # fmt: skip
 _LINES = ("-", "--", ":", "-.")
-_MARKERS = ("s", "o", "^", "D", "v", "P")
-_WIDE = (7.2, 3.6)
-_FLOOR = 1e-16
+_MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p", "h")
+_WIDE = (8.4, 3.8)
+_EXACT = 1e-7
+"""Where errors are cut off below: what is less is round-off."""
 _HIGHEST_ERROR = 1e3
+_WIDE_SPREAD = 100.0
+"""Per cent of change from which on a logarithmic scale shows more."""
 
 FORMATS: dict[str, dict] = {
     "pdf": {"metadata": {"CreationDate": None}},
@@ -184,6 +190,95 @@ def torque_error(data: ReportData) -> Figure:
     )
 
 
+@figure("proven-bound")
+def proven_bound(data: ReportData) -> Figure:
+    """Torque error of every heuristic over what is proven to be possible; no subset is below the grey."""
+    drawn = Figure(figsize=_WIDE)
+    axes = drawn.subplots()
+    proofs = data.reduction.proofs
+    if proofs is None:
+        axes.text(0.5, 0.5, "best-subset was not run", ha="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return drawn
+    shown = np.maximum(proofs.lower_bound, _EXACT)
+    axes.fill_between(proofs.n, shown, _EXACT, step="mid", color="#d5d9de", zorder=0)
+    axes.step(proofs.n, shown, where="mid", color="#30363d", linewidth=0.9, label="proven bound")
+    for name, found in data.reduction.heuristics.items():
+        if "@" in name:
+            continue
+        colour, marker = _heuristic_style(data, name)
+        optimal = name == "best-subset"
+        axes.semilogy(
+            found.n, np.maximum(found.torque_error, _EXACT), color=colour, marker=marker,
+            markersize=4 if optimal else 2.5, linewidth=0.8, label=name, linestyle="none" if optimal
+            else "-",
+        )  # fmt: skip
+    axes.set_yscale("log")
+    axes.set_ylim(bottom=_EXACT)
+    unproven = [status != "optimal" for status in proofs.status]
+    axes.set_title(
+        f"optimal for {len(unproven) - sum(unproven)} of {len(unproven)} sizes",
+        fontsize=9,
+        loc="left",
+    )
+    _mark_selected(axes, data)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel(r"$\varepsilon_\tau$, estimation")
+    _legend_beside(axes)
+    return drawn
+
+
+@figure("stability")
+def stability(data: ReportData) -> Figure:
+    """How often each parameter is chosen, the spread of its value, and the torque error, on other data."""
+    found, names = data.validation.stability, data.reduction.names
+    drawn = Figure(figsize=(7.2, 4.6))
+    if found is None:
+        axes = drawn.subplots()
+        axes.text(0.5, 0.5, "validation.stability is off", ha="center", transform=axes.transAxes)
+        axes.set_axis_off()
+        return drawn
+    often = found.chosen.mean(axis=0)
+    order = np.argsort(-often, kind="stable")[: int(np.sum(often > 0))]
+    upper, middle, lower = drawn.subplots(3, 1)
+    places = np.arange(order.size)
+    own = np.isin(order, np.flatnonzero(found.chosen[0]))
+    upper.bar(places, 100 * often[order], color=np.where(own, "#0b62c4", "#b9c2cc"), width=0.7)
+    upper.set_ylabel("chosen, %")
+    for place, column in zip(places, order, strict=True):
+        values = found.values[found.chosen[:, column], column]
+        scale = np.abs(np.median(values)) or 1.0
+        middle.plot([place, place], 100 * (np.array([values.min(), values.max()]) / scale
+                    - np.sign(np.median(values))), color="#0b62c4", linewidth=3)  # fmt: skip
+    if np.abs(middle.get_ylim()).max() > _WIDE_SPREAD:
+        middle.set_yscale("symlog", linthresh=10)
+    middle.set_ylabel("φ' - median, %")
+    for axes, shown in ((upper, False), (middle, True)):
+        labels = [names[k] for k in order] if shown else []
+        axes.set_xticks(places, labels if shown else [""] * order.size, rotation=90, fontsize=7)
+        axes.set_xlim(-0.7, order.size - 0.3)
+        axes.grid(axis="x", visible=False)
+    kinds = np.array([not v.startswith("every") for v in found.variants])
+    numbers = np.arange(len(found.variants))
+    for chosen, colour, label in (
+        (kinds, "#0b62c4", "all, then one trajectory left out"),
+        (
+            ~kinds,
+            "#d9730d",
+            "fewer samples: " + ", ".join(v for v in found.variants if "every" in v),
+        ),
+    ):
+        if chosen.any():
+            lower.plot(
+                numbers[chosen], 100 * found.torque_error[chosen], "o", color=colour, markersize=4,
+                label=label,
+            )  # fmt: skip
+    lower.set_xticks([])
+    lower.set_ylabel(r"$\varepsilon_\tau$, %")
+    lower.legend(fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    return drawn
+
+
 @figure("acceleration-error")
 def acceleration_error(data: ReportData) -> Figure:
     """Acceleration error against the number of parameters, on both sets."""
@@ -200,13 +295,13 @@ def _error_figure(data: ReportData, estimation: str, validation: str, label: str
     axes = drawn.subplots()
     for name, result in data.validation.heuristics.items():
         colour, marker = _heuristic_style(data, name)
-        for key, line, suffix in ((estimation, "-", ", E"), (validation, "--", ", V")):
+        for key, line in ((estimation, "-"), (validation, "--")):
             values = _visible(getattr(result, key))
             axes.semilogy(
-                result.n, values, line, color=colour, label=name + suffix,
+                result.n, values, line, color=colour, label=name if line == "-" else None,
                 marker=marker if line == "-" else None, markersize=3,
             )  # fmt: skip
-    axes.set_ylim(top=min(axes.get_ylim()[1], _HIGHEST_ERROR))
+    axes.set_ylim(bottom=_EXACT, top=min(axes.get_ylim()[1], _HIGHEST_ERROR))
     axes.axvline(data.reduction.rank, color="#57606a", linewidth=0.8, linestyle=":")
     axes.annotate(
         f" r = {data.reduction.rank}", (data.reduction.rank, 1.0),
@@ -215,13 +310,19 @@ def _error_figure(data: ReportData, estimation: str, validation: str, label: str
     _mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel(label)
-    axes.legend(fontsize=8, ncols=1)
+    axes.plot([], [], color="#57606a", label="estimation")
+    axes.plot([], [], "--", color="#57606a", label="validation")
+    _legend_beside(axes)
     return drawn
 
 
+def _legend_beside(axes: Axes) -> None:
+    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+
 def _visible(values: FloatArray) -> FloatArray:
-    """Errors as they can be drawn: infinite ones leave a gap, zero stands at the floor."""
-    result: FloatArray = np.where(np.isfinite(values), np.maximum(values, _FLOOR), np.nan)
+    """Errors as they can be drawn: infinite ones leave a gap, exact ones stand at the floor."""
+    result: FloatArray = np.where(np.isfinite(values), np.maximum(values, _EXACT), np.nan)
     return result
 
 
@@ -240,11 +341,11 @@ def operations(data: ReportData) -> Figure:
     axes = drawn.subplots()
     for name, result in data.validation.heuristics.items():
         colour, marker = _heuristic_style(data, name)
-        for key, label, line in _FUNCTIONS:
+        for key, _, line in _FUNCTIONS:
             values = getattr(result, f"operations_{key}")
             axes.plot(
                 result.n, values, line, color=colour, marker=marker, markersize=2.5,
-                label=f"{name}, {label}",
+                label=name if line == "-" else None,
             )  # fmt: skip
     for key, _, line in _FUNCTIONS:
         axes.axhline(
@@ -255,7 +356,9 @@ def operations(data: ReportData) -> Figure:
     axes.set_ylim(bottom=0)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel("operations")
-    axes.legend(fontsize=8)
+    for _, label, line in _FUNCTIONS:
+        axes.plot([], [], line, color="#57606a", label=label)
+    _legend_beside(axes)
     return drawn
 
 
@@ -272,10 +375,31 @@ def error_vs_operations(data: ReportData) -> Figure:
                 getattr(result, f"operations_{key}"), values,
                 color=colour, marker=marker, markersize=3, linewidth=0.8, label=name,
             )  # fmt: skip
+        results = ((data.validation.heuristics[name], n) for name, n in data.validation.pareto)
+        front = [
+            (
+                float(getattr(r, f"operations_{key}")[r.n == n][0]),
+                float(r.torque_error_estimation[r.n == n][0]),
+            )
+            for r, n in results
+        ]
+        stairs = np.array(_staircase(front))
+        if stairs.size:
+            one.step(*stairs.T, where="post", color="#30363d", linewidth=1.2, label="best known")
         one.set_xlabel(f"operations of {label}")
     axes[0].set_ylabel(r"$\varepsilon_\tau$, estimation")
-    axes[0].legend(fontsize=8)
+    _legend_beside(axes[1])
     return drawn
+
+
+def _staircase(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Of points (cost, error) those that no cheaper one beats, by cost; exact ones left out."""
+    best, kept = np.inf, []
+    for cost, error in sorted(points):
+        if _EXACT < error < best:
+            best = error
+            kept.append((cost, error))
+    return kept
 
 
 @figure("torques")
@@ -325,5 +449,5 @@ def mass_matrix_condition(data: ReportData) -> Figure:
     _mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel("largest κ(M) over the samples")
-    axes.legend(fontsize=8)
+    _legend_beside(axes)
     return drawn
