@@ -7,7 +7,7 @@ import pytest
 from conftest import CONFIGS, ROOT
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.records import Recordings, Trajectories, Trajectory
+from paramreduce_cli.records import Recordings, Run, Trajectories, Trajectory
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.reduce import reduce
 from paramreduce_cli.stages.sample import sample
@@ -36,15 +36,14 @@ def test_selection_on_the_committed_trajectories(robot):
         summary["trajectories"]["period"], "", "", (), series("estimation"), series("validation")
     )
     samples = sample(config, model, trajectories, Recordings(None, None))
-    orderings = reduce(config, model, samples).orderings
+    found = reduce(config, model, samples, None, Run()).heuristics
     qr, forward, backward, n, error = TARGETS[robot]
 
     def full_precision(name):
-        ordering = orderings[name]
-        return int(ordering.n[np.argmax(ordering.torque_error < FULL)])
+        return int(found[name].n[np.argmax(found[name].torque_error < FULL)])
 
     assert full_precision("qr") == qr
     assert full_precision("forward-selection") <= forward
     assert full_precision("backward-elimination") <= backward
-    chosen = orderings["forward-selection"]
+    chosen = found["forward-selection"]
     assert chosen.torque_error[chosen.row(n)] <= error

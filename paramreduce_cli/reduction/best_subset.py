@@ -110,8 +110,10 @@ class _Proofs:
         limit = self._task.effort.node_limit or _UNLIMITED
         with ThreadPoolExecutor(self._task.effort.jobs) as pool:
             try:
-                while budget < _GROWTH * limit and time.monotonic() < deadline and self._open():
+                while time.monotonic() < deadline and self._open():
                     self._round(pool, min(budget, limit), deadline, stop)
+                    if budget >= limit:
+                        break
                     budget *= _GROWTH
                 self._raise_bounds(pool, stop)
             except KeyboardInterrupt:
@@ -166,7 +168,7 @@ class _Proofs:
                 search = self._search(proof, factor=share**2)
                 self._advance(search, _NODES_PER_SHARE, np.inf, stop)
                 proof.seconds += search.seconds
-                if not search.finished or search.doubtful or not self._problem.certifiable:
+                if not search.finished or not self._problem.certifiable:
                     return
                 proof.squared_bound = max(proof.squared_bound, search.bound)
 
@@ -181,7 +183,7 @@ class _Proofs:
                 proof.subset, proof.squared_error = full, self._squared_error(full)
         proof.nodes += search.nodes
         proof.seconds += search.seconds
-        certain = self._problem.certifiable and not search.doubtful
+        certain = self._problem.certifiable
         if certain:
             proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
         proof.log = np.zeros(0, np.int64) if search.finished else search.log

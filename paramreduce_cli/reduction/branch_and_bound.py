@@ -130,7 +130,7 @@ class Search:
             errors=errors,
             included=np.zeros(n, np.int64),
             log=np.zeros(3 * n + 10, np.int64),
-            progress=np.zeros(4, np.int64),
+            progress=np.zeros(3, np.int64),
             best=np.array([squared_error]),
             subset=found,
         )
@@ -153,11 +153,6 @@ class Search:
         return found
 
     @property
-    def doubtful(self) -> bool:
-        """Whether a column was neither surely dependent nor surely not, so that nothing is proven."""
-        return bool(self._state.progress[self._kernel.DOUBTFUL])
-
-    @property
     def bound(self) -> float:
         """Squared error that no subset is below, as far as the search has come."""
         searched = self.squared_error * self._data.factor
@@ -175,6 +170,8 @@ class Search:
         n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
         free = numbers[kernel.FIRST : kernel.FIRST + numbers[kernel.FREE]]
         own = np.flatnonzero(self._data.unit[free] == numbers[kernel.BRANCH])
+        if numbers[kernel.NEAR]:
+            return float(state.errors[level, kernel.BOUND])
         apart = np.sum(sheet[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
         rises = np.where(apart, sheet[-1, own] ** 2 / sheet[n + own, own], 0.0)
         return float(state.errors[level, kernel.BOUND] + rises.max())

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,16 +47,6 @@ class SelectionProblem:
         for column in self.candidates_by_preference.tolist():
             found.setdefault(owner.get(column, -1 - column), []).append(column)
         return [np.array(columns, dtype=np.int64) for columns in found.values()]
-
-    def sizes(self, order: IntArray) -> IntArray:
-        """Numbers of columns at which an order is between groups, not inside one."""
-        position = {int(column): k for k, column in enumerate(order)}
-        inside = {p for unit in self.units() for p in sorted(position[int(c)] for c in unit)[:-1]}
-        return np.array([n for n in range(1, order.size + 1) if n - 1 not in inside], np.int64)
-
-
-Heuristic = Callable[[SelectionProblem], IntArray]
-"""Orders all candidates, groups in one piece: the first n of them are the subset of size n."""
 
 
 def first_of_the_best(scores: FloatArray) -> int:

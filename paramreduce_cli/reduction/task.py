@@ -6,9 +6,11 @@ from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from threadpoolctl import threadpool_limits
 
 from paramreduce_cli.records import IntArray, Progress, Proofs
 from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.registry import heuristic
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,18 @@ class Found:
 
 
 Heuristic = Callable[[Task], Found]
+
+
+def run(name: str, task: Task) -> Found:
+    """Run a heuristic; on one core, as its matrices are too small for more.
+
+    Args:
+        name: Of the heuristic, perhaps with the criterion after an @.
+        task: What is asked for.
+    """
+    with threadpool_limits(limits=1):
+        found: Found = heuristic[name.partition("@")[0]](task)
+    return found
 
 
 def nested(task: Task, order: Units) -> Found:

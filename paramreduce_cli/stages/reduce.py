@@ -38,6 +38,7 @@ from paramreduce_cli.reduction.grouping import GroupedColumns
 from paramreduce_cli.reduction.objective import Means
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort, Task
+from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.registry import stage
 from paramreduce_cli.stages.counting import count_operations
 from paramreduce_cli.stages.problem import merged_factor, selection_problem, tied_columns
@@ -198,7 +199,7 @@ def _task(
 
 def _selected(task: Task, name: str, stop: Stop) -> tuple[_Selected, Proofs | None]:
     started = time.perf_counter()
-    found = registry.heuristic[name.partition("@")[0]](task)
+    found = run_heuristic(name, task)
     seconds = time.perf_counter() - started
     if not found.subsets:
         smallest = int(task.objective.widths.min())

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli import registry
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -33,6 +32,7 @@ from paramreduce_cli.reduction.picking import pareto_front
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.stability import stability
 from paramreduce_cli.reduction.task import Effort, Task
+from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.reduction.torque import TorqueObjective
 from paramreduce_cli.registry import stage
 from paramreduce_cli.stages.counting import count_operations
@@ -229,7 +229,6 @@ def _stability(
     columns = tied_columns(config.reduction, samples.names)
     weights = reduction.nominal_torque
     problem = selection_problem(reduction.factor, model, columns)
-    heuristic = registry.heuristic[selected.heuristic.partition("@")[0]]
     effort = Effort(
         base_sets=config.reduction.backward_elimination.base_sets,
         continue_with_swaps=config.reduction.backward_elimination.swaps,
@@ -244,7 +243,7 @@ def _stability(
 
     def chosen(other: SelectionProblem) -> IntArray:
         task = Task(TorqueObjective(other), selected.n, smallest=selected.n, effort=effort)
-        return heuristic(task).subsets[-1]
+        return run_heuristic(selected.heuristic, task).subsets[-1]
 
     own = samples.estimation.factors()
     variants = {"all": reduction.factor}

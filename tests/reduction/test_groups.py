@@ -4,41 +4,53 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from oracles.selection import error_by_definition
+from oracles.selection import all_best_errors, error_by_definition
+from selecting import found, order, problem, subsets
 
 from paramreduce_cli import registry
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.grouping import Group, grouped_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
 
-GROUPS = (np.array([0, 3, 5]), np.array([1, 7]))
+GROUPS = ([0, 3, 5], [1, 7])
 
 
-def problem(seed, rank=9, columns=12, groups=GROUPS):
+def grouped_problem(seed, rank=9, columns=12, groups=GROUPS):
     rng = np.random.default_rng(seed)
     W = rng.normal(size=(60, rank)) @ rng.normal(size=(rank, columns))
-    chi = W @ rng.normal(size=columns)
-    return SelectionProblem(W, chi, np.arange(columns), np.arange(columns), groups)
+    return problem(W, W @ rng.normal(size=columns), groups)
+
+
+def sizes_between_units(name, p):
+    return [subset.size for subset in found(name, p).subsets]
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
 @pytest.mark.parametrize("seed", range(4))
 def test_groups_stay_together(name, seed):
-    p = problem(seed)
-    order = registry.heuristic[name](p)
-    assert sorted(order) == list(range(12))
-    sizes = p.sizes(order)
-    assert sizes.size == 12 - 3
-    for n in sizes:
-        chosen = set(order[:n].tolist())
-        assert all(not chosen & set(g) or set(g) <= chosen for g in GROUPS)
+    p = grouped_problem(seed)
+    chosen = subsets(name, p)
+    assert set(chosen[12]) == set(range(12))
+    for n, subset in chosen.items():
+        assert len(set(subset)) == n
+        assert all(not set(subset) & set(g) or set(g) <= set(subset) for g in GROUPS)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_best_subset_of_groups_is_that_of_exhaustive_search(seed):
+    p = grouped_problem(seed, rank=12)
+    best = all_best_errors(p.W, p.chi, [u.tolist() for u in p.units()])
+    proofs = found("best-subset", p).proofs
+    assert set(proofs.status) == {"optimal"}
+    for n, subset in zip(proofs.n, proofs.subsets, strict=True):
+        assert error_by_definition(p.W, p.chi, subset) == pytest.approx(best[n], rel=1e-6, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_each_forward_step_explains_most_per_parameter(seed):
-    p = problem(seed)
-    order = registry.heuristic["forward-selection"](p)
-    sizes = [0, *p.sizes(order)]
+    p = grouped_problem(seed)
+    taken_order = order("forward-selection", p)
+    sizes = [0, *sizes_between_units("forward-selection", p)]
 
     def squared(kept):
         return error_by_definition(p.W, p.chi, list(kept)) ** 2 if len(kept) else 1.0
@@ -46,25 +58,25 @@ def test_each_forward_step_explains_most_per_parameter(seed):
     for n, after in pairwise(sizes):
         if after > 7:
             break
-        before = squared(order[:n])
+        before = squared(taken_order[:n])
         gains = {
-            tuple(unit): (before - squared([*order[:n], *unit])) / len(unit)
+            tuple(unit): (before - squared([*taken_order[:n], *unit])) / len(unit)
             for unit in map(tuple, p.units())
-            if unit[0] not in order[:n]
+            if unit[0] not in taken_order[:n]
         }
-        taken = (before - squared(order[:after])) / (after - n)
+        taken = (before - squared(taken_order[:after])) / (after - n)
         assert taken >= max(gains.values()) * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(4))
 def test_each_backward_step_loses_least_per_parameter(seed):
-    p = problem(seed)
-    order = registry.heuristic["backward-elimination"](p)
-    sizes = p.sizes(order).tolist()
+    p = grouped_problem(seed)
+    taken_order = order("backward-elimination", p)
+    sizes = sizes_between_units("backward-elimination", p)
     for n, after in pairwise(sizes):
         if after > 9:
             break
-        kept = order[:after].tolist()
+        kept = taken_order[:after].tolist()
         now = error_by_definition(p.W, p.chi, kept) ** 2
         losses = []
         for unit in map(tuple, p.units()):
@@ -72,13 +84,8 @@ def test_each_backward_step_loses_least_per_parameter(seed):
                 rest = [k for k in kept if k not in unit]
                 squared = error_by_definition(p.W, p.chi, rest) ** 2 if rest else 1.0
                 losses.append((squared - now) / len(unit))
-        lost = (error_by_definition(p.W, p.chi, order[:n]) ** 2 - now) / (after - n)
+        lost = (error_by_definition(p.W, p.chi, taken_order[:n]) ** 2 - now) / (after - n)
         assert lost <= min(losses) * (1 + 1e-6) + 1e-14
-
-
-def test_without_groups_every_size_exists():
-    p = problem(0, groups=())
-    assert p.sizes(np.arange(12)).tolist() == list(range(1, 13))
 
 
 def test_a_tied_group_is_one_column_with_one_value():
@@ -106,5 +113,4 @@ def test_elimination_begins_with_what_causes_the_smallest_torques(seed):
     W = np.column_stack([W, W[:, 0] + 1e-3 * W[:, 1]])
     chi = W[:, :5] @ np.array([3.0, 1e-4, 2.0, -1.0, 1.0])
     p = SelectionProblem(W, chi, np.arange(6), np.arange(6))
-    order = registry.heuristic["backward-elimination"](p)
-    assert order[-1] == 1
+    assert order("backward-elimination", p)[-1] == 1

@@ -4,101 +4,158 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from oracles.selection import best_subset_error, error_by_definition
+from oracles.selection import (
+    best_subset_error,
+    error_by_definition,
+    floating_forward,
+    forward_two_passes,
+)
+from selecting import Effort, order, problem, subsets
 
 from paramreduce_cli import registry
 from paramreduce_cli.reduction.fitting import fit
-from paramreduce_cli.reduction.problem import SelectionProblem
 
 
-def problem(seed, rows=60, rank=8, columns=12, preference=None):
+def dependent_problem(seed, rows=60, rank=8, columns=12, **changes):
     """Four dependent columns; the torques are not reached by any proper subset."""
     rng = np.random.default_rng(seed)
     W = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
-    chi = W @ rng.normal(size=columns)
-    order = np.arange(columns) if preference is None else np.asarray(preference)
-    return SelectionProblem(W, chi, np.arange(columns), order)
+    return problem(W, W @ rng.normal(size=columns), **changes)
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
 @pytest.mark.parametrize("seed", range(3))
-def test_every_heuristic_orders_all_candidates_once(name, seed):
-    p = problem(seed)
-    order = registry.heuristic[name](p)
-    assert sorted(order) == list(p.candidates)
+def test_every_heuristic_finds_a_subset_of_every_size(name, seed):
+    p = dependent_problem(seed)
+    found = subsets(name, p)
+    assert list(found) == list(range(1, 13))
+    assert all(len(set(s)) == n and set(s) <= set(range(12)) for n, s in found.items())
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
 @pytest.mark.parametrize("seed", range(3))
 def test_full_precision_at_the_rank(name, seed):
-    p = problem(seed)
-    order = registry.heuristic[name](p)
-    assert error_by_definition(p.W, p.chi, order[:8]) < 1e-12
+    p = dependent_problem(seed)
+    assert error_by_definition(p.W, p.chi, subsets(name, p)[8]) < 1e-12
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
-def test_candidates_alone_are_ordered(name):
-    p = problem(0)
-    p = SelectionProblem(p.W, p.chi, np.array([1, 4, 7]), p.preference)
-    assert sorted(registry.heuristic[name](p)) == [1, 4, 7]
+def test_candidates_alone_are_chosen(name):
+    whole = dependent_problem(0)
+    p = problem(whole.W, whole.chi, candidates=[1, 4, 7])
+    found = subsets(name, p)
+    assert list(found) == [1, 2, 3]
+    assert set(found[3]) == {1, 4, 7}
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
-@pytest.mark.parametrize("factor", [1e-6, 1e6])
+@pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])  # no rounding
 def test_units_of_the_torques_do_not_matter(name, factor):
-    p = problem(1)
-    scaled = SelectionProblem(p.W * factor, p.chi * factor, p.candidates, p.preference)
-    assert np.array_equal(registry.heuristic[name](p), registry.heuristic[name](scaled))
+    p = dependent_problem(1)
+    scaled = problem(p.W * factor, p.chi * factor)
+    one, two = subsets(name, p), subsets(name, scaled)
+    assert all(set(one[n]) == set(two[n]) for n in range(1, 8))
+
+
+@pytest.mark.parametrize("name", list(registry.heuristic))
+def test_sizes_are_limited(name):
+    assert max(subsets(name, dependent_problem(2), largest=5)) == 5
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_forward_selection_2_is_algorithm_3(seed):
+    p = dependent_problem(seed, rank=12, columns=12)
+    found = subsets("forward-selection-2", p)
+    for expected in forward_two_passes(p.W, p.chi, 11):
+        assert set(found[len(expected)]) == set(expected)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_floating_takes_out_what_a_better_subset_does_not_need(seed):
+    p = dependent_problem(seed, rank=12, columns=12)
+    found = subsets("floating", p, largest=11)
+    for n, expected in floating_forward(p.W, p.chi, 11).items():
+        assert set(found[n]) == set(expected)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_no_exchange_improves_what_the_swap_search_finds(seed):
+    p = dependent_problem(seed, rank=10, columns=14)
+    for n, kept in subsets("swap", p).items():
+        error = error_by_definition(p.W, p.chi, kept)
+        if n > 9:
+            break
+        rest = set(range(14)) - set(kept)
+        for out in kept:
+            for into in rest:
+                other = [into if k == out else k for k in kept]
+                assert error_by_definition(p.W, p.chi, other) >= error * (1 - 1e-8)
+
+
+def test_the_swap_search_leaves_a_greedy_trap():
+    """Two columns that explain all together, and one that alone is better than either."""
+    a, b, c, d = np.eye(6)[:, :4].T
+    W = np.column_stack([a + 3 * c, b - 3 * c, a + b + 0.5 * d])
+    p = problem(W, W[:, 0] + W[:, 1])
+    assert 2 in subsets("forward-selection", p)[2]
+    assert set(subsets("swap", p)[2]) == {0, 1}
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_more_base_sets_and_swaps_only_improve_elimination(seed):
+    p = dependent_problem(seed, rank=9, columns=13)
+    plain = subsets("backward-elimination", p)
+    several = subsets("backward-elimination", p, effort=Effort(base_sets=5))
+    swapped = subsets("backward-elimination", p, effort=Effort(continue_with_swaps=True))
+    for n in range(1, 9):
+        one, two, three = (error_by_definition(p.W, p.chi, s[n]) for s in (plain, several, swapped))
+        assert two <= one * (1 + 1e-9)
+        assert three <= one * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_each_forward_step_beats_every_other_candidate(seed):
-    p = problem(seed)
-    order = registry.heuristic["forward-selection"](p)
+    p = dependent_problem(seed)
+    found = order("forward-selection", p)
     for n in range(7):
-        rest = set(range(12)) - set(order[:n])
-        best = min(error_by_definition(p.W, p.chi, [*order[:n], i]) for i in rest)
-        assert error_by_definition(p.W, p.chi, order[: n + 1]) <= best * (1 + 1e-9)
+        rest = set(range(12)) - set(found[:n])
+        best = min(error_by_definition(p.W, p.chi, [*found[:n], i]) for i in rest)
+        assert error_by_definition(p.W, p.chi, found[: n + 1]) <= best * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_each_backward_step_loses_least(seed):
-    p = problem(seed)
-    order = registry.heuristic["backward-elimination"](p)
+    p = dependent_problem(seed)
+    found = order("backward-elimination", p)
     for n in range(7, 0, -1):
-        kept = list(order[: n + 1])
+        kept = list(found[: n + 1])
         best = min(error_by_definition(p.W, p.chi, [k for k in kept if k != i]) for i in kept)
-        assert error_by_definition(p.W, p.chi, order[:n]) <= best * (1 + 1e-9)
+        assert error_by_definition(p.W, p.chi, found[:n]) <= best * (1 + 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_each_qr_step_takes_the_most_independent_column(seed):
-    p = problem(seed)
-    order = registry.heuristic["qr"](p)
+    p = dependent_problem(seed)
+    found = order("qr", p)
     for n in range(8):
-        taken = p.W[:, order[:n]]
+        taken = p.W[:, found[:n]]
         left = p.W - taken @ np.linalg.lstsq(taken, p.W, rcond=None)[0] if n else p.W
         lengths = np.linalg.norm(left, axis=0)
-        lengths[order[:n]] = 0
-        assert lengths[order[n]] >= lengths.max() * (1 - 1e-9)
+        lengths[found[:n]] = 0
+        assert lengths[found[n]] >= lengths.max() * (1 - 1e-9)
 
 
 @pytest.mark.parametrize("seed", range(3))
 @pytest.mark.parametrize("name", list(registry.heuristic))
-def test_no_subset_beats_exhaustive_search_and_the_last_steps_equal_it(name, seed):
-    p = problem(seed, rank=7, columns=7)
-    order = registry.heuristic[name](p)
+def test_no_subset_beats_exhaustive_search_and_some_equal_it(name, seed):
+    p = dependent_problem(seed, rank=7, columns=7)
+    found = subsets(name, p)
+    always = {"forward-selection": {1}, "forward-selection-2": {1}, "backward-elimination": {6}}
+    exact = always.get(name, set(range(1, 7)) if name in ("swap", "best-subset") else set())
     for n in range(1, 7):
-        best = best_subset_error(p.W, p.chi, n)
-        assert error_by_definition(p.W, p.chi, order[:n]) >= best * (1 - 1e-9)
-    if name == "forward-selection":
-        assert error_by_definition(p.W, p.chi, order[:1]) == pytest.approx(
-            best_subset_error(p.W, p.chi, 1)
-        )
-    if name == "backward-elimination":
-        assert error_by_definition(p.W, p.chi, order[:6]) == pytest.approx(
-            best_subset_error(p.W, p.chi, 6)
-        )
+        best, error = best_subset_error(p.W, p.chi, n), error_by_definition(p.W, p.chi, found[n])
+        assert error >= best * (1 - 1e-9)
+        assert n not in exact or error == pytest.approx(best, rel=1e-8)
 
 
 def twins(preference):
@@ -106,21 +163,18 @@ def twins(preference):
     rng = np.random.default_rng(0)
     free = rng.normal(size=(30, 3))
     W = np.column_stack([free[:, 0], free[:, 0], free[:, 1], -free[:, 1], free[:, 2]])
-    chi = free @ [3.0, 2.0, 1.0]
-    return SelectionProblem(W, chi, np.arange(5), np.asarray(preference))
+    return problem(W, free @ [3.0, 2.0, 1.0], preference=preference)
 
 
 @pytest.mark.parametrize("name", list(registry.heuristic))
 def test_ties_go_to_the_preferred_column(name):
     for preference, winners in (([0, 1, 2, 3, 4], {0, 2, 4}), ([1, 3, 4, 0, 2], {1, 3, 4})):
-        order = registry.heuristic[name](twins(preference))
-        assert set(order[:3].tolist()) == winners
+        assert set(subsets(name, twins(preference))[3]) == winners
 
 
 @settings(max_examples=60, deadline=None)
 @given(st.integers(0, 10_000), st.integers(2, 9), st.sampled_from(list(registry.heuristic)))
 def test_errors_never_rise_with_n(seed, columns, name):
-    p = problem(seed, rows=20, rank=max(1, columns - 2), columns=columns)
-    order = registry.heuristic[name](p)
-    errors = [fit(p, order[:n]).torque_error for n in range(1, columns + 1)]
+    p = dependent_problem(seed, rows=20, rank=max(1, columns - 2), columns=columns)
+    errors = [fit(p, np.array(s)).torque_error for s in subsets(name, p).values()]
     assert all(b <= a + 1e-10 for a, b in pairwise(errors))

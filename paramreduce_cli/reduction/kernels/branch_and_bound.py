@@ -18,7 +18,8 @@ counters of every array in a tuple:
 * ``sheet``, one free column a column: n rows of the Gram matrix, n of the inverse, the basis of
   the null space, then moments and solution;
 * ``numbers``: how many columns are FREE, the NULLITY, how many are INCLUDED, which unit was taken
-  (BRANCH) and the length of the log then (MARK), and from FIRST on which columns are free;
+  (BRANCH) and the length of the log then (MARK), whether the included and free columns are
+  nearly dependent (NEAR), and from FIRST on which columns are free;
 * ``errors``: INSIDE and BOUND.
 """
 
@@ -31,26 +32,28 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 
-GONE = 1e-13
+GONE = 1e-14
 """Squared share of a column's length below which nothing but round-off is left of it."""
 SURE = 1e-10
 """Squared share from which on the Gram matrix is known well enough to go on with; below, it is
 calculated anew from the columns."""
 ROUND_OFF = 4e-15
 """Of the entries of the Gram matrix."""
-DEPENDENT = 1e-20
-"""The same as GONE where it was calculated from the columns."""
-REAL = 1e-12
-"""Calculated from the columns, what is left between DEPENDENT and this is neither surely
-round-off nor surely not."""
-APART = 1e-20
-"""Squared share in the null space below which a column takes no part in it: the basis itself is
-known to round-off, not its square."""
-INVOLVED = 1e-12
-"""Squared share in the null space from which on a column surely takes part in it."""
-FREE, NULLITY, INCLUDED, BRANCH, MARK, FIRST = 0, 1, 2, 3, 4, 5
+DEPENDENT = 1e-9
+"""Share of a column's length, or of the largest singular value, that counts as zero where it is
+calculated from the columns."""
+APART = 1e-18
+"""Squared share in the null space below which a column takes no part in it."""
+INVOLVED = 1e-10
+"""Squared share from which on a column can be excluded by an update; below, those that stay are
+nearly dependent, and the fit is calculated anew."""
+NEARLY = 1e-5
+"""Smallest over largest singular value at which columns are called nearly dependent: then bounds
+are lowered by what is uncertain, and none is included by force."""
+
+FREE, NULLITY, INCLUDED, BRANCH, MARK, NEAR, FIRST = 0, 1, 2, 3, 4, 5, 6
 INSIDE, BOUND = 0, 1
-LEVEL, GOING_BACK, LOGGED, DOUBTFUL = 0, 1, 2, 3
+LEVEL, GOING_BACK, LOGGED = 0, 1, 2
 DONE, PAUSED = 0, 1
 
 
@@ -91,8 +94,7 @@ class State(NamedTuple):
     log: IntArray
     """Decisions on the way here: 0 before a branch, unit + 1 included, -unit - 1 excluded."""
     progress: IntArray
-    """LEVEL, whether to go back from it, length of the log, and how often a column was neither
-    surely dependent nor surely not, (4,)."""
+    """LEVEL, whether to go back from it, and length of the log, (3,)."""
     best: FloatArray
     """The smallest squared error found, (1,)."""
     subset: IntArray
@@ -150,18 +152,50 @@ def _share(sheet: FloatArray, nullity: int, j: int) -> float:
 
 @numba.njit(cache=True)
 def _exclude(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, progress: IntArray, j: int
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
     n, row = sheet.shape[1], sheet.shape[0] - 1
     share = _share(sheet, numbers[NULLITY], j)
-    if APART < share < INVOLVED:
-        progress[DOUBTFUL] += 1
+    if numbers[NEAR] == 1 or APART < share < INVOLVED:
+        _drop(sheet, numbers, j)
+        _fit_anew(sheet, numbers, errors, s, data)
+        return
     if share > APART:
         _exclude_dependent(sheet, numbers, j, share)
     else:
         errors[BOUND] += sheet[row, j] ** 2 / sheet[n + j, j]
         _sweep(sheet, n, row, j, numbers[FREE])
     _drop(sheet, numbers, j)
+
+
+@numba.njit(cache=True)
+def _fit_anew(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
+) -> None:
+    """The fit with all included and free columns, from the columns themselves."""
+    n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
+    rows = np.empty((free + count, data.chi.size))
+    for j in range(free):
+        rows[j] = data.columns[numbers[FIRST + j]]
+    for k in range(count):
+        rows[free + k] = data.columns[s.included[k]]
+    left, values, right = np.linalg.svd(rows, full_matrices=True)
+    rank = 0
+    while rank < values.size and values[rank] > DEPENDENT * values[0]:
+        rank += 1
+    spanned = np.ascontiguousarray(right[:rank])
+    inner = spanned @ data.chi
+    rest = data.chi - inner @ spanned
+    own = np.ascontiguousarray(left[:free, :rank])
+    sheet[n : n + free, :free] = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
+    numbers[NULLITY] = min(free + count - rank, sheet.shape[0] - 2 * n - 2)
+    for c in range(numbers[NULLITY]):
+        sheet[2 * n + c, :free] = left[:free, rank + c]
+    sheet[sheet.shape[0] - 1, :free] = own @ (inner / values[:rank])
+    ratio = values[rank - 1] / values[0]
+    numbers[NEAR] = 1 if ratio < NEARLY else 0
+    length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
+    errors[BOUND] = max(errors[BOUND], max(length, 0.0) ** 2)
 
 
 @numba.njit(cache=True)
@@ -195,23 +229,21 @@ def _exclude_dependent(sheet: FloatArray, numbers: IntArray, j: int, share: floa
 @numba.njit(cache=True)
 def _orthonormal(
     columns: FloatArray, chi: FloatArray, subset: IntArray, count: int
-) -> tuple[FloatArray, FloatArray, float]:
-    """Directions of a subset's columns, what they leave of chi, and the squared length that was
-    left of the last column.
-    """
-    left, last = chi.copy(), 0.0
+) -> tuple[FloatArray, FloatArray]:
+    """Directions of a subset's columns, and what they leave of chi."""
+    left = chi.copy()
     basis, known = np.empty((count, chi.size)), 0
     for k in range(count):
         direction = columns[subset[k]].copy()
         for _ in range(2):
             for i in range(known):
                 direction -= np.dot(basis[i], direction) * basis[i]
-        last = np.dot(direction, direction)
-        if last > DEPENDENT:
-            basis[known] = direction / np.sqrt(last)
+        length = np.sqrt(np.dot(direction, direction))
+        if length > DEPENDENT:
+            basis[known] = direction / length
             left -= np.dot(basis[known], left) * basis[known]
             known += 1
-    return basis[:known], left, last
+    return basis[:known], left
 
 
 @numba.njit(cache=True)
@@ -233,9 +265,7 @@ def _calculate_anew(
 ) -> None:
     """What the included columns leave, from the columns themselves."""
     free, row = numbers[FREE], sheet.shape[0] - 2
-    basis, left, last = _orthonormal(data.columns, data.chi, s.included, numbers[INCLUDED])
-    if DEPENDENT < last < REAL:
-        s.progress[DOUBTFUL] += 1
+    basis, left = _orthonormal(data.columns, data.chi, s.included, numbers[INCLUDED])
     rest = np.empty((free, left.size))
     for j in range(free):
         rest[j] = data.columns[numbers[FIRST + j]]
@@ -265,7 +295,7 @@ def _decide(
             numbers[INCLUDED] += 1
             _include(sheet, numbers, errors, s, data, j)
         else:
-            _exclude(sheet, numbers, errors, progress, j)
+            _exclude(sheet, numbers, errors, s, data, j)
 
 
 @numba.njit(cache=True)
@@ -336,7 +366,7 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
         if column >= 0:
             subset[count] = column
             count += 1
-    _, left, _ = _orthonormal(data.columns, data.chi, subset, count)
+    _, left = _orthonormal(data.columns, data.chi, subset, count)
     error = np.dot(left, left)
     if error < s.best[0] * (1 - 1e-12):
         s.best[0] = error
@@ -391,7 +421,7 @@ def _needed_and_useless(
         own = unit[numbers[FIRST + j]]
         if size[own] > places or (size[own] == 1 and sheet[j, j] <= GONE):
             return needed, must, own
-        if _needed(sheet, nullity, j, room):
+        if numbers[NEAR] == 0 and _needed(sheet, nullity, j, room):
             counted = False
             for i in range(j if size[own] > 1 else 0):
                 same = unit[numbers[FIRST + i]] == own

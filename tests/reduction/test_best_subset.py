@@ -1,0 +1,173 @@
+"""Proofs against exhaustive search, and searches that are stopped and continued."""
+
+import numpy as np
+import pytest
+from oracles.selection import all_best_errors, error_by_definition
+from selecting import Effort, found, problem
+
+from paramreduce_cli.reduction.branch_and_bound import Search, unit_problem
+
+KINDS = ("generic", "sparse", "proportional", "dependent", "near-dependent", "nearly-parallel")
+
+
+def case(kind, rng):
+    """Up to 13 columns of very different sizes; half of the time with noise."""
+    m = int(rng.integers(3, 14))
+    rows = m + int(rng.integers(0, 6))
+    W = rng.normal(size=(rows, m))
+    if kind == "sparse":
+        W = W * (rng.random((rows, m)) < 0.35)
+    if kind == "proportional":
+        for _ in range(int(rng.integers(1, 4))):
+            i, j = rng.choice(m, 2, replace=False)
+            W[:, i] = W[:, j] * rng.choice([-1, 1, 2.5, -0.01])
+    if kind in ("dependent", "near-dependent"):
+        rank = int(rng.integers(2, max(3, m - 1)))
+        W = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, m))
+    if kind == "near-dependent":
+        W = W + 10.0 ** -rng.uniform(1, 3.5) * rng.normal(size=(rows, m))
+    if kind == "nearly-parallel":  # the spectrum of W does not show it
+        i, j, k = rng.choice(m, 3, replace=False)
+        W[:, i] = W[:, j] + 10.0 ** -rng.uniform(1, 6) * W[:, k]
+    empty = np.linalg.norm(W, axis=0) == 0
+    W[:, empty] = rng.normal(size=(rows, int(empty.sum())))
+    W = W * 10.0 ** rng.uniform(-3, 3, m)
+    chi = W @ (rng.normal(size=m) / np.linalg.norm(W, axis=0) * 10.0 ** rng.uniform(-3, 0, m))
+    if rng.random() < 0.5:
+        chi = chi + 0.1 * np.linalg.norm(chi) * rng.normal(size=rows) / np.sqrt(rows)
+    return W, chi
+
+
+@pytest.mark.parametrize("part", range(8))
+def test_exhaustive_search_agrees(part):
+    """800 cases in all; a bare search, without a good subset to start from."""
+    rng = np.random.default_rng(part)
+    uncertain = 0
+    for k in range(100):
+        W, chi = case(KINDS[k % len(KINDS)], rng)
+        m = W.shape[1]
+        p = unit_problem(problem(W, chi, preference=rng.permutation(m)))
+        best = all_best_errors(W, chi, [[c] for c in range(m)])
+        for n in range(1, m + 1):
+            search = Search(p, n, 1.0, np.zeros(0, np.int64))
+            search.advance(10**6)
+            assert search.finished
+            if not p.certifiable:
+                uncertain += 1
+                continue
+            assert np.sqrt(search.squared_error) == pytest.approx(best[n], rel=1e-6, abs=1e-8)
+            if best[n] < 1:
+                error = error_by_definition(p.X, p.chi, search.subset)
+                assert error == pytest.approx(best[n], rel=1e-6, abs=1e-8)
+    assert uncertain < 20  # sizes, of about 800
+
+
+def hard_problem(seed=0, rank=26, columns=30):
+    rng = np.random.default_rng(seed)
+    W = rng.normal(size=(60, rank)) @ rng.normal(size=(rank, columns))
+    return problem(W, W @ rng.normal(size=columns))
+
+
+def start(p, n):
+    """A subset that is not the best, and its squared error."""
+    subset = np.arange(n)
+    return error_by_definition(p.X, p.chi, subset) ** 2, subset
+
+
+def test_a_search_can_be_stopped_anywhere_and_continued():
+    p = unit_problem(hard_problem())
+    whole = Search(p, 8, *start(p, 8))
+    whole.advance(10**9)
+    log, error, subset, nodes = np.zeros(0, np.int64), *start(p, 8), 0
+    while True:
+        part = Search(p, 8, error, subset, log=log)
+        part.advance(37)
+        log, error, subset, nodes = part.log, part.squared_error, part.subset, nodes + part.nodes
+        if part.finished:
+            break
+        assert part.bound <= whole.squared_error * (1 + 1e-9)
+    assert error == pytest.approx(whole.squared_error, rel=1e-9)
+    assert whole.nodes > 300
+    assert whole.nodes <= nodes < 2 * whole.nodes
+
+
+def test_a_search_for_less_proves_a_lower_bound():
+    p = unit_problem(hard_problem())
+    whole = Search(p, 8, *start(p, 8))
+    whole.advance(10**9)
+    quick = Search(p, 8, whole.squared_error, whole.subset, factor=0.25)
+    quick.advance(10**9)
+    assert quick.nodes < whole.nodes / 2
+    assert quick.bound == pytest.approx(0.25 * whole.squared_error, rel=1e-6)
+
+
+def test_what_is_proven_is_kept_when_nodes_run_out_and_a_later_run_proves_more():
+    p = hard_problem()
+    optimum = found("best-subset", p, largest=8).proofs
+    assert set(optimum.status) == {"optimal"}
+    before, runs = None, 0
+    while before is None or "best-found" in before.status:
+        now = found(
+            "best-subset", p, largest=8, effort=Effort(node_limit=400, kicks=0), previous=before
+        ).proofs
+        assert np.all(now.lower_bound <= optimum.torque_error * (1 + 1e-9) + 1e-12)
+        assert np.all(now.lower_bound <= now.torque_error * (1 + 1e-9))
+        assert np.all(now.torque_error >= optimum.torque_error * (1 - 1e-6) - 1e-12)
+        if before is not None:
+            assert now.nodes.sum() > before.nodes.sum()
+            done = np.array(before.status) == "optimal"
+            assert np.all(np.array(now.status)[done] == "optimal")
+        before, runs = now, runs + 1
+    assert runs > 2
+    assert before.torque_error == pytest.approx(optimum.torque_error, rel=1e-6, abs=1e-12)
+
+
+def test_without_any_time_there_are_subsets_and_bounds():
+    p = hard_problem()
+    result = found("best-subset", p, effort=Effort(time_limit=0.0))
+    optimum = found("best-subset", p).proofs
+    assert [s.size for s in result.subsets] == list(range(1, 31))
+    assert "best-found" in result.proofs.status
+    assert np.all(result.proofs.lower_bound <= optimum.torque_error * (1 + 1e-9) + 1e-12)
+    assert result.proofs.lower_bound.max() > 0
+
+
+def test_an_interruption_ends_the_search_and_keeps_what_is_known():
+    told = []
+
+    def interrupt(_):
+        raise KeyboardInterrupt
+
+    result = found(
+        "best-subset", hard_problem(), progress=interrupt, interrupted=lambda: told.append(1)
+    )
+    assert told == [1]
+    assert len(result.subsets) == 30
+
+
+@pytest.mark.parametrize("condition", [1e6, 1e8])
+def test_what_double_precision_cannot_tell_is_not_called_optimal(condition):
+    rng = np.random.default_rng(0)
+    W = np.linalg.qr(rng.normal(size=(40, 9)))[0]
+    W[:, 8] = W[:, 0] + W[:, 8] / condition
+    result = found("best-subset", problem(W, W @ rng.normal(size=9))).proofs
+    assert set(result.status[:8]) == {"uncertified"}
+    assert np.all(result.lower_bound[:8] == 0)
+    assert [s.size for s in result.subsets] == list(range(1, 10))
+
+
+def test_duplicates_and_columns_beyond_the_rank():
+    rng = np.random.default_rng(1)
+    base = rng.normal(size=(30, 4))
+    W = np.column_stack([base, base, -2 * base[:, :2]])
+    proofs = found("best-subset", problem(W, base @ [1.0, 2.0, 3.0, 4.0])).proofs
+    assert set(proofs.status) == {"optimal"}
+    best = all_best_errors(W, base @ [1.0, 2.0, 3.0, 4.0], [[c] for c in range(10)])
+    assert proofs.torque_error == pytest.approx(best[1:], abs=1e-12)
+
+
+def test_one_column_alone():
+    W = np.arange(1.0, 6.0)[:, None]
+    proofs = found("best-subset", problem(W, np.ones(5))).proofs
+    assert proofs.status == ("optimal",)
+    assert proofs.torque_error == pytest.approx([error_by_definition(W, np.ones(5), [0])])
