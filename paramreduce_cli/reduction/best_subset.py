@@ -168,11 +168,14 @@ class _Proofs:
                 search = self._search(proof, factor=share**2)
                 self._advance(search, _NODES_PER_SHARE, np.inf, stop)
                 proof.seconds += search.seconds
-                if not search.finished or not self._problem.certifiable:
+                if not search.finished or not self._certain(search):
                     return
                 proof.squared_bound = max(proof.squared_bound, search.bound)
 
         list(pool.map(work, self._open()))
+
+    def _certain(self, search: Search) -> bool:
+        return self._problem.certifiable and not search.doubtful
 
     def _take_over(self, proof: _Proof, search: Search) -> None:
         """Note how far a search has come."""
@@ -183,7 +186,7 @@ class _Proofs:
                 proof.subset, proof.squared_error = full, self._squared_error(full)
         proof.nodes += search.nodes
         proof.seconds += search.seconds
-        certain = self._problem.certifiable
+        certain = self._certain(search)
         if certain:
             proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
         proof.log = np.zeros(0, np.int64) if search.finished else search.log

@@ -33,6 +33,7 @@ class UnitProblem:
         columns: Their numbers in the problem it was made from, units together.
         unit: Which unit each column belongs to, (n_columns,).
         condition: Largest over smallest non-zero singular value of X.
+        nearest: Smallest sine of the angle between two columns, those parallel to rounding aside.
         rank: Of X.
     """
 
@@ -41,12 +42,13 @@ class UnitProblem:
     columns: IntArray
     unit: IntArray
     condition: float
+    nearest: float
     rank: int
 
     @property
     def certifiable(self) -> bool:
         """Whether double precision is enough for proofs."""
-        return self.condition <= LARGEST_CONDITION
+        return self.condition <= LARGEST_CONDITION and self.nearest >= 1 / LARGEST_CONDITION
 
 
 def unit_problem(problem: SelectionProblem) -> UnitProblem:
@@ -60,7 +62,16 @@ def unit_problem(problem: SelectionProblem) -> UnitProblem:
     rank = int(np.sum(s > DEPENDENT * s[0]))
     unit = np.repeat(np.arange(len(units)), [u.size for u in units])
     chi = problem.chi / np.linalg.norm(problem.chi)
-    return UnitProblem(X, chi, columns, unit, float(s[0] / s[rank - 1]), rank)
+    return UnitProblem(X, chi, columns, unit, float(s[0] / s[rank - 1]), _nearest(X), rank)
+
+
+def _nearest(X: FloatArray) -> float:
+    sines = [1.0]
+    for j in range(1, X.shape[1]):
+        other = X[:, :j]
+        rest = X[:, [j]] - other * (X[:, j] @ other)
+        sines += np.linalg.norm(rest, axis=0).tolist()
+    return min(sine for sine in sines if sine > DEPENDENT)
 
 
 class Search:
@@ -130,7 +141,8 @@ class Search:
             errors=errors,
             included=np.zeros(n, np.int64),
             log=np.zeros(3 * n + 10, np.int64),
-            progress=np.zeros(3, np.int64),
+            progress=np.zeros(5, np.int64),
+            basis=np.zeros((n, chi.size)),
             best=np.array([squared_error]),
             subset=found,
         )
@@ -151,6 +163,11 @@ class Search:
         """The best subset found, numbered as the columns of the problem."""
         found: IntArray = self._state.subset[self._state.subset >= 0]
         return found
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a column was neither surely dependent nor surely not, so that nothing is proven."""
+        return bool(self._state.progress[self._kernel.DOUBTFUL])
 
     @property
     def bound(self) -> float:

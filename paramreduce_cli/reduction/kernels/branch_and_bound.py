@@ -32,18 +32,21 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 
-GONE = 1e-14
+GONE = 1e-13
 """Squared share of a column's length below which nothing but round-off is left of it."""
-SURE = 1e-10
+SURE = 1e-6
 """Squared share from which on the Gram matrix is known well enough to go on with; below, it is
 calculated anew from the columns."""
-ROUND_OFF = 4e-15
-"""Of the entries of the Gram matrix."""
+ROUND_OFF = 1e-13
+"""Of the entries of the Gram matrix, after steps with pivots of SURE and more."""
 DEPENDENT = 1e-9
 """Share of a column's length, or of the largest singular value, that counts as zero where it is
 calculated from the columns."""
 APART = 1e-18
 """Squared share in the null space below which a column takes no part in it."""
+REAL = 1e-6
+"""Share of a column's length from which on it is surely independent; between this and DEPENDENT
+nothing is certified."""
 INVOLVED = 1e-10
 """Squared share from which on a column can be excluded by an update; below, those that stay are
 nearly dependent, and the fit is calculated anew."""
@@ -53,7 +56,7 @@ are lowered by what is uncertain, and none is included by force."""
 
 FREE, NULLITY, INCLUDED, BRANCH, MARK, NEAR, FIRST = 0, 1, 2, 3, 4, 5, 6
 INSIDE, BOUND = 0, 1
-LEVEL, GOING_BACK, LOGGED = 0, 1, 2
+LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
 DONE, PAUSED = 0, 1
 
 
@@ -94,7 +97,11 @@ class State(NamedTuple):
     log: IntArray
     """Decisions on the way here: 0 before a branch, unit + 1 included, -unit - 1 excluded."""
     progress: IntArray
-    """LEVEL, whether to go back from it, and length of the log, (3,)."""
+    """LEVEL, whether to go back from it, length of the log, how many directions of the included
+    columns are known (SPANNED), and how often a column was neither surely dependent nor surely
+    not (DOUBTFUL), (5,)."""
+    basis: FloatArray
+    """Directions of the included columns, zero for those that depend on others, (n_columns, k)."""
     best: FloatArray
     """The smallest squared error found, (1,)."""
     subset: IntArray
@@ -227,23 +234,25 @@ def _exclude_dependent(sheet: FloatArray, numbers: IntArray, j: int, share: floa
 
 
 @numba.njit(cache=True)
-def _orthonormal(
-    columns: FloatArray, chi: FloatArray, subset: IntArray, count: int
-) -> tuple[FloatArray, FloatArray]:
-    """Directions of a subset's columns, and what they leave of chi."""
-    left = chi.copy()
-    basis, known = np.empty((count, chi.size)), 0
-    for k in range(count):
-        direction = columns[subset[k]].copy()
-        for _ in range(2):
-            for i in range(known):
-                direction -= np.dot(basis[i], direction) * basis[i]
-        length = np.sqrt(np.dot(direction, direction))
-        if length > DEPENDENT:
-            basis[known] = direction / length
-            left -= np.dot(basis[known], left) * basis[known]
-            known += 1
-    return basis[:known], left
+def _left(basis: FloatArray, count: int, column: FloatArray) -> FloatArray:
+    """What is left of a column without its parts along some directions."""
+    left: FloatArray = column.copy()
+    for _ in range(2):
+        for i in range(count):
+            left -= np.dot(basis[i], left) * basis[i]
+    return left
+
+
+@numba.njit(cache=True)
+def _span(s: State, data: Data, count: int) -> None:
+    """Find the directions of the first included columns, as far as they are not known."""
+    for k in range(s.progress[SPANNED], count):
+        left = _left(s.basis, k, data.columns[s.included[k]])
+        length = np.sqrt(np.dot(left, left))
+        if DEPENDENT < length < REAL:
+            s.progress[DOUBTFUL] += 1
+        s.basis[k] = left / length if length > DEPENDENT else 0.0 * left
+    s.progress[SPANNED] = max(s.progress[SPANNED], count)
 
 
 @numba.njit(cache=True)
@@ -265,13 +274,12 @@ def _calculate_anew(
 ) -> None:
     """What the included columns leave, from the columns themselves."""
     free, row = numbers[FREE], sheet.shape[0] - 2
-    basis, left = _orthonormal(data.columns, data.chi, s.included, numbers[INCLUDED])
+    count = numbers[INCLUDED]
+    _span(s, data, count)
+    left = _left(s.basis, count, data.chi)
     rest = np.empty((free, left.size))
     for j in range(free):
-        rest[j] = data.columns[numbers[FIRST + j]]
-        for _ in range(2):
-            for i in range(len(basis)):
-                rest[j] -= np.dot(basis[i], rest[j]) * basis[i]
+        rest[j] = _left(s.basis, count, data.columns[numbers[FIRST + j]])
         sheet[row, j] = np.dot(rest[j], left)
         for i in range(j + 1):
             sheet[i, j] = sheet[j, i] = np.dot(rest[i], rest[j])
@@ -292,6 +300,7 @@ def _decide(
         j = _position(numbers, column)
         if include:
             s.included[numbers[INCLUDED]] = column
+            progress[SPANNED] = min(progress[SPANNED], numbers[INCLUDED])
             numbers[INCLUDED] += 1
             _include(sheet, numbers, errors, s, data, j)
         else:
@@ -322,12 +331,40 @@ def _branch(s: State, data: Data, unit: int) -> None:
 
 
 @numba.njit(cache=True)
-def _go_back(s: State, data: Data) -> None:
-    """Take the exclude branch of the level above.
+def _parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
+    """Whether the included columns leave of two others what is parallel to rounding."""
+    _span(s, data, count)
+    first = _left(s.basis, count, data.columns[one])
+    length = np.dot(first, first)
+    if length <= DEPENDENT**2:
+        return False
+    second = _left(s.basis, count, data.columns[other])
+    rest = second - np.dot(first, second) / length * first
+    return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
 
-    Columns that are parallel to the excluded one, in what is left of them, go with it: a subset
-    with one of them explains no more than the same with the excluded one, which is searched.
+
+@numba.njit(cache=True)
+def _exclude_parallel(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
+) -> None:
+    """Exclude the columns that are parallel, in what is left of them, to that of a unit.
+
+    A subset with one of them explains no more than the same with the unit, which is searched.
     """
+    own = _position(numbers, data.first[unit])
+    for j in range(numbers[FREE] - 1, -1, -1):
+        column = numbers[FIRST + j]
+        near = sheet[j, j] * sheet[own, own] - sheet[j, own] ** 2 <= GONE * sheet[own, own]
+        if j == own or not near or data.size[data.unit[column]] > 1:
+            continue
+        if _parallel(s, data, numbers[INCLUDED], data.first[unit], column):
+            _decide(sheet, numbers, errors, s, data, data.unit[column], False)
+            own = _position(numbers, data.first[unit])
+
+
+@numba.njit(cache=True)
+def _go_back(s: State, data: Data) -> None:
+    """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
     level = s.progress[LEVEL]
     if level < 0:
@@ -336,15 +373,7 @@ def _go_back(s: State, data: Data) -> None:
     s.progress[LOGGED] = numbers[MARK]
     unit = numbers[BRANCH]
     if data.size[unit] == 1:
-        own = _position(numbers, data.first[unit])
-        for j in range(numbers[FREE] - 1, -1, -1):
-            parallel = sheet[j, own] ** 2 >= (1 - 1e-12) * sheet[j, j] * sheet[own, own]
-            if j != own and parallel and data.size[data.unit[numbers[FIRST + j]]] == 1:
-                moved = own == numbers[FREE] - 1
-                _decide(
-                    sheet, numbers, errors, s, data, data.unit[numbers[FIRST + j]], False
-                )  # fmt: skip
-                own = j if moved else own
+        _exclude_parallel(sheet, numbers, errors, s, data, unit)
     _decide(sheet, numbers, errors, s, data, unit, False)
 
 
@@ -362,11 +391,17 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
     """
     subset = np.full(data.unit.size, -1, np.int64)
     subset[:count] = s.included[:count]
+    _span(s, data, count)
+    basis = np.empty((count + 2, data.chi.size))
+    basis[:count] = s.basis[:count]
     for column in (first, second):
         if column >= 0:
             subset[count] = column
+            direction = _left(basis, count, data.columns[column])
+            length = np.sqrt(np.dot(direction, direction))
+            basis[count] = direction / length if length > DEPENDENT else 0.0 * direction
             count += 1
-    _, left = _orthonormal(data.columns, data.chi, subset, count)
+    left = _left(basis, count, data.chi)
     error = np.dot(left, left)
     if error < s.best[0] * (1 - 1e-12):
         s.best[0] = error
