@@ -370,10 +370,12 @@ class Subsets(BySize):
 
 @dataclass(frozen=True)
 class Proofs(BySize):
-    """How far the best subset of each size is proven; arrays have one row per size."""
+    """How far the best subset of at most each size is proven; arrays have one row per size."""
 
+    units: tuple[IntArray, ...]
+    """Columns that were chosen as one, the most wanted first."""
     subsets: tuple[IntArray, ...]
-    """Column indices of the best subset found of each size."""
+    """Column indices of the best subset found of at most each size."""
     torque_error: FloatArray
     """Of these, (m,)."""
     lower_bound: FloatArray
@@ -404,6 +406,11 @@ class Reduction:
     """By name, `HEURISTIC@CRITERION` where the criterion is not the torque error."""
     proofs: Proofs | None
     """Of the best subsets by torque, where they were looked for."""
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether more time could prove more."""
+        return self.proofs is not None and "best-found" in self.proofs.status
 
     def standard(self, subset: IntArray, values: FloatArray) -> FloatArray:
         """Standard parameters of a reduced model, zero where one is not kept, (n_standard,)."""
@@ -446,6 +453,8 @@ class Selected:
     """Each approximate base parameter as a linear expression of standard ones."""
     reason: str
     """One sentence that says why it was taken."""
+    missed: str
+    """What the tolerances asked for and no model has; empty where they are kept."""
 
 
 @dataclass(frozen=True)

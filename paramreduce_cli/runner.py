@@ -31,6 +31,7 @@ from paramreduce_cli.artifacts.store import (
     load_file,
 )
 from paramreduce_cli.config import Config, section_text
+from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.pipeline import (
     Stage,
     StageInput,
@@ -142,8 +143,13 @@ class Runner:
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
 
-    def run(self, stage: Stage, *, force: bool = False) -> Outcome:
+    def run(self, stage: Stage, *, force: bool = False, go_on: bool = False) -> Outcome:
         """Run one stage, unless its artifact is up to date.
+
+        Args:
+            stage: Which one.
+            force: Run it even so.
+            go_on: Run it also where more time could make its artifact better.
 
         Raises:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
@@ -151,7 +157,9 @@ class Runner:
         path = self.store.path(stage.output)
         self.store.refuse_to_replace(stage.output, self._robot)
         self._look_at_inputs(stage)
-        if not force and self.is_current(stage):
+        previous = self._previous(stage)
+        better = go_on and getattr(previous, "unfinished", False)
+        if not force and not better and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
@@ -160,7 +168,7 @@ class Runner:
         lent = (Run, stage.output)
         arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
         if stage.previous is not None:
-            arguments[stage.previous.name] = None if force else self._previous(stage)
+            arguments[stage.previous.name] = previous
         parts = self._lend_run(stage, arguments, inputs)
         record = stage.function(**arguments)
         self.store.save(record, self._stamp(stage, inputs, started))
@@ -171,10 +179,14 @@ class Runner:
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""
         stamp = self.store.stamp(stage.output)
-        if stamp is None or (stamp.schema, stamp.versions) != (SCHEMA, versions()):
+        known = stamp is not None and (stamp.schema, stamp.versions) == (SCHEMA, versions())
+        if stage.previous is None or not known:
             return None
-        path = self.store.path(stage.output)
-        return load_file(path, stage.output, self._robot, stage.name)[0]
+        try:
+            path = self.store.path(stage.output)
+            return load_file(path, stage.output, self._robot, stage.name)[0]
+        except ArtifactError:  # damaged: it is made again
+            return None
 
     def is_current(self, stage: Stage) -> bool:
         """Whether a stage's artifact was made by this version from just these inputs."""

@@ -228,6 +228,8 @@ def _save_proofs(writer: Writer, proofs: Proofs) -> None:
     for key in ("n", "torque_error", "lower_bound", "nodes"):
         writer.dataset(f"proofs/{key}", getattr(proofs, key))
     writer.dataset("proofs/status", list(proofs.status))
+    writer.dataset("proofs/units/columns", np.concatenate(proofs.units))
+    writer.dataset("proofs/units/sizes", np.array([unit.size for unit in proofs.units]))
     for n, subset, log in zip(proofs.n, proofs.subsets, proofs.logs, strict=True):
         writer.dataset(f"proofs/subsets/{n}", subset)
         writer.dataset(f"proofs/logs/{n}", log)
@@ -270,7 +272,9 @@ def _load_subsets(reader: Reader, name: str) -> Subsets:
 
 def _load_proofs(reader: Reader) -> Proofs:
     sizes = reader.array("proofs/n", 1)
+    ends = np.cumsum(reader.array("proofs/units/sizes", 1))[:-1]
     return Proofs(
+        units=tuple(np.split(reader.array("proofs/units/columns", 1), ends)),
         n=sizes,
         subsets=tuple(reader.array(f"proofs/subsets/{n}", 1) for n in sizes),
         torque_error=reader.array("proofs/torque_error", 1),
@@ -301,6 +305,7 @@ def save_validation(writer: Writer, validation: Validation) -> None:
     writer.dataset("selected/values", selected.values)
     writer.dataset("selected/expressions", selected.expressions)
     writer.dataset("selected/reason", selected.reason)
+    writer.dataset("selected/missed", selected.missed)
     writer.dataset("pareto/heuristic", np.array([name for name, _ in validation.pareto], dtype=str))
     writer.dataset("pareto/n", np.array([n for _, n in validation.pareto], dtype=np.int64))
     if validation.stability is not None:
@@ -342,6 +347,7 @@ def load_validation(reader: Reader) -> Validation:
             values=reader.array("selected/values", 1),
             expressions=reader.texts("selected/expressions"),
             reason=reader.text("selected/reason"),
+            missed=reader.text("selected/missed"),
         ),
         pareto=tuple(
             (name, int(n))

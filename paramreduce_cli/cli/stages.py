@@ -22,7 +22,7 @@ from paramreduce_cli.records import Report, Run, Validation
 from paramreduce_cli.runner import Outcome, Runner
 
 NOT_ACCEPTED = 1
-_TABLE_WIDTH = 84
+_TABLE_WIDTH = 110
 
 CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
 RESULTS = click.option(
@@ -79,7 +79,7 @@ def stage_command(stage: Stage) -> click.Command:
             runner = Runner(
                 loaded, store, jobs or _cores(), progress, samples, remark, interruption.heeded
             )
-            outcome = runner.run(stage, force=force)
+            outcome = runner.run(stage, force=force, go_on=True)
         if not quiet:
             _say_outcome(outcome)
         return _exit_code(stage, outcome, quiet)
@@ -182,6 +182,7 @@ def run(
         say(f"Report: {store.path(Report).with_name('index.html')}")
     selected = summary["selected"]
     if not quiet:
+        say(f"Selected: {selected['reason']}")
         for text in summary["remarks"]:
             if text.startswith("The selected model"):
                 remark(text.rstrip("."))

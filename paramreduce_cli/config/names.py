@@ -49,6 +49,8 @@ class registered:  # noqa: N801 - reads as a type in annotations
         return {"type": "string", "enum": list(self._registry)}
 
     def _check(self, name: str) -> str:
+        if isinstance(self._registry, HeuristicsByCriterion):
+            self._registry.refuse(name)
         if name not in self._registry:
             raise ValueError(unknown(self._registry.kind, name, self._registry))
         return name
@@ -67,3 +69,20 @@ class HeuristicsByCriterion:
 
     def __contains__(self, name: object) -> bool:
         return name in list(self)
+
+    def refuse(self, name: str) -> None:
+        """Explain what is wrong with a criterion.
+
+        Raises:
+            ValueError: It is not known, or makes no sense with the heuristic.
+        """
+        who, at, by = name.partition("@")
+        criteria = [known for known in selection_criterion if known != "torque"]
+        if not at or who not in heuristic:
+            return
+        if by == "torque":
+            raise ValueError(f"{who} selects by torque as it is; leave out @torque")
+        if by not in criteria:
+            raise ValueError(unknown("criterion", by, criteria))
+        if selects_by_torque_only(heuristic[who]):
+            raise ValueError(f"{who} takes no criterion; it is of the torques alone")

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.fitting import Fit, fit
 from paramreduce_cli.reduction.objective import Means, Objective, Units, without
@@ -67,7 +68,13 @@ class _Accelerations:
         self.data = data
         self._total = float(np.linalg.norm(data.ddz / data.nominal))
         M = data.A @ reference
-        weights = np.linalg.inv(M) / data.nominal[:, None]
+        try:
+            weights = np.linalg.inv(M) / data.nominal[:, None]
+        except np.linalg.LinAlgError as error:
+            raise DataError(
+                "the mass matrix of the model fitted to the estimation set is singular, so that "
+                "nothing can be selected by accelerations; bring more exciting samples."
+            ) from error
         K = np.einsum("sijp,sj->sip", data.A, data.ddz) + data.B
         n = K.shape[2]
         self._first = (weights @ K).reshape(-1, n)

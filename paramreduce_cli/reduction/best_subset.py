@@ -10,7 +10,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from paramreduce_cli.records import IntArray, Progress, Proofs
-from paramreduce_cli.reduction.branch_and_bound import Search, UnitProblem, unit_problem
+from paramreduce_cli.reduction.branch_and_bound import (
+    Search,
+    UnitProblem,
+    compile_search,
+    unit_problem,
+)
 from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.swap import swap
@@ -26,6 +31,8 @@ _UNLIMITED = 10**15
 _SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
 """Of the best error, that are tried as lower bounds where the optimum is not proven."""
 _NODES_PER_SHARE = 30_000
+_SHARE_OF_TIME, _LEAST_TIME = 0.1, 2.0
+"""Of the time limit, and s, that lower bounds may take after it."""
 
 
 @heuristic("best-subset")
@@ -46,13 +53,22 @@ class _Proof:
     """What is known of one size; errors are squared shares of chi."""
 
     n: int
+    exact: IntArray
+    """A subset of just this size, for groups do not fill every size as well as a smaller one."""
     subset: IntArray
+    """The best one of at most this size."""
     squared_error: float
     squared_bound: float = 0.0
     status: str = BEST_FOUND
     seconds: float = 0.0
     nodes: int = 0
     log: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def take(self, subset: IntArray, squared_error: float) -> None:
+        """Remember a better subset."""
+        self.subset, self.squared_error = subset, squared_error
+        if subset.size == self.n:
+            self.exact = subset
 
 
 class _Proofs:
@@ -83,18 +99,21 @@ class _Proofs:
 
     def _start(self, subset: IntArray) -> None:
         error = self._squared_error(subset)
-        self._proofs[subset.size] = _Proof(subset.size, subset, error)
+        self._proofs[subset.size] = _Proof(subset.size, subset, subset, error)
 
     def _remember(self, previous: Proofs) -> None:
-        """Take over what an earlier run has found and proven."""
-        for k, n in enumerate(previous.n.tolist()):
+        """Take over what an earlier run has found and proven on the same units."""
+        same = len(previous.units) == len(self._objective.units) and all(
+            np.array_equal(a, b) for a, b in zip(previous.units, self._objective.units, strict=True)
+        )
+        for k, n in enumerate(previous.n.tolist() if same else []):
             proof = self._proofs.get(n)
             if proof is None:
                 continue
             subset = self._numbered(previous.subsets[k])
             error = self._squared_error(subset)
             if error < proof.squared_error:
-                proof.subset, proof.squared_error = subset, error
+                proof.take(subset, error)
             proof.squared_bound = float(previous.lower_bound[k]) ** 2
             proof.status, proof.log = previous.status[k], previous.logs[k]
             proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
@@ -104,6 +123,7 @@ class _Proofs:
 
         In rounds of growing effort, so that what is easily proven does not wait for the rest.
         """
+        compile_search()
         stop = threading.Event()
         deadline = time.monotonic() + self._task.effort.time_limit
         budget = _FIRST_ROUND
@@ -115,7 +135,8 @@ class _Proofs:
                     if budget >= limit:
                         break
                     budget *= _GROWTH
-                self._raise_bounds(pool, stop)
+                more = max(_LEAST_TIME, _SHARE_OF_TIME * self._task.effort.time_limit)
+                self._raise_bounds(pool, time.monotonic() + more, stop)
             except KeyboardInterrupt:
                 stop.set()
                 self._task.interrupted()
@@ -139,10 +160,14 @@ class _Proofs:
             self._spent[proof.n] = self._spent.get(proof.n, 0) + search.nodes
             self._take_over(proof, search)
 
-        for _ in as_completed([pool.submit(work, proof) for proof in self._open()]):
+        shown = -1
+        for future in as_completed([pool.submit(work, proof) for proof in self._open()]):
+            future.result()
             done = len(self._proofs) - len(self._open())
-            remark = f"{done} of {len(self._proofs)} sizes"
-            self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
+            if done != shown:
+                remark = f"{done} of {len(self._proofs)} sizes"
+                self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
+                shown = done
 
     def _search(self, proof: _Proof, factor: float = 1.0) -> Search:
         log = proof.log if factor == 1.0 else None
@@ -156,7 +181,9 @@ class _Proofs:
             search.advance(min(_SLICE, nodes - search.nodes))
         search.seconds = time.perf_counter() - started
 
-    def _raise_bounds(self, pool: ThreadPoolExecutor, stop: threading.Event) -> None:
+    def _raise_bounds(
+        self, pool: ThreadPoolExecutor, deadline: float, stop: threading.Event
+    ) -> None:
         """Prove at least that the error cannot be a fraction of the best one.
 
         A search for much smaller errors ends much sooner.
@@ -166,7 +193,7 @@ class _Proofs:
             known = np.sqrt(proof.squared_bound / proof.squared_error)
             for share in (share for share in _SHARES if share > known):
                 search = self._search(proof, factor=share**2)
-                self._advance(search, _NODES_PER_SHARE, np.inf, stop)
+                self._advance(search, _NODES_PER_SHARE, deadline, stop)
                 proof.seconds += search.seconds
                 if not search.finished or not self._certain(search):
                     return
@@ -180,10 +207,8 @@ class _Proofs:
     def _take_over(self, proof: _Proof, search: Search) -> None:
         """Note how far a search has come."""
         if search.squared_error < proof.squared_error and search.subset.size:
-            # A subset may need fewer columns than there are places.
-            full = self._filled(search.subset, proof.n)
-            if full is not None:
-                proof.subset, proof.squared_error = full, self._squared_error(full)
+            better = self._filled(search.subset, proof.n)
+            proof.take(better, self._squared_error(better))
         proof.nodes += search.nodes
         proof.seconds += search.seconds
         certain = self._certain(search)
@@ -195,35 +220,41 @@ class _Proofs:
         if proof.status == OPTIMAL:
             proof.squared_bound = proof.squared_error
 
-    def _filled(self, subset: IntArray, n: int) -> IntArray | None:
-        """A subset with further units until it has n columns; None if none fit."""
+    def _filled(self, subset: IntArray, n: int) -> IntArray:
+        """A subset with further units, as long as there are places."""
         kept = self._units(subset)
         for unit in range(len(self._objective.units)):
             longer = (*kept, unit)
             if unit not in kept and self._objective.width(longer) <= n:
                 kept = longer
-        columns = self._objective.columns(kept)
-        return self._numbered(columns) if columns.size == n else None
+        return self._numbered(self._objective.columns(kept))
 
     def _spread(self) -> None:
-        """What holds for one size holds for its neighbours: a bound for all smaller ones, and
-        where nothing is left to explain there is nothing to prove.
+        """What holds for one size holds for its neighbours.
+
+        A subset may be used for all larger sizes, a bound for all smaller ones; and where nothing
+        is left to explain there is nothing to prove.
         """
+        before: _Proof | None = None
+        for _, proof in sorted(self._proofs.items()):
+            if before is not None and before.squared_error < proof.squared_error:
+                proof.subset, proof.squared_error = before.subset, before.squared_error
+            before = proof
         bound = 0.0
-        for n in sorted(self._proofs, reverse=True):
-            proof = self._proofs[n]
+        for _, proof in sorted(self._proofs.items(), reverse=True):
             if proof.squared_error <= FULL_PRECISION**2:
                 proof.status = OPTIMAL
             proof.squared_bound = bound = max(bound, proof.squared_bound)
 
     def subsets(self) -> dict[int, Units]:
-        """The best subset found of every size."""
-        return {n: self._units(proof.subset) for n, proof in self._proofs.items()}
+        """The best subset found of just each size."""
+        return {n: self._units(proof.exact) for n, proof in self._proofs.items()}
 
     def record(self) -> Proofs:
         """All proofs by size."""
         proofs = [self._proofs[n] for n in sorted(self._proofs)]
         return Proofs(
+            units=tuple(self._objective.units),
             n=np.array([p.n for p in proofs]),
             subsets=tuple(self._problem.columns[p.subset] for p in proofs),
             torque_error=np.sqrt([p.squared_error for p in proofs]),

@@ -20,7 +20,7 @@ def forward_selection(task: Task) -> Found:
     objective = task.objective
     order: tuple[int, ...] = ()
     while objective.width(order) < task.limit:
-        longer = objective.with_best(order)
+        longer = objective.with_best(order, task.limit)
         if longer == order:
             break
         order = longer
@@ -35,13 +35,13 @@ def forward_selection_2(task: Task) -> Found:
     its text describes.) Subsets are not nested.
     """
     objective = task.objective
-    kept = objective.with_best(())
+    kept = objective.with_best((), task.limit)
     subsets = [kept]
     while objective.width(kept) < task.limit:
-        longer = objective.with_best(kept)
+        longer = objective.with_best(kept, task.limit)
         if longer == kept:
             break
-        renewed = objective.with_best(without(longer, kept[-1]))
+        renewed = objective.with_best(without(longer, kept[-1]), task.limit)
         # With groups the parameter that comes back may be wider or narrower.
         kept = renewed if objective.width(renewed) > objective.width(kept) else longer
         subsets.append(kept)

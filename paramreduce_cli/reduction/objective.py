@@ -88,9 +88,14 @@ class Objective(ABC):
         owner = {int(c): k for k, unit in enumerate(self.units) for c in unit}
         return tuple(dict.fromkeys(owner[int(c)] for c in columns))
 
-    def with_best(self, kept: Units) -> Units:
-        """The subset with the unit that is worth most; itself where nothing may be added."""
-        gains = self.gains(kept)
+    def with_best(self, kept: Units, most: int) -> Units:
+        """The subset with the unit that is worth most; itself where nothing may be added.
+
+        Args:
+            kept: The subset.
+            most: Columns it may have then.
+        """
+        gains = np.where(self.widths <= most - self.width(kept), self.gains(kept), -np.inf)
         if not np.any(gains > -np.inf):
             return kept
         return (*kept, first_of_the_best(gains))

@@ -45,7 +45,7 @@ class OperationsObjective(Objective):
         """A few more than greedy selection by torque needs to keep the limit."""
         kept: Units = ()
         while self._torque.score(kept) > self._limit:
-            longer = self._torque.with_best(kept)
+            longer = self._torque.with_best(kept, super().largest)
             if longer == kept:
                 break
             kept = longer

@@ -17,6 +17,8 @@ _ON_BOTH_SETS = {
     "acceleration_error": ("acceleration_error_estimation", "acceleration_error_validation"),
     "operations": ("operations_inverse",),
 }
+_EXACT = 1e-10
+"""Errors below this are round-off."""
 _OBJECTIVES = (
     "n",
     "torque_error_estimation",
@@ -47,7 +49,7 @@ def smallest_within(
 ) -> Choice | None:
     """The model with the fewest parameters that keeps to all tolerances on both sets.
 
-    Of several with as many parameters the one with the smallest torque error on the estimation
+    Operations alone ask for the smallest error that they can buy instead. Of several with as many parameters the one with the smallest torque error on the estimation
     set, of equal ones the last heuristic's; None if there is none.
     """
     good = [
@@ -55,6 +57,8 @@ def smallest_within(
         for name, result in results.items()
         for row in np.flatnonzero(excess(result, tolerances) <= 1)
     ]
+    if good and set(tolerances) == {"operations"}:
+        return _best(results, good)
     return _smallest_then_best(results, good)
 
 
@@ -85,20 +89,22 @@ def _smallest_then_best(
         return None
     n = min(int(results[name].n[row]) for name, row in choices)
     small = [(name, row) for name, row in choices if results[name].n[row] == n]
-    errors = np.array([results[name].torque_error_estimation[row] for name, row in small])
-    return small[int(np.flatnonzero(errors <= errors.min() * (1 + TIE))[-1])]
+    return _best(results, small)
 
 
-def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> int:
-    """Sizes below n that are proven to have a larger error on the estimation set, from n down.
+def _best(results: Mapping[str, HeuristicValidation], choices: Sequence[Choice]) -> Choice:
+    """Of the smallest torque error on the estimation set; of equal ones the last."""
+    errors = np.array([results[name].torque_error_estimation[row] for name, row in choices])
+    return choices[int(np.flatnonzero(errors <= errors.min() * (1 + TIE) + _EXACT)[-1])]
 
-    Returns:
-        The smallest size k such that no subset of k, ..., n - 1 parameters keeps to the error; n
-        where nothing is proven. As more parameters never have a larger error, one is as good as
-        all.
+
+def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> bool:
+    """Whether no subset of fewer than n parameters keeps to an error on the estimation set.
+
+    Fewer parameters never have a smaller error, so the bound of the largest size below n decides.
     """
-    row = proofs.row(n - 1)
-    return 1 if row is not None and proofs.lower_bound[row] > torque_error else n
+    smaller = np.flatnonzero(proofs.n < n)
+    return smaller.size == 0 or bool(proofs.lower_bound[smaller[-1]] > torque_error)
 
 
 def pareto_front(results: Mapping[str, HeuristicValidation]) -> list[Choice]:
@@ -111,7 +117,7 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> list[Choice]:
     if not choices:
         return []
     values = np.array(
-        [[float(getattr(results[h], key)[row]) for key in _OBJECTIVES] for h, row in choices]
+        [[_resolved(getattr(results[h], key)[row]) for key in _OBJECTIVES] for h, row in choices]
     )
     front = []
     for k, own in enumerate(values):
@@ -122,6 +128,11 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> list[Choice]:
             front.append(choices[k])
     order = np.argsort([results[h].n[row] for h, row in front], kind="stable")
     return [front[k] for k in order]
+
+
+def _resolved(value: float) -> float:
+    """A number without what is round-off in it."""
+    return 0.0 if value < _EXACT else float(f"{value:.9g}")
 
 
 def _choices(results: Mapping[str, HeuristicValidation]) -> Iterator[Choice]:

@@ -87,7 +87,7 @@ class _Search:
                 return
 
     def _offer_longer(self, n: int) -> bool:
-        longer = self.objective.with_best(self.best[n])
+        longer = self.objective.with_best(self.best[n], self.limit)
         wide = self.objective.width(longer)
         return n < wide <= self.limit and self.offer(longer)
 

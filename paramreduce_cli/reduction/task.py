@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -61,7 +61,6 @@ class Found:
 
     subsets: tuple[IntArray, ...]
     proofs: Proofs | None = None
-    warnings: tuple[str, ...] = field(default=())
 
 
 Heuristic = Callable[[Task], Found]

@@ -41,7 +41,7 @@ _HEURISTIC_COLOURS = (
     "#0b8f8f",
 )  # fmt: skip
 _LINES = ("-", "--", ":", "-.")
-_MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p", "h")
+_MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
 _WIDE = (8.4, 3.8)
 _EXACT = 1e-7
 """Where errors are cut off below: what is less is round-off."""
@@ -265,7 +265,7 @@ def stability(data: ReportData) -> Figure:
         (
             ~kinds,
             "#d9730d",
-            "fewer samples: " + ", ".join(v for v in found.variants if "every" in v),
+            ", ".join(v for v in found.variants if "every" in v),
         ),
     ):
         if chosen.any():
@@ -273,7 +273,8 @@ def stability(data: ReportData) -> Figure:
                 numbers[chosen], 100 * found.torque_error[chosen], "o", color=colour, markersize=4,
                 label=label,
             )  # fmt: skip
-    lower.set_xticks([])
+    lower.set_xticks(numbers, ["all", *map(str, numbers[1:])], fontsize=7)
+    lower.set_xlabel("which trajectory is left out; then fewer samples")
     lower.set_ylabel(r"$\varepsilon_\tau$, %")
     lower.legend(fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return drawn
@@ -375,13 +376,12 @@ def error_vs_operations(data: ReportData) -> Figure:
                 getattr(result, f"operations_{key}"), values,
                 color=colour, marker=marker, markersize=3, linewidth=0.8, label=name,
             )  # fmt: skip
-        results = ((data.validation.heuristics[name], n) for name, n in data.validation.pareto)
         front = [
-            (
-                float(getattr(r, f"operations_{key}")[r.n == n][0]),
-                float(r.torque_error_estimation[r.n == n][0]),
+            (float(cost), float(error))
+            for r in data.validation.heuristics.values()
+            for cost, error in zip(
+                getattr(r, f"operations_{key}"), _visible(r.torque_error_estimation), strict=True
             )
-            for r, n in results
         ]
         stairs = np.array(_staircase(front))
         if stairs.size:
@@ -393,10 +393,10 @@ def error_vs_operations(data: ReportData) -> Figure:
 
 
 def _staircase(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Of points (cost, error) those that no cheaper one beats, by cost; exact ones left out."""
+    """Of points (cost, error) those that no cheaper one beats, by cost."""
     best, kept = np.inf, []
     for cost, error in sorted(points):
-        if _EXACT < error < best:
+        if error < best:
             best = error
             kept.append((cost, error))
     return kept

@@ -83,6 +83,7 @@ def reduce(
         task = _task(problem, name, wanted, means, previous, run)
         found[name], made = _selected(task, name, wanted.stop)
         proofs = made if made is not None else proofs
+    _remark_on_proofs(proofs)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns.names, columns.expansion, weights, rank, factor, heuristics, proofs)
 
@@ -159,6 +160,25 @@ class _Means(Means):
             independent=config.validation.operations == "independent",
             direct=False,
         )[0]
+
+
+def _remark_on_proofs(proofs: Proofs | None) -> None:
+    """Say what is not proven."""
+    if proofs is None or set(proofs.status) == {"optimal"}:
+        return
+    counts = {status: proofs.status.count(status) for status in dict.fromkeys(proofs.status)}
+    text = f"best-subset: {counts.get('optimal', 0)} of {proofs.n.size} sizes are proven"
+    if "best-found" in counts:
+        text += (
+            f", {counts['best-found']} are the best found so far, with lower bounds; `paramreduce "
+            "reduce` goes on with them"
+        )
+    if "uncertified" in counts:
+        text += (
+            f", {counts['uncertified']} cannot be certified in double precision, because columns "
+            "are nearly dependent"
+        )
+    warnings.warn(text, ParamreduceWarning, stacklevel=2)
 
 
 @dataclass(frozen=True)

@@ -30,8 +30,10 @@ def select(
 ) -> Selected:
     """The model of the size asked for, or the smallest one within the tolerances on both sets.
 
+    Where none keeps to them it is the nearest one, and says so.
+
     Raises:
-        ConfigError: There is no such model.
+        ConfigError: There is no model of that size.
         DataError: The heuristic asked for was not run.
     """
     if wanted.heuristic is not None:
@@ -40,13 +42,21 @@ def select(
                 f"reduction.h5 has no {wanted.heuristic}; run `paramreduce reduce` with this config."
             )
         results = {wanted.heuristic: results[wanted.heuristic]}
+    missed = ""
     if wanted.n is not None:
         heuristic, row = _of_size(wanted.n, results)
         reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
     else:
         tolerances = wanted.tolerances() or _DEFAULT
-        heuristic, row = _within(tolerances, results)
-        reason = _reason(tolerances, reduction, heuristic, int(results[heuristic].n[row]))
+        choice = smallest_within(results, tolerances)
+        heuristic, row = choice if choice is not None else nearest_to(results, tolerances)
+        n = int(results[heuristic].n[row])
+        if choice is None:
+            worst = float(excess(results[heuristic], tolerances)[row])
+            missed = f"no model has {_listed(tolerances)}, the nearest is {worst:.3g} times beyond"
+            reason = f"{heuristic} with n = {n}: {missed}."
+        else:
+            reason = _reason(wanted, tolerances, reduction, heuristic, n)
     found = reduction.heuristics[heuristic]
     kept = found.subsets[row]
     known = np.linalg.pinv(reduction.expansion) @ model.values
@@ -57,6 +67,7 @@ def select(
         values=found.parameters[row],
         expressions=tuple(approximate_expressions(reduction.names, kept, found.beta[row], known)),
         reason=reason,
+        missed=missed,
     )
 
 
@@ -75,35 +86,31 @@ def _of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Choice:
     )
 
 
-def _within(tolerances: Mapping[str, float], results: Mapping[str, HeuristicValidation]) -> Choice:
-    choice = smallest_within(results, tolerances)
-    if choice is not None:
-        return choice
-    name, row = nearest_to(results, tolerances)
-    worst = float(excess(results[name], tolerances)[row])
-    raise ConfigError(
-        f"selected.{next(iter(tolerances))}: no model keeps to {_listed(tolerances)} on both sets; the "
-        f"nearest is {name} with {results[name].n[row]} parameters, {worst:.3g} times too large. "
-        "Allow more, or let reduction.stop go further."
-    )
-
-
-def _reason(tolerances: Mapping[str, float], reduction: Reduction, heuristic: str, n: int) -> str:
-    text = f"{heuristic} with {n} parameters is the smallest model found with {_listed(tolerances)} on both sets"
+def _reason(
+    wanted: SelectedSection,
+    tolerances: Mapping[str, float],
+    reduction: Reduction,
+    heuristic: str,
+    n: int,
+) -> str:
+    who = f"{heuristic} with n = {n}"
+    if set(tolerances) == {"operations"}:
+        return f"{who} has the smallest torque error with {_listed(tolerances)}."
+    whose = f" of {wanted.heuristic}" if wanted.heuristic is not None else ""
+    text = f"{who} is the smallest model found{whose} with {_listed(tolerances)}"
     limit = tolerances.get("torque_error")
-    if reduction.proofs is None or limit is None:
+    if reduction.proofs is None or limit is None or n == 1:
         return f"{text}."
-    if proven_necessary(reduction.proofs, n, limit) < n:
-        return (
-            f"{text}; proven: none of {n - 1} or fewer has that torque error on the estimation set."
-        )
+    if proven_necessary(reduction.proofs, n, limit):
+        return f"{text}; proven: with fewer parameters none has that torque error on the estimation set."
     return f"{text}; smaller ones are not excluded by proof."
 
 
 def _listed(tolerances: Mapping[str, float]) -> str:
-    shown = (
-        f"{key.replace('_', ' ')} at most "
-        + (f"{100 * value:.3g} %" if "error" in key else f"{value:g}")
+    shown = [
+        f"{key.replace('_', ' ')} at most {100 * value:.3g} % on both sets"
+        if "error" in key
+        else f"at most {value:g} operations of d"
         for key, value in tolerances.items()
-    )
+    ]
     return " and ".join(shown)

@@ -243,7 +243,10 @@ def _stability(
 
     def chosen(other: SelectionProblem) -> IntArray:
         task = Task(TorqueObjective(other), selected.n, smallest=selected.n, effort=effort)
-        return run_heuristic(selected.heuristic, task).subsets[-1]
+        found = run_heuristic(selected.heuristic, task).subsets
+        # With groups the size itself may not come up on other data.
+        fitting = [subset for subset in found if subset.size <= selected.n]
+        return fitting[-1] if fitting else np.zeros(0, np.int64)
 
     own = samples.estimation.factors()
     variants = {"all": reduction.factor}
@@ -254,5 +257,7 @@ def _stability(
     for every in _THINNED:
         if rows // every >= 2 * problem.candidates.size:
             blocks = thinned_blocks(samples.estimation.blocks(), every)
-            variants[f"every {every}. sample"] = factor(joint_factors(blocks))
+            variants[f"every {every}{'nd' if every == 2 else 'th'} sample"] = factor(
+                joint_factors(blocks)
+            )
     return stability(problem, variants, chosen)

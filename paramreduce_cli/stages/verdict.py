@@ -18,7 +18,7 @@ def verdict(
 ) -> tuple[bool, str]:
     """Whether the selected model keeps to the limits of the config, and the sentence for it."""
     met: list[str] = []
-    missed: list[str] = []
+    missed: list[str] = [selected.missed] if selected.missed else []
     for key in type(limits).model_fields:
         limit = getattr(limits, key)
         if limit is None:
@@ -45,17 +45,19 @@ def remarks(
     full: Mapping[str, int | float],
     selected: Selected,
 ) -> Iterator[str]:
-    """Where reduced models should not be trusted."""
+    """Where reduced models should not be trusted; the same of several heuristics once."""
+    common: dict[str, list[str]] = {}
     for name, result in heuristics.items():
         chosen = result.row(selected.n) if name == selected.heuristic else None
         unsafe = _unsafe(section, full, result)
         if unsafe.any():
             last = int(result.n[np.flatnonzero(unsafe)[-1]])
-            yield (
-                f"{name}: direct dynamics is not safe to use everywhere up to n = {last}; there the "
-                "mass matrix loses positive definiteness on the samples, or comes more than "
-                f"{section.condition_factor:g} times nearer to singular than the full model's."
-            )
+            common.setdefault(
+                f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass "
+                "matrix loses positive definiteness on the samples, or comes more than "
+                f"{section.condition_factor:g} times nearer to singular than the full model's.",
+                [],
+            ).append(name)
         if chosen is not None and unsafe[chosen]:
             yield (
                 f"The selected model ({name}, n = {selected.n}) is not safe for direct dynamics: use "
@@ -65,15 +67,19 @@ def remarks(
             apart = _apart(section, result, what)
             if apart.any():
                 sizes = ", ".join(_ranges(result.n[apart].tolist()))
-                yield (
-                    f"{name}: {what} errors on the two sets differ more than "
-                    f"{section.error_factor:g} times at n = {sizes}."
-                )
+                common.setdefault(
+                    f"{what} errors on the two sets differ more than {section.error_factor:g} times "
+                    f"at n = {sizes}.",
+                    [],
+                ).append(name)
             if chosen is not None and apart[chosen]:
                 yield (
                     f"The selected model ({name}, n = {selected.n}) has {what} errors on the two sets "
                     "that part: use more trajectories, or more parameters."
                 )
+
+    for text, names in common.items():
+        yield f"{', '.join(names)}: {text}"
 
 
 def _unsafe(
