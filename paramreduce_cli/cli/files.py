@@ -139,6 +139,11 @@ def compare_command(
     Example: paramreduce compare results/reference/puma560.json results/puma560
     """
     summaries = [_load_summary(path) for path in (first, second)]
+    for path, summary in zip((first, second), summaries, strict=True):
+        if "proofs" not in summary.get("reduction", {}):
+            raise ConfigError(
+                f"{path}: is a summary of an older version; make it again with `paramreduce run`."
+            )
     tolerances = {**TOLERANCES, **dict(map(_tolerance, given))}
     try:
         differences = compare(summaries[0], summaries[1], tolerances, only)

@@ -301,7 +301,7 @@ class ReductionSection(Section):
     ]
     """Which heuristics run; HEURISTIC@CRITERION selects by acceleration or operations instead of torque."""
     backward_elimination: BackwardElimination = BackwardElimination()
-    """Backward elimination."""
+    """How backward elimination starts and ends."""
     swap: Swap = Swap()
     """Swap search."""
     best_subset: BestSubset = BestSubset()

@@ -136,8 +136,9 @@ def _text(value: float | None) -> str:
 
 def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
     """Subsets are the same up to ties: another subset with the same error is no difference."""
-    yield from _exact("heuristics", sorted(a["validation"]), sorted(b["validation"]))
-    for name in a["validation"].keys() & b["validation"].keys():
+    names = [sorted(k for k, v in s["reduction"].items() if "n" in v) for s in (a, b)]
+    yield from _exact("heuristics", *names)
+    for name in a["validation"].keys() & b["validation"].keys() & {*names[0]} & {*names[1]}:
         first, second = (dict(_named_subsets(s["reduction"][name])) for s in (a, b))
         errors = [
             {row["n"]: row["torque_error"]["estimation"] for row in s["validation"][name]}
@@ -146,7 +147,9 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
         yield from _exact(f"sizes of subsets, {name}", list(first), list(second))
         for n in first.keys() & second.keys():
             x, y = set(first[n]), set(second[n])
-            if x != y:
+            if len(x) != len(y):
+                yield from _exact(f"parameters of the subset, {name}, n = {n}", len(x), len(y))
+            elif x != y:
                 holds = _TIE.holds(errors[0].get(n), errors[1].get(n))
                 yield Difference(
                     f"subset, {name}, n = {n}",

@@ -155,7 +155,7 @@ def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy):
 def test_a_file_without_one_of_its_datasets_is_refused(record, two_link_copy):
     path = Store(two_link_copy).path(record)
     victims = {Model: "base/beta", Trajectories: "validation/coefficients", Samples: "estimation/W",
-               Reduction: "qr/order", Validation: "qr/n"}  # fmt: skip
+               Reduction: "qr/n", Validation: "qr/n"}  # fmt: skip
     with h5py.File(path, "a") as file:
         del file[victims[record]]
     with pytest.raises(ArtifactError, match=victims[record]):

@@ -198,8 +198,10 @@ def test_yaml_that_cannot_be_built(write_config, tmp_path, text):
 
 
 def test_schema_lists_registered_names():
-    heuristics = config_schema()["$defs"]["SelectedSection"]["properties"]["heuristic"]["enum"]
-    assert set(heuristics) >= {"qr", "forward-selection", "backward-elimination"}
+    heuristics = config_schema()["$defs"]["SelectedSection"]["properties"]["heuristic"]["anyOf"]
+    names = set(heuristics[0]["enum"])
+    assert names >= {"qr", "best-subset", "swap", "swap@acceleration", "floating@operations"}
+    assert not names & {"qr@acceleration", "best-subset@operations", "swap@torque"}
 
 
 @pytest.mark.parametrize("joints", [1, 2, 6, 9])

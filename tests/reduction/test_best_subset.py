@@ -25,10 +25,10 @@ def case(kind, rng):
         rank = int(rng.integers(2, max(3, m - 1)))
         W = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, m))
     if kind == "near-dependent":
-        W = W + 10.0 ** -rng.uniform(1, 3.5) * rng.normal(size=(rows, m))
+        W = W + 10.0 ** -rng.uniform(1, 3) * rng.normal(size=(rows, m))
     if kind == "nearly-parallel":  # the spectrum of W does not show it
         i, j, k = rng.choice(m, 3, replace=False)
-        W[:, i] = W[:, j] + 10.0 ** -rng.uniform(1, 6) * W[:, k]
+        W[:, i] = W[:, j] + 10.0 ** -rng.uniform(1, 4) * W[:, k]
     empty = np.linalg.norm(W, axis=0) == 0
     W[:, empty] = rng.normal(size=(rows, int(empty.sum())))
     W = W * 10.0 ** rng.uniform(-3, 3, m)

@@ -49,7 +49,7 @@ FS = "forward-selection"
         (["validation", FS, 2, "acceleration_error", "estimation"], lambda v: None, "acceleration"),
         (["validation", FS, 2, "operations", "direct"], lambda v: v + 1, "operations.direct"),
         (["selected", "accepted"], lambda v: not v, "selected.accepted"),
-        (["reduction", FS, "order"], lambda v: v[:-1], "parameters ordered"),
+        (["reduction", FS, "order"], lambda v: v[:-1], "parameters of the subset"),
         (["trajectories", "estimation", 0, "kappa"], lambda v: v * 1.2, "kappa"),
     ],
 )
@@ -82,7 +82,7 @@ def test_orders_are_compared_up_to_ties(summary):
     different = changed(
         swap, ["validation", FS, 0, "torque_error", "estimation"], lambda v: v * 1.5
     )
-    assert any("order" in entry for entry in bad(summary, different))
+    assert any("subset" in entry for entry in bad(summary, different))
 
 
 def test_only_what_is_asked(summary):

@@ -57,7 +57,7 @@ def test_the_page_needs_nothing_else(folder):
     page = (folder / "index.html").read_text()
     links = Links()
     links.feed(page)
-    assert len(links.found) == 8
+    assert len(links.found) == 10
     assert all(link.startswith("data:image/svg+xml;base64,") for link in links.found)
     assert "http" not in page.split("<body>")[1].replace("data:image", "")[:2000]
 
