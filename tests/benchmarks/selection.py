@@ -7,8 +7,9 @@ from sklearn.feature_selection import SequentialFeatureSelector
 from sklearn.linear_model import LinearRegression
 
 from paramreduce_cli.multibody.observation import append_rows
-from paramreduce_cli.reduction.forward_selection import forward_selection
 from paramreduce_cli.reduction.problem import SelectionProblem
+from paramreduce_cli.reduction.task import Task, run
+from paramreduce_cli.reduction.torque import TorqueObjective
 
 
 def matrix():
@@ -21,7 +22,8 @@ def matrix():
 def ours(W, chi):
     factor = append_rows(np.zeros((0, 61)), np.column_stack([W, chi]))
     columns = np.arange(60)
-    return forward_selection(SelectionProblem(factor[:, :-1], factor[:, -1], columns, columns))
+    problem = SelectionProblem(factor[:, :-1], factor[:, -1], columns, columns)
+    return run("forward-selection", Task(TorqueObjective(problem)))
 
 
 def theirs(W, chi):

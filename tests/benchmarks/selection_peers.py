@@ -1,0 +1,113 @@
+"""Subsets of the paper's systems beside those of other packages: errors and times in one table.
+
+`python -m tests.benchmarks.selection_peers` after `make puma560 hexaglide`; needs the extra
+`benchmark`.
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import time
+import warnings
+
+import h5py
+import numpy as np
+import rich.box
+import rich.console
+import rich.table
+from sklearn.feature_selection import SequentialFeatureSelector
+from sklearn.linear_model import LinearRegression
+
+from paramreduce_cli.reduction.problem import SelectionProblem
+from paramreduce_cli.reduction.task import Effort, Task, run
+from paramreduce_cli.reduction.torque import TorqueObjective
+from tests.conftest import ROOT
+
+SIZES = {"puma560": (12, 18, 24), "hexaglide": (12, 15, 17, 20)}
+OURS = ("forward-selection", "forward-selection-2", "floating", "backward-elimination", "swap",
+        "best-subset")  # fmt: skip
+
+
+def problem(robot):
+    """The weighted factor of the estimation set, its columns of unit length."""
+    with h5py.File(ROOT / "results" / robot / "reduction.h5") as file:
+        factor = file["factor"][:]
+    W, chi = factor[:, :-1], factor[:, -1]
+    lengths = np.linalg.norm(W, axis=0)
+    kept = np.flatnonzero(lengths > 1e-11 * lengths.max())
+    X = W[:, kept] / lengths[kept]
+    columns = np.arange(kept.size)
+    return SelectionProblem(X, chi / np.linalg.norm(chi), columns, columns)
+
+
+def sequential_feature_selector(X, y, n):
+    # Without folds its score is that of the whole matrix, as ours is.
+    everything = [(np.arange(len(y)), np.arange(len(y)))]
+    selector = SequentialFeatureSelector(
+        LinearRegression(fit_intercept=False), n_features_to_select=n,
+        scoring="neg_mean_squared_error", cv=everything,
+    )  # fmt: skip
+    return np.flatnonzero(selector.fit(X, y).get_support())
+
+
+def abess(X, y, n):
+    from abess.linear import LinearRegression as Abess
+
+    model = Abess(support_size=[n], fit_intercept=False, is_normal=False)
+    return np.flatnonzero(model.fit(X, y).coef_)
+
+
+def frols(X, y, n):
+    """pysindy's: greedy orthogonal least squares; one run passes through every size."""
+    from pysindy.optimizers import FROLS
+
+    model = FROLS(max_iter=n, alpha=0.0, normalize_columns=False, verbose=False)
+    model.fit(X, y)
+    return np.flatnonzero(np.ravel(model.coef_))
+
+
+PEERS = {"scikit-learn SequentialFeatureSelector": sequential_feature_selector, "abess": abess,
+         "FROLS (pysindy)": frols}  # fmt: skip
+
+
+def main():
+    warnings.simplefilter("ignore")
+    table = rich.table.Table(box=rich.box.MARKDOWN)
+    for heading in ("system", "method", "time, all sizes", "torque error, %", "sizes"):
+        table.add_column(heading)
+    for robot, sizes in SIZES.items():
+        p = problem(robot)
+        objective = TorqueObjective(p)
+
+        def error(subset, objective=objective):
+            return objective.score(objective.units_of(np.asarray(subset)))
+
+        run("best-subset", Task(TorqueObjective(p), 2))  # compile
+        reference = None
+        for name in OURS:
+            started = time.perf_counter()
+            effort = Effort(time_limit=600, jobs=os.cpu_count() or 1)
+            found = run(name, Task(TorqueObjective(p), max(sizes), effort=effort)).subsets
+            seconds = time.perf_counter() - started
+            reference = reference or seconds
+            errors = [error(next(s for s in found if s.size == n)) for n in sizes]
+            add(table, robot, name, seconds / reference, errors, sizes)
+        for name, select in PEERS.items():
+            errors, seconds = [], 0.0
+            for n in sizes:
+                started = time.perf_counter()
+                subset = select(p.W, p.chi, n)
+                seconds += time.perf_counter() - started
+                errors.append(error(subset) if len(subset) == n else np.nan)
+            add(table, robot, name, seconds / reference, errors, sizes)
+    rich.console.Console(width=130).print(table)
+
+
+def add(table, robot, name, ratio, errors, sizes):
+    shown = ", ".join(f"{100 * e:.3f}" for e in errors)
+    table.add_row(robot, name, f"{ratio:.3g}", shown, ", ".join(map(str, sizes)))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""Which model is taken, and which are worth a look."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.records import HeuristicValidation, Proofs
+from paramreduce_cli.reduction.picking import (
+    best_of_size,
+    nearest_to,
+    pareto_front,
+    proven_necessary,
+    smallest_within,
+)
+
+
+def judged(n, torque, torque_validation=None, acceleration=None, inverse=None, direct=None):
+    """Errors and costs of one heuristic; what is not given does not matter."""
+    n = np.asarray(n)
+    zero = np.zeros(n.size)
+    values = {f.name: zero for f in dataclasses.fields(HeuristicValidation)}
+    torque = np.asarray(torque, float)
+    values |= {
+        "n": n,
+        "torque_error_estimation": torque,
+        "torque_error_validation": torque if torque_validation is None else torque_validation,
+        "acceleration_error_estimation": zero if acceleration is None else acceleration,
+        "operations_inverse": 10 * n if inverse is None else inverse,
+        "operations_direct": 10 * n if direct is None else direct,
+    }
+    return HeuristicValidation(**{k: np.asarray(v) for k, v in values.items()})
+
+
+def test_the_smallest_model_keeps_its_tolerance_on_both_sets():
+    results = {
+        "a": judged([1, 2, 3], [0.5, 0.009, 0.001], [0.5, 0.02, 0.002]),
+        "b": judged([1, 2, 3], [0.5, 0.011, 0.003], [0.5, 0.001, 0.001]),
+    }
+    assert smallest_within(results, {"torque_error": 0.01}) == ("a", 2)
+    assert smallest_within(results, {"torque_error": 0.02}) == ("a", 1)
+    assert smallest_within(results, {"torque_error": 1e-5}) is None
+    assert nearest_to(results, {"torque_error": 1e-5}) == ("a", 2)
+
+
+def test_several_tolerances_hold_together():
+    results = {"a": judged([1, 2, 3], [0.1, 0.01, 0.01], acceleration=[0.3, 0.3, 0.1])}
+    both = {"torque_error": 0.05, "acceleration_error": 0.2}
+    assert smallest_within(results, both) == ("a", 2)
+    assert smallest_within(results, {**both, "operations": 25}) is None
+
+
+def test_operations_alone_buy_the_smallest_error():
+    results = {"a": judged([1, 2, 3], [0.5, 0.1, 0.01], inverse=[10, 20, 40])}
+    assert smallest_within(results, {"operations": 30}) == ("a", 1)
+
+
+def test_of_equal_models_the_last_heuristics_is_taken():
+    results = {name: judged([1, 2], [0.5, 0.1]) for name in ("first", "second")}
+    results["worse"] = judged([1, 2], [0.5, 0.1001])
+    assert best_of_size(results, 2) == ("second", 1)
+    exact = {name: judged([1], [error]) for name, error in (("a", 1e-16), ("b", 3e-15))}
+    assert best_of_size(exact, 1) == ("b", 0)
+    assert best_of_size(results, 7) is None
+
+
+def proofs(n, lower_bound):
+    n = np.asarray(n)
+    empty = tuple(np.zeros(0, int) for _ in n)
+    bound = np.asarray(lower_bound)
+    zero = np.zeros(n.size)
+    return Proofs(n, (), empty, bound, bound, ("optimal",) * n.size, zero, zero, empty)
+
+
+def test_what_is_proven_necessary():
+    found = proofs([1, 2, 4], [0.5, 0.1, 0.001])
+    found = dataclasses.replace(found, n=np.array([1, 2, 4]))
+    assert proven_necessary(found, 4, 0.05)
+    assert not proven_necessary(found, 4, 0.2)
+    assert proven_necessary(found, 3, 0.05)
+    assert proven_necessary(found, 1, 0.9)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_front_is_what_nothing_beats(seed):
+    rng = np.random.default_rng(seed)
+    results = {
+        name: judged(
+            np.arange(1, 9), rng.integers(1, 6, 8) / 10, acceleration=rng.integers(1, 6, 8) / 10,
+            inverse=rng.integers(1, 6, 8), direct=rng.integers(1, 6, 8),
+        )
+        for name in "abc"
+    }  # fmt: skip
+
+    def values(name, row):
+        r = results[name]
+        return (
+            r.n[row], r.torque_error_estimation[row], r.acceleration_error_estimation[row],
+            r.operations_inverse[row], r.operations_direct[row],
+        )  # fmt: skip
+
+    everything = {values(name, row) for name in results for row in range(8)}
+
+    def beaten(one):
+        return any(
+            all(x <= y for x, y in zip(two, one, strict=True)) and two != one for two in everything
+        )
+
+    front = [values(*choice) for choice in pareto_front(results)]
+    assert len(front) == len(set(front))
+    assert set(front) == {one for one in everything if not beaten(one)}
+
+
+def test_round_off_is_no_improvement():
+    results = {"a": judged([3, 4], [1e-15, 1e-16], inverse=[30, 40], direct=[30, 40])}
+    assert pareto_front(results) == [("a", 0)]
