@@ -54,8 +54,8 @@ def sequential_feature_selector(X, y, n):
 def abess(X, y, n):
     from abess.linear import LinearRegression as Abess
 
-    model = Abess(support_size=[n], fit_intercept=False, is_normal=False)
-    return np.flatnonzero(model.fit(X, y).coef_)
+    model = Abess(support_size=[n], fit_intercept=False)
+    return np.flatnonzero(model.fit(X, y, is_normal=False).coef_)
 
 
 def frols(X, y, n):
