@@ -42,7 +42,7 @@ all: $(PAPER)
 	@$(PARAMREDUCE) table $(PAPER:%=results/%)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/pytest
+	$(BIN)/pytest -n $(JOBS)
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -13,16 +13,22 @@ from paramreduce_cli.stages.reduce import reduce
 from paramreduce_cli.stages.sample import sample
 
 FULL = 1e-10
-TARGETS = {  # largest n of full precision: QR, FS, BE; n and torque error of FS
-    "puma560": (36, 35, 36, 18, 0.016),
-    "hexaglide": (64, 61, 62, 17, 0.009),  # FS 58 to 61 by the draw, 59 in the paper
+TARGETS = {  # largest n of full precision: QR, FS, BE, best; n and torque error of FS and of the best
+    "puma560": (36, 35, 36, 34, (18, 0.016), (18, 0.012)),
+    # FS 58 to 61 by the draw, 59 in the paper
+    "hexaglide": (64, 61, 62, 58, (17, 0.009), (15, 0.008)),
 }
+QUICK = [
+    "sampling.points=100",
+    "reduction.heuristics=[qr, forward-selection, backward-elimination, swap, best-subset]",
+    "reduction.best_subset.time_limit=3",
+]
 
 
 @pytest.mark.parametrize("robot", list(TARGETS))
 def test_selection_on_the_committed_trajectories(robot):
     summary = json.loads((ROOT / "results" / "reference" / f"{robot}.json").read_text())
-    config = load_config(CONFIGS / f"{robot}.yaml", ["sampling.points=100"])
+    config = load_config(CONFIGS / f"{robot}.yaml", QUICK)
     model = build_model(config)
     empty = np.zeros(0)
 
@@ -36,14 +42,23 @@ def test_selection_on_the_committed_trajectories(robot):
         summary["trajectories"]["period"], "", "", (), series("estimation"), series("validation")
     )
     samples = sample(config, model, trajectories, Recordings(None, None))
-    found = reduce(config, model, samples, None, Run()).heuristics
-    qr, forward, backward, n, error = TARGETS[robot]
+    reduction = reduce(config, model, samples, None, Run(jobs=2))
+    found = reduction.heuristics
+    qr, forward, backward, best, greedy, optimal = TARGETS[robot]
 
     def full_precision(name):
         return int(found[name].n[np.argmax(found[name].torque_error < FULL)])
 
+    def error(name, n):
+        return found[name].torque_error[found[name].row(n)]
+
     assert full_precision("qr") == qr
     assert full_precision("forward-selection") <= forward
     assert full_precision("backward-elimination") <= backward
-    chosen = found["forward-selection"]
-    assert chosen.torque_error[chosen.row(n)] <= error
+    assert full_precision("best-subset") <= best
+    assert error("forward-selection", greedy[0]) <= greedy[1]
+    assert error("best-subset", optimal[0]) <= optimal[1]
+    proofs = reduction.proofs
+    assert set(proofs.status[: optimal[0]]) == {"optimal"}
+    equal = [error("swap", n) <= error("best-subset", n) * (1 + 1e-6) + 1e-12 for n in proofs.n]
+    assert np.mean(equal) >= 0.9
