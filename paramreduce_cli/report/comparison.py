@@ -105,7 +105,8 @@ def _numbers(part: str) -> Quantity:
         for name, rows in a["validation"].items():
             others = {row["n"]: row for row in b["validation"].get(name, [])}
             yield from _exact(f"sizes of {part}, {name}", [r["n"] for r in rows], [*others])
-            for x in rows:
+            tied = _tied_sizes(a, b, name) if part != "torque_error" else set()
+            for x in (row for row in rows if row["n"] not in tied):
                 y = others.get(x["n"], x)
                 yield from _row(f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part])
 
@@ -157,6 +158,22 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
                     " ".join(sorted(y - x)),
                     holds,
                 )
+
+
+def _tied_sizes(a: Summary, b: Summary, name: str) -> set[int]:
+    """Sizes at which a heuristic took different subsets with the same error: all else may differ."""
+    found = [dict(_named_subsets(s["reduction"][name])) for s in (a, b) if name in s["reduction"]]
+    rows = [
+        {row["n"]: row["torque_error"]["estimation"] for row in s["validation"].get(name, [])}
+        for s in (a, b)
+    ]
+    if len(found) < 2:
+        return set()
+    return {
+        n
+        for n in found[0].keys() & found[1].keys() & rows[0].keys() & rows[1].keys()
+        if set(found[0][n]) != set(found[1][n]) and _TIE.holds(rows[0][n], rows[1][n])
+    }
 
 
 def _named_subsets(found: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
