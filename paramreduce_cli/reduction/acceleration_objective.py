@@ -23,9 +23,9 @@ _PROPOSALS = 6
 _STEPS = 8
 _SMALLEST_STEP = 0.1
 _SETTLED = 1e-3
-_HOPELESS = 1e3
-"""Stands for errors of models whose mass matrix is singular, which only the first order tells
-apart."""
+_HOPELESS = 1.0
+"""Errors from which on models have a mass matrix too far from the real one for a fit to settle;
+only the first order tells them apart, and their parameters are those of the torques."""
 
 
 @dataclass(frozen=True)
@@ -173,7 +173,7 @@ class AccelerationObjective(Objective):
             if point is not None and point.error < _HOPELESS:
                 self._known[key] = (point.error, point)
             else:
-                hopeless = _HOPELESS * (1 + self._search.first_order_error(columns))
+                hopeless = _HOPELESS + self._search.first_order_error(columns)
                 self._known[key] = (hopeless, None)
         return self._known[key]
 
@@ -226,7 +226,7 @@ class AccelerationObjective(Objective):
         """Parameters that minimise the exact acceleration error; beta is that of the torques."""
         torque = fit(self.problem, subset)
         point = self._final.fit(subset, self._final.start(subset))
-        if point is None:
+        if point is None or point.error >= _HOPELESS:
             return torque
         W, chi = self.problem.W, self.problem.chi
         left = chi - W[:, subset] @ point.parameters
