@@ -78,8 +78,7 @@ class _Proofs:
         self._task = task
         self._objective: Objective = task.objective
         self._problem: UnitProblem = unit_problem(task.objective.problem)
-        place = {int(column): k for k, column in enumerate(self._problem.columns)}
-        self._place = place
+        self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._proofs: dict[int, _Proof] = {}
         self._spent: dict[int, int] = {}
         for columns in swap(task).subsets:

@@ -7,7 +7,6 @@ is a tuple of units in the order in which they were taken.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -134,6 +133,3 @@ class Means(ABC):
     @abstractmethod
     def cost(self, kept: IntArray) -> int:
         """Operations of a model that keeps these columns."""
-
-
-MakeObjective = Callable[[SelectionProblem, Means], Objective]

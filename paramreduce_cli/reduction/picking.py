@@ -49,8 +49,9 @@ def smallest_within(
 ) -> Choice | None:
     """The model with the fewest parameters that keeps to all tolerances on both sets.
 
-    Operations alone ask for the smallest error that they can buy instead. Of several with as many parameters the one with the smallest torque error on the estimation
-    set, of equal ones the last heuristic's; None if there is none.
+    Operations alone ask for the smallest error that they can buy instead. Of several with as many
+    parameters the one with the smallest torque error on the estimation set, of equal ones the last
+    heuristic's; None if there is none.
     """
     good = [
         (name, int(row))

@@ -1,4 +1,4 @@
-"""The selection problem of an estimation set; shared by the stages."""
+"""The selection problem of an estimation set and how hard to search; shared by the stages."""
 
 from __future__ import annotations
 
@@ -7,9 +7,10 @@ import numpy as np
 from paramreduce_cli.config.schema import ReductionSection
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.base_parameters import affecting_columns, preference_order
-from paramreduce_cli.records import FloatArray, Model
+from paramreduce_cli.records import FloatArray, Model, Run
 from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
+from paramreduce_cli.reduction.task import Effort
 
 
 def tied_columns(wanted: ReductionSection, names: tuple[str, ...]) -> GroupedColumns:
@@ -20,6 +21,19 @@ def tied_columns(wanted: ReductionSection, names: tuple[str, ...]) -> GroupedCol
         for name, members in section.groups().items()
     ]
     return grouped_columns(names, groups)
+
+
+def effort(wanted: ReductionSection, run: Run) -> Effort:
+    """How hard the config asks to search."""
+    return Effort(
+        base_sets=wanted.backward_elimination.base_sets,
+        continue_with_swaps=wanted.backward_elimination.swaps,
+        kicks=wanted.swap.kicks,
+        seed=wanted.swap.seed,
+        time_limit=wanted.best_subset.time_limit,
+        node_limit=wanted.best_subset.node_limit,
+        jobs=run.jobs,
+    )
 
 
 def merged_factor(factor: FloatArray, columns: GroupedColumns) -> FloatArray:

@@ -1,4 +1,4 @@
-"""reduce: order the parameters by each heuristic."""
+"""reduce: select parameters with each heuristic, and prove how good that is."""
 
 from __future__ import annotations
 
@@ -35,13 +35,17 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.acceleration_objective import AccelerationData
 from paramreduce_cli.reduction.fitting import Fit, NormErrors, torque_errors
 from paramreduce_cli.reduction.grouping import GroupedColumns
-from paramreduce_cli.reduction.objective import Means
-from paramreduce_cli.reduction.problem import SelectionProblem
-from paramreduce_cli.reduction.task import Effort, Task
+from paramreduce_cli.reduction.objective import Means, Objective
+from paramreduce_cli.reduction.task import Task
 from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.registry import stage
 from paramreduce_cli.stages.counting import count_operations
-from paramreduce_cli.stages.problem import merged_factor, selection_problem, tied_columns
+from paramreduce_cli.stages.problem import (
+    effort,
+    merged_factor,
+    selection_problem,
+    tied_columns,
+)
 
 
 @stage
@@ -78,9 +82,13 @@ def reduce(
     if previous is not None and not np.array_equal(previous.factor, factor):
         previous = None
     means = _Means(config, model, samples, columns)
+    objectives: dict[str, Objective] = {}
     found, proofs = {}, None
     for name in wanted.heuristics:
-        task = _task(problem, name, wanted, means, previous, run)
+        criterion = name.partition("@")[2] or "torque"
+        if criterion not in objectives:
+            objectives[criterion] = registry.selection_criterion[criterion](problem, means)
+        task = _task(objectives[criterion], wanted, previous, run)
         found[name], made = _selected(task, name, wanted.stop)
         proofs = made if made is not None else proofs
     _remark_on_proofs(proofs)
@@ -191,26 +199,12 @@ class _Selected:
 
 
 def _task(
-    problem: SelectionProblem,
-    name: str,
-    wanted: ReductionSection,
-    means: Means,
-    previous: Reduction | None,
-    run: Run,
+    objective: Objective, wanted: ReductionSection, previous: Reduction | None, run: Run
 ) -> Task:
-    criterion = name.partition("@")[2] or "torque"
     return Task(
-        objective=registry.selection_criterion[criterion](problem, means),
+        objective=objective,
         largest=wanted.stop.parameters,
-        effort=Effort(
-            base_sets=wanted.backward_elimination.base_sets,
-            continue_with_swaps=wanted.backward_elimination.swaps,
-            kicks=wanted.swap.kicks,
-            seed=wanted.swap.seed,
-            time_limit=wanted.best_subset.time_limit,
-            node_limit=wanted.best_subset.node_limit,
-            jobs=run.jobs,
-        ),
+        effort=effort(wanted, run),
         previous=previous.proofs if previous is not None else None,
         progress=run.progress,
         interrupted=run.interrupted,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 
 from paramreduce_cli.config import Config
@@ -31,12 +33,17 @@ from paramreduce_cli.reduction.fitting import NormErrors, torque_errors
 from paramreduce_cli.reduction.picking import pareto_front
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.stability import stability
-from paramreduce_cli.reduction.task import Effort, Task
+from paramreduce_cli.reduction.task import Task
 from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.reduction.torque import TorqueObjective
 from paramreduce_cli.registry import stage
 from paramreduce_cli.stages.counting import count_operations
-from paramreduce_cli.stages.problem import merged_factor, selection_problem, tied_columns
+from paramreduce_cli.stages.problem import (
+    effort,
+    merged_factor,
+    selection_problem,
+    tied_columns,
+)
 from paramreduce_cli.stages.selection import select
 from paramreduce_cli.stages.verdict import remarks, verdict
 
@@ -229,20 +236,13 @@ def _stability(
     columns = tied_columns(config.reduction, samples.names)
     weights = reduction.nominal_torque
     problem = selection_problem(reduction.factor, model, columns)
-    effort = Effort(
-        base_sets=config.reduction.backward_elimination.base_sets,
-        continue_with_swaps=config.reduction.backward_elimination.swaps,
-        kicks=config.reduction.swap.kicks,
-        seed=config.reduction.swap.seed,
-        node_limit=_NODES,
-        jobs=run.jobs,
-    )
+    quick = dataclasses.replace(effort(config.reduction, run), node_limit=_NODES)
 
     def factor(factors: FloatArray) -> FloatArray:
         return merged_factor(combined_factor(factors, weights), columns)
 
     def chosen(other: SelectionProblem) -> IntArray:
-        task = Task(TorqueObjective(other), selected.n, smallest=selected.n, effort=effort)
+        task = Task(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)
         found = run_heuristic(selected.heuristic, task).subsets
         # With groups the size itself may not come up on other data.
         fitting = [subset for subset in found if subset.size <= selected.n]
