@@ -43,7 +43,7 @@ def backward_elimination(task: Task) -> Found:
                 found = objective.improved(kept)
             if n not in best or found[1] < best[n][0]:
                 best[n] = (found[1], found[0])
-    return by_size(objective, {n: kept for n, (_, kept) in best.items()})
+    return by_size(objective, [kept for _, kept in best.values()])
 
 
 def _starts(objective: Objective, seed: int) -> Iterator[Units]:

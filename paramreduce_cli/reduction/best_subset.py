@@ -245,9 +245,9 @@ class _Proofs:
                 proof.status = OPTIMAL
             proof.squared_bound = bound = max(bound, proof.squared_bound)
 
-    def subsets(self) -> dict[int, Units]:
+    def subsets(self) -> list[Units]:
         """The best subset found of just each size."""
-        return {n: self._units(proof.exact) for n, proof in self._proofs.items()}
+        return [self._units(proof.exact) for proof in self._proofs.values()]
 
     def record(self) -> Proofs:
         """All proofs by size."""

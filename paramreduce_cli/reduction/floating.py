@@ -34,7 +34,7 @@ def floating(task: Task) -> Found:
     for k in range(len(kept) + 1, len(rest) + 1):
         if objective.width(rest[:k]) <= task.limit:
             best[objective.width(rest[:k])] = (0.0, rest[:k])
-    return by_size(objective, {n: units for n, (_, units) in best.items() if n <= task.limit})
+    return by_size(objective, [units for n, (_, units) in best.items() if n <= task.limit])
 
 
 def _keep_if_better(task: Task, best: dict[int, tuple[float, Units]], kept: Units) -> bool:

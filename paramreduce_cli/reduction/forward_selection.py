@@ -47,4 +47,4 @@ def forward_selection_2(task: Task) -> Found:
         subsets.append(kept)
     rest = completed(objective, kept)
     subsets += [rest[:k] for k in range(len(kept) + 1, len(rest) + 1)]
-    return by_size(objective, [s for s in subsets if objective.width(s) <= task.limit])
+    return by_size(objective, [s for s in subsets if s and objective.width(s) <= task.limit])

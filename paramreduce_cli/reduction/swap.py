@@ -39,7 +39,7 @@ def swap(task: Task) -> Found:
     search.neighbours()
     if cheap is None:
         search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed))
-    return by_size(task.objective, search.best)
+    return by_size(task.objective, search.best.values())
 
 
 class _Search:

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-import numpy as np
 from threadpoolctl import threadpool_limits
 
 from paramreduce_cli.records import IntArray, Progress, Proofs
@@ -63,9 +62,6 @@ class Found:
     proofs: Proofs | None = None
 
 
-Heuristic = Callable[[Task], Found]
-
-
 def run(name: str, task: Task) -> Found:
     """Run a heuristic; on one core, as its matrices are too small for more.
 
@@ -94,8 +90,6 @@ def completed(objective: Objective, kept: Units) -> Units:
     return (*kept, *(u for u in range(len(objective.units)) if u not in kept))
 
 
-def by_size(objective: Objective, subsets: Mapping[int, Units] | Iterable[Units]) -> Found:
+def by_size(objective: Objective, subsets: Iterable[Units]) -> Found:
     """One subset for every number of columns."""
-    values = subsets.values() if isinstance(subsets, Mapping) else subsets
-    columns = [objective.columns(kept) for kept in values if kept]
-    return Found(tuple(sorted(columns, key=lambda c: int(np.size(c)))))
+    return Found(tuple(sorted((objective.columns(kept) for kept in subsets), key=len)))
