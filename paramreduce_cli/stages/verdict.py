@@ -47,39 +47,39 @@ def remarks(
 ) -> Iterator[str]:
     """Where reduced models should not be trusted; the same of several heuristics once."""
     common: dict[str, list[str]] = {}
+    who = f"The selected model ({selected.heuristic}, n = {selected.n})"
     for name, result in heuristics.items():
         chosen = result.row(selected.n) if name == selected.heuristic else None
-        unsafe = _unsafe(section, full, result)
-        if unsafe.any():
-            last = int(result.n[np.flatnonzero(unsafe)[-1]])
-            common.setdefault(
-                f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass "
-                "matrix loses positive definiteness on the samples, or comes more than "
-                f"{section.condition_factor:g} times nearer to singular than the full model's.",
-                [],
-            ).append(name)
-        if chosen is not None and unsafe[chosen]:
-            yield (
-                f"The selected model ({name}, n = {selected.n}) is not safe for direct dynamics: use "
-                "its inverse dynamics only."
-            )
-        for what in ("torque", "acceleration"):
-            apart = _apart(section, result, what)
-            if apart.any():
-                sizes = ", ".join(_ranges(result.n[apart].tolist()))
-                common.setdefault(
-                    f"{what} errors on the two sets differ more than {section.error_factor:g} times "
-                    f"at n = {sizes}.",
-                    [],
-                ).append(name)
-            if chosen is not None and apart[chosen]:
-                yield (
-                    f"The selected model ({name}, n = {selected.n}) has {what} errors on the two sets "
-                    "that part: use more trajectories, or more parameters."
-                )
-
+        for flags, text, consequence in _doubts(section, full, result):
+            if flags.any():
+                common.setdefault(text, []).append(name)
+            if chosen is not None and flags[chosen]:
+                yield f"{who} {consequence}"
     for text, names in common.items():
         yield f"{', '.join(names)}: {text}"
+
+
+def _doubts(
+    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
+) -> Iterator[tuple[BoolArray, str, str]]:
+    """Which subsets are doubtful, why, and what that means for the selected model."""
+    unsafe = _unsafe(section, full, result)
+    last = int(result.n[unsafe].max(initial=0))
+    yield (
+        unsafe,
+        f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass matrix loses "
+        f"positive definiteness on the samples, or comes more than {section.condition_factor:g} times "
+        "nearer to singular than the full model's.",
+        "is not safe for direct dynamics: use its inverse dynamics only.",
+    )
+    for what in ("torque", "acceleration"):
+        apart = _apart(section, result, what)
+        yield (
+            apart,
+            f"{what} errors on the two sets differ more than {section.error_factor:g} times at n = "
+            f"{', '.join(_ranges(result.n[apart].tolist()))}.",
+            f"has {what} errors on the two sets that part: use more trajectories, or more parameters.",
+        )
 
 
 def _unsafe(
@@ -106,11 +106,9 @@ def _apart(section: ValidationSection, result: HeuristicValidation, what: str) -
 
 def _ranges(numbers: list[int]) -> Iterator[str]:
     """Runs of consecutive numbers as text."""
-    start = previous = numbers[0]
-    for number in [*numbers[1:], None]:
-        if number is not None and number == previous + 1:
-            previous = number
+    start = 0
+    for k, number in enumerate(numbers):
+        if k + 1 < len(numbers) and numbers[k + 1] == number + 1:
             continue
-        yield f"{start}" if start == previous else f"{start}...{previous}"
-        if number is not None:
-            start = previous = number
+        yield f"{number}" if start == k else f"{numbers[start]}...{number}"
+        start = k + 1
