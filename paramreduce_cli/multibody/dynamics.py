@@ -172,10 +172,7 @@ class Dynamics:
         programs = self._independent_programs if independent else self._programs
         counts = [0, 0]
         for k, program in enumerate(programs if direct else programs[:1]):
-            start = program.input_offsets[-1]
-            zero = [start + int(k) for k in dropped]
-            tied = {start + k: start + other for k, other in same.items()}
-            counts[k] = program.count(zero, same=tied, signs_free=signs_free)
+            counts[k] = program.count(dropped.tolist(), same=same, signs_free=signs_free)
         return counts[0], counts[1]
 
     @cached_property
@@ -187,13 +184,13 @@ class Dynamics:
         return self._counted(self._tau, *self._direct)
 
     def _counted(self, tau: ca.SX, M: ca.SX, delta: ca.SX) -> tuple[Program, Program]:
-        """Straight-line programs of IDM and [M | delta], M's lower triangle; phi comes last."""
+        """Straight-line programs of IDM and [M | delta], M's lower triangle; phi comes first."""
         lower = [M[i, j] for i in range(M.shape[0]) for j in range(i + 1)]
         loop = [] if self._projection is None else [self._projection.R_d, self._projection.b_d]
         q, dq, ddq = self._q, self._dq, self._ddq
-        inverse = ca.Function("d", [q, dq, ddq, *loop, self._phi], [tau])
-        direct = ca.Function("M_delta", [q, dq, *loop, self._phi], [ca.vertcat(*lower), delta])
-        return Program(inverse), Program(direct)
+        inverse = ca.Function("d", [self._phi, q, dq, ddq, *loop], [tau])
+        direct = ca.Function("M_delta", [self._phi, q, dq, *loop], [ca.vertcat(*lower), delta])
+        return Program.of_function(inverse), Program.of_function(direct)
 
 
 class ObservationFunction:

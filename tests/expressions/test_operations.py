@@ -7,7 +7,7 @@ x = ca.SX.sym("x", 4)
 
 
 def count(*outputs, zero=(), **options):
-    return Program(ca.Function("f", [x], [ca.vertcat(*outputs)])).count(zero, **options)
+    return Program.of_function(ca.Function("f", [x], [ca.vertcat(*outputs)])).count(zero, **options)
 
 
 @pytest.mark.parametrize(

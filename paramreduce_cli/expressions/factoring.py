@@ -1,0 +1,220 @@
+"""Fewer operations by the laws of sums and products.
+
+Chains of sums and of products are taken apart into sums and products of many terms, factors
+common to terms of a sum are taken out of it, pairs that several sums (or products) share are
+computed once [Breuer1969], and all is put together again. Results differ by rounding only.
+"""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator, Sequence
+from itertools import combinations
+
+from paramreduce_cli.expressions.graph import Graph
+
+_MORE_THAN_ONE = 2
+
+
+class _Terms:
+    """Sums and products of many terms, by the number of their value.
+
+    Terms are signed references as in a graph; new sums and products get numbers after those of the
+    graph's nodes.
+    """
+
+    def __init__(self, graph: Graph, outputs: Sequence[int]) -> None:
+        self._graph = graph
+        self.reached = graph.reached(list(outputs))
+        self.outputs = list(outputs)
+        self.sums: dict[int, list[int]] = {}
+        self.products: dict[int, list[int]] = {}
+        self._next = len(graph.nodes)
+        self._take_apart()
+
+    def _take_apart(self) -> None:
+        uses = Counter(value >> 1 for value in self.outputs)
+        above: dict[int, str] = {}
+        for number in self.reached:
+            node = self._graph.nodes[number]
+            for value in node.operands:
+                uses[value >> 1] += 1
+                above[value >> 1] = node.operation
+        for number in self.reached:
+            node = self._graph.nodes[number]
+            table = self._table(node.operation)
+            if table is None:
+                continue
+            terms = []
+            for value in node.operands:
+                below = value >> 1
+                if below in table and uses[below] == 1:
+                    terms += [term ^ (value & 1) for term in table.pop(below)]
+                else:
+                    terms.append(value)
+            table[number] = terms
+
+    def _table(self, operation: str) -> dict[int, list[int]] | None:
+        return {"+": self.sums, "*": self.products}.get(operation)
+
+    def new(self, table: dict[int, list[int]], terms: list[int]) -> int:
+        """The value of a new sum or product."""
+        number = self._next
+        self._next += 1
+        table[number] = terms
+        return 2 * number
+
+    def uses(self) -> Counter[int]:
+        """How often every number is referred to."""
+        result = Counter(value >> 1 for value in self.outputs)
+        for table in (self.sums, self.products):
+            for terms in table.values():
+                result.update(value >> 1 for value in terms)
+        for number in self.reached:
+            node = self._graph.nodes[number]
+            if self._table(node.operation) is None:
+                result.update(value >> 1 for value in node.operands)
+        return result
+
+
+def factored(graph: Graph, outputs: Sequence[int], target: Graph) -> list[int]:
+    """Build values again with fewer operations.
+
+    Args:
+        graph: Where the values are; one in which signs are free.
+        outputs: The values.
+        target: Where they are built.
+    """
+    terms = _Terms(graph, outputs)
+    _take_out_factors(terms)
+    _share_pairs(terms, terms.products)
+    _share_pairs(terms, terms.sums)
+    return _Assembly(graph, terms, target).built(outputs)
+
+
+def _take_out_factors(terms: _Terms) -> None:
+    uses = terms.uses()
+    pending = sorted(terms.sums, reverse=True)
+    while pending:
+        number = pending.pop()
+        while (new := _take_out_one(terms, number, uses)) is not None:
+            pending.append(new)
+
+
+def _take_out_one(terms: _Terms, number: int, uses: Counter[int]) -> int | None:
+    """Take the most frequent factor out of a sum; the number of the sum it multiplies."""
+    total = terms.sums[number]
+    single = [v for v in total if v >> 1 in terms.products and uses[v >> 1] == 1]
+    counts = Counter(f for v in single for f in set(terms.products[v >> 1]))
+    if not counts:
+        return None
+    factor, count = min(counts.items(), key=lambda item: (-item[1], item[0]))
+    if count < _MORE_THAN_ONE:
+        return None
+    inner, left = [], []
+    for value in total:
+        if value in single and factor in terms.products[value >> 1]:
+            rest = list(terms.products.pop(value >> 1))
+            rest.remove(factor)
+            product = rest[0] if len(rest) == 1 else terms.new(terms.products, rest)
+            uses[product >> 1] = max(uses[product >> 1], 1)
+            inner.append(product ^ (value & 1))
+        else:
+            left.append(value)
+    bracket = terms.new(terms.sums, inner)
+    uses[factor >> 1] -= count - 1
+    uses[bracket >> 1] = 1
+    if left:
+        product = terms.new(terms.products, [factor, bracket])
+        uses[product >> 1] = 1
+        terms.sums[number] = [*left, product]
+    else:
+        del terms.sums[number]
+        terms.products[number] = [factor, bracket]
+        return None
+    return bracket >> 1
+
+
+def _pairs(values: Sequence[int]) -> Iterator[tuple[int, int]]:
+    """All pairs of terms, up to a common sign."""
+    for a, b in combinations(sorted(values), 2):
+        yield (a & ~1, b ^ (a & 1))
+
+
+def _share_pairs(terms: _Terms, table: dict[int, list[int]]) -> None:
+    """Compute pairs once that come up in several sums, or in several products."""
+    where: dict[tuple[int, int], set[int]] = defaultdict(set)
+    for number, values in table.items():
+        for pair in _pairs(values):
+            where[pair].add(number)
+    while where:
+        pair, owners = min(where.items(), key=lambda item: (-len(item[1]), item[0]))
+        if len(owners) < _MORE_THAN_ONE:
+            break
+        whole = min((n for n in owners if len(table[n]) == len(pair)), default=None)
+        shared = terms.new(table, list(pair)) if whole is None else 2 * whole
+        sign = 0 if whole is None else min(table[whole]) & 1
+        for number in sorted(owners):
+            if number == whole:
+                continue
+            values = table[number]
+            for old in _pairs(values):
+                where[old].discard(number)
+            flip = _take_pair(values, pair)
+            values.append(shared ^ sign ^ flip)
+            for new in _pairs(values):
+                where[new].add(number)
+        if whole is None:
+            where[pair].add(shared >> 1)
+        # Once taken, a pair is not taken again.
+        if len(where[pair]) < _MORE_THAN_ONE:
+            del where[pair]
+
+
+def _take_pair(values: list[int], pair: tuple[int, int]) -> int:
+    """Remove a pair of terms; the sign with which it was there."""
+    for flip in (0, 1):
+        a, b = pair[0] ^ flip, pair[1] ^ flip
+        if a in values and b in values and (a != b or values.count(a) > 1):
+            values.remove(a)
+            values.remove(b)
+            return flip
+    raise AssertionError("the pair is not there")
+
+
+class _Assembly:
+    """Builds terms in a graph."""
+
+    def __init__(self, source: Graph, terms: _Terms, target: Graph) -> None:
+        self._source, self._terms, self._target = source, terms, target
+        self._built: dict[int, int] = {}
+
+    def built(self, values: Sequence[int]) -> list[int]:
+        """The values in the target graph."""
+        return [self._value(value) for value in values]
+
+    def _value(self, value: int) -> int:
+        number = value >> 1
+        if number not in self._built:
+            self._built[number] = self._number(number)
+        return self._target.negate(self._built[number]) if value & 1 else self._built[number]
+
+    def _number(self, number: int) -> int:
+        graph = self._target
+        for table, join in ((self._terms.sums, graph.add), (self._terms.products, graph.multiply)):
+            if number in table:
+                return _joined(self.built(table[number]), join)
+        node = self._source.nodes[number]
+        if node.operation == "constant":
+            return graph.constant(node.number)
+        if node.operation == "input":
+            return graph.input(int(node.number))
+        return graph.call(node.operation, *self.built(node.operands))
+
+
+def _joined(values: list[int], join) -> int:  # noqa: ANN001
+    """Join terms two by two, so that few wait for others."""
+    while len(values) > 1:
+        pairs = [join(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
+        values = pairs + values[len(pairs) * 2 :]
+    return values[0]

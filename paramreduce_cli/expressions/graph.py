@@ -1,0 +1,149 @@
+"""Hash-consed expression graphs.
+
+A node's key says everything it computes, so that equal subexpressions are one node whatever
+way they were built. A value is a signed reference to a node, as one integer: twice the node's
+number, plus one if it is negated. Constants are folded, zeros and ones vanish as they are met.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+ZERO = 0
+"""The value of the constant zero in every graph."""
+_ODD = frozenset({"sin", "tan", "asin", "atan", "inv"})
+_EVEN = frozenset({"cos"})
+
+
+class Node(NamedTuple):
+    """What a node computes: a constant, an input, or an operation on values."""
+
+    operation: str
+    """``constant``, ``input``, ``+``, ``*`` or the name of a function."""
+    operands: tuple[int, ...] = ()
+    number: float = 0.0
+    """Of a constant, its size; of an input, its position."""
+
+
+class Graph:
+    """A growing set of nodes.
+
+    Args:
+        signs_free: Whether signs are carried along as part of values, and so cost nothing; if
+            not, a negation is a node like any other.
+    """
+
+    def __init__(self, *, signs_free: bool = True) -> None:
+        self._signs_free = signs_free
+        self.nodes: list[Node] = []
+        self._index: dict[tuple, int] = {}
+        self.constant(0.0)
+
+    def _value(self, operation: str, operands: tuple[int, ...], number: float = 0.0) -> int:
+        key = (operation, operands, number)
+        value = self._index.get(key)
+        if value is None:
+            value = 2 * len(self.nodes)
+            self._index[key] = value
+            self.nodes.append(Node(operation, operands, number))
+        return value
+
+    def constant(self, number: float) -> int:
+        """A number."""
+        return self._value("constant", (), abs(number)) ^ (number < 0)
+
+    def input(self, position: int) -> int:
+        """One of the inputs, by position."""
+        return self._value("input", (), position)
+
+    def number(self, value: int) -> float | None:
+        """What a constant is, None for anything else."""
+        node = self.nodes[value >> 1]
+        if node.operation != "constant":
+            return None
+        return -node.number if value & 1 else node.number
+
+    def negate(self, a: int) -> int:
+        """-a"""
+        if a == ZERO:
+            return a
+        if self._signs_free:
+            return a ^ 1
+        node = self.nodes[a >> 1]
+        if node.operation == "constant":
+            return a ^ 1
+        if node.operation == "neg":
+            return node.operands[0]
+        return self._value("neg", (a,))
+
+    def subtract(self, a: int, b: int) -> int:
+        """A - b"""
+        return self.negate(b) if a == ZERO else self.add(a, b ^ 1 if b != ZERO else b)
+
+    def add(self, a: int, b: int) -> int:
+        """A + b"""
+        if a == ZERO:
+            return b
+        if b == ZERO:
+            return a
+        if a >> 1 == b >> 1:
+            return ZERO if a != b else self.multiply(self.constant(2.0), a)
+        x, y = self.number(a), self.number(b)
+        if x is not None and y is not None:
+            return self.constant(x + y)
+        if b >> 1 < a >> 1:
+            a, b = b, a
+        if not self._signs_free:
+            return self._value("+", (a, b))
+        sign = a & 1
+        return self._value("+", (a ^ sign, b ^ sign)) ^ sign
+
+    def multiply(self, a: int, b: int) -> int:
+        """A b"""
+        if a == ZERO or b == ZERO:
+            return ZERO
+        x, y = self.number(a), self.number(b)
+        if x is not None and y is not None:
+            return self.constant(x * y)
+        if y is not None:
+            a, b, x = b, a, y
+        if x is not None:
+            if abs(x) == 1.0:
+                return b if x > 0 else self.negate(b)
+            node = self.nodes[b >> 1]
+            if node.operation == "*" and (inner := self.number(node.operands[0])) is not None:
+                factor = self.constant(-x * inner if b & 1 else x * inner)
+                return self.multiply(factor, node.operands[1])
+        sign = (a ^ b) & 1
+        a, b = a & ~1, b & ~1
+        if b < a and x is None:
+            a, b = b, a
+        return self._value("*", (a, b)) ^ sign
+
+    def call(self, function: str, *values: int) -> int:
+        """A function of values: sin, cos, sqrt, /, atan2, ..."""
+        if values == (ZERO,) and function in ("sin", "cos"):
+            return self.constant(float(function == "cos"))
+        if len(values) == 1 and self._signs_free and function in _ODD:
+            return self._value(function, (values[0] & ~1,)) ^ (values[0] & 1)
+        if function in _EVEN:
+            return self._value(function, (values[0] & ~1,))
+        return self._value(function, values)
+
+    def reached(self, outputs: list[int]) -> list[int]:
+        """Numbers of the nodes that outputs are made of, operands before what uses them."""
+        seen = {value >> 1 for value in outputs}
+        pending = list(seen)
+        while pending:
+            for value in self.nodes[pending.pop()].operands:
+                node = value >> 1
+                if node not in seen:
+                    seen.add(node)
+                    pending.append(node)
+        return sorted(seen)
+
+    def count(self, outputs: list[int]) -> int:
+        """Operations that outputs take: all their nodes but constants and inputs."""
+        return sum(
+            self.nodes[node].operation not in ("constant", "input") for node in self.reached(outputs)
+        )

@@ -1,0 +1,1 @@
+"""Models with few operations: formulations, and the search over them."""

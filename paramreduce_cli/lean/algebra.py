@@ -1,0 +1,82 @@
+"""Scalars of an expression graph with the usual operators, and 3-vectors of them."""
+
+from __future__ import annotations
+
+from paramreduce_cli.expressions.graph import ZERO, Graph
+
+
+class Scalar:
+    """A value of a graph.
+
+    Args:
+        graph: Where results go.
+        value: Its signed reference.
+    """
+
+    __slots__ = ("graph", "value")
+
+    def __init__(self, graph: Graph, value: int) -> None:
+        self.graph = graph
+        self.value = value
+
+    def __add__(self, other: Scalar | float) -> Scalar:
+        return Scalar(self.graph, self.graph.add(self.value, self._of(other)))
+
+    def __sub__(self, other: Scalar | float) -> Scalar:
+        return Scalar(self.graph, self.graph.subtract(self.value, self._of(other)))
+
+    def __mul__(self, other: Scalar | float) -> Scalar:
+        return Scalar(self.graph, self.graph.multiply(self.value, self._of(other)))
+
+    __radd__ = __add__
+    __rmul__ = __mul__
+
+    def __neg__(self) -> Scalar:
+        return Scalar(self.graph, self.graph.negate(self.value))
+
+    def __bool__(self) -> bool:
+        """Whether it is anything but the constant zero."""
+        return self.value != ZERO
+
+    def _of(self, other: Scalar | float) -> int:
+        return other.value if isinstance(other, Scalar) else self.graph.constant(other)
+
+    def sine(self) -> Scalar:
+        """sin"""
+        return Scalar(self.graph, self.graph.call("sin", self.value))
+
+    def cosine(self) -> Scalar:
+        """cos"""
+        return Scalar(self.graph, self.graph.call("cos", self.value))
+
+
+Vector = tuple[Scalar, Scalar, Scalar]
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """A + b"""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def scale(factor: Scalar, a: Vector) -> Vector:
+    """Factor * a"""
+    return (factor * a[0], factor * a[1], factor * a[2])
+
+
+def dot(a: Vector, b: Vector) -> Scalar:
+    """A . b"""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """A x b"""
+    return (
+        a[1] * b[2] - a[2] * b[1],
+        a[2] * b[0] - a[0] * b[2],
+        a[0] * b[1] - a[1] * b[0],
+    )
+
+
+def is_zero(a: Vector) -> bool:
+    """Whether all components are the constant zero."""
+    return not (a[0] or a[1] or a[2])

@@ -1,0 +1,248 @@
+"""The motion of every frame of a tree, as the choices at its joints say."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.lean.algebra import Scalar, Vector, add, cross
+from paramreduce_cli.lean.choices import Choice
+from paramreduce_cli.lean.inertia import Inertia
+from paramreduce_cli.lean.motion import (
+    Motion,
+    Turning,
+    motion,
+    seen_through,
+    slide,
+    turned,
+    turning,
+)
+from paramreduce_cli.lean.tree import Joint, Tree
+from paramreduce_cli.lean.turns import ConstantTurn, Turn, turn_by
+from paramreduce_cli.records import BASE, PARAMETER_KINDS
+
+_WIDTH = len(PARAMETER_KINDS)
+
+
+class Symbols:
+    """The inputs of all models of a tree: parameters first, then q, dq and ddq.
+
+    Args:
+        graph: Where they are.
+        tree: Whose models.
+        dropped: Positions of parameters that are zero.
+    """
+
+    def __init__(self, graph: Graph, tree: Tree, dropped: Collection[int] = ()) -> None:
+        self.graph = graph
+        self._dropped = frozenset(dropped)
+        self._start = _WIDTH * len(tree.inertial)
+        self._n = len(tree.joints)
+        self._order = {body: k for k, body in enumerate(tree.inertial)}
+
+    def number(self, value: float) -> Scalar:
+        """A constant."""
+        return Scalar(self.graph, self.graph.constant(value))
+
+    def vector(self, values: Sequence[float]) -> Vector:
+        """Three constants."""
+        x, y, z = (self.number(float(value)) for value in values)
+        return (x, y, z)
+
+    def coordinate(self, i: int, derivative: int) -> Scalar:
+        """Of joint i as described: the coordinate, its speed or its acceleration."""
+        position = self._start + derivative * self._n + i
+        return Scalar(self.graph, self.graph.input(position))
+
+    def inertia(self, body: int) -> Inertia:
+        """The parameters of a body, in its frame as described."""
+        if body not in self._order:
+            return self.no_inertia()
+        first = _WIDTH * self._order[body]
+        m, x, y, z, *tensor = (self._parameter(first + k) for k in range(_WIDTH))
+        return Inertia(m, (x, y, z), *tensor)
+
+    def _parameter(self, position: int) -> Scalar:
+        if position in self._dropped:
+            return self.number(0.0)
+        return Scalar(self.graph, self.graph.input(position))
+
+    def no_inertia(self) -> Inertia:
+        """Of nothing."""
+        zero = self.number(0.0)
+        return Inertia(zero, (zero, zero, zero), *[zero] * 6)
+
+
+@dataclass(frozen=True)
+class Angle:
+    """An angle about z with its derivatives; constant parts are kept apart."""
+
+    sum: Scalar
+    offset: float
+    speed: Scalar
+    acceleration: Scalar
+
+
+@dataclass(frozen=True)
+class JointState:
+    """The kinematics at one joint.
+
+    The frame at rest is the one the body's angle is measured against: that of the joint, or
+    where parallel axes are aligned, that of the first of them.
+    """
+
+    joint: Joint
+    aligned: bool
+    fixed: ConstantTurn
+    """From the frame at rest to that of the body before; of no use where aligned."""
+    angle: Angle
+    turn: Turn
+    """Of the body against the frame at rest."""
+    rest: Motion
+    """Of the frame at rest, in its components."""
+    own: Motion
+    """Of the body's frame, in its own."""
+    adds: Turning
+    """What U of the body has on top of U of the frame at rest."""
+    a_rest: Vector
+    """Acceleration of the origin less gravity, in the frame at rest."""
+    a_own: Vector
+    """The same in the body's frame."""
+    reach: Vector
+    """From the origin before: in the frame of the body before, or aligned, in that at rest."""
+    extra: Vector
+    """Acceleration of the origin against the frame before that ``reach`` is given in; at rest."""
+
+
+class Kinematics:
+    """States of all joints of a tree.
+
+    Args:
+        tree: The tree.
+        choices: One per joint.
+        graph: Where the expressions go.
+        moving: Whether joints accelerate.
+        dropped: Positions of parameters that are zero.
+    """
+
+    def __init__(
+        self,
+        tree: Tree,
+        choices: Sequence[Choice],
+        graph: Graph,
+        *,
+        moving: bool = True,
+        dropped: Collection[int] = (),
+    ) -> None:
+        self.tree, self.choices, self.graph = tree, choices, graph
+        self.symbols = Symbols(graph, tree, dropped)
+        self._zero = self.symbols.number(0.0)
+        self._none = self.symbols.vector((0, 0, 0))
+        self._moving = moving
+        self._screws: dict[int, dict[int, tuple[Vector, Vector]]] = {}
+        self.states: list[JointState] = []
+        for i in range(len(tree.joints)):
+            self.states.append(self._state(i))
+
+    def body(self, i: int) -> Inertia:
+        """The parameters of a body in the frame on its joint."""
+        described = self.symbols.inertia(i)
+        frame = self.tree.joints[i].described
+        turned_body = ConstantTurn(self.graph, frame[:3, :3]).inertia(described)
+        return turned_body.shifted(self.symbols.vector(frame[:3, 3]))
+
+    def _state(self, i: int) -> JointState:
+        joint, choice = self.tree.joints[i], self.choices[i]
+        before = None if joint.parent == BASE else self.states[joint.parent]
+        fixed = ConstantTurn(self.graph, joint.turn)
+        place = self.symbols.vector(joint.place)
+        aligned = before is not None and joint.parallel and choice.aligned
+        if before is None:
+            rest, reach, extra = motion(self._none, self._none), self._none, self._none
+            a = fixed.back(self.symbols.vector(-self.tree.gravity))
+        elif aligned:
+            rest, reach = before.rest, before.turn.out(place)
+            extra = before.adds.moved(reach)
+            a = add(before.a_rest, before.turn.out(before.own.moved(place)))
+            if choice.reach_turned:
+                a = add(add(before.a_rest, before.rest.moved(reach)), extra)
+        else:
+            rest, reach, extra = seen_through(fixed, before.own), place, self._none
+            a = fixed.back(add(before.a_own, before.own.moved(place)))
+        q, dq, ddq = (joint.sign * self.symbols.coordinate(i, k) for k in range(3))
+        if not self._moving:
+            ddq = self._zero
+        angle = before.angle if aligned and before is not None else self._no_angle()
+        if joint.revolute:
+            angle = Angle(
+                angle.sum + q,
+                angle.offset + joint.offset,
+                angle.speed + dq,
+                angle.acceleration + ddq,
+            )
+        else:
+            sliding, distance = slide(rest, dq, ddq), q + joint.offset
+            x, y, z = (distance * component for component in rest.along_z())
+            a, extra = add(add(a, sliding), (x, y, z)), add(extra, sliding)
+            step = (self._zero, self._zero, distance)
+            reach = add(reach, step if aligned else fixed.out(step))
+        turn = turn_by(angle.sum, angle.offset)
+        return JointState(
+            joint=joint,
+            aligned=aligned,
+            fixed=fixed,
+            angle=angle,
+            turn=turn,
+            rest=rest,
+            own=turned(
+                rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.doubled
+            ),
+            adds=turning(rest, angle.speed, angle.acceleration),
+            a_rest=a,
+            a_own=turn.back(a),
+            reach=reach,
+            extra=extra,
+        )
+
+    def _no_angle(self) -> Angle:
+        return Angle(self._zero, 0.0, self._zero, self._zero)
+
+    def screws(self, i: int) -> dict[int, tuple[Vector, Vector]]:
+        """How the joints before joint i move its origin.
+
+        Returns:
+            For each of them the angular velocity and the velocity of the origin for a unit speed,
+            in the frame at rest of joint i.
+        """
+        if i not in self._screws:
+            self._screws[i] = self._found_screws(i)
+        return self._screws[i]
+
+    def _found_screws(self, i: int) -> dict[int, tuple[Vector, Vector]]:
+        state = self.states[i]
+        parent = state.joint.parent
+        if parent == BASE:
+            return {}
+        before = self.states[parent]
+        one = self.symbols.number(1.0)
+        axis = (self._zero, self._zero, one)
+        own = (axis, self._none) if before.joint.revolute else (self._none, axis)
+        known = self.screws(parent)
+        if state.aligned:
+            screws = {**known, parent: own}
+            return {j: (w, add(v, cross(w, state.reach))) for j, (w, v) in screws.items()}
+        turned_in = {j: (before.turn.back(w), before.turn.back(v)) for j, (w, v) in known.items()}
+        moved = {
+            j: (w, add(v, cross(w, state.reach))) for j, (w, v) in {**turned_in, parent: own}.items()
+        }
+        return {j: (state.fixed.back(w), state.fixed.back(v)) for j, (w, v) in moved.items()}
+
+    def spun(self, i: int) -> Motion:
+        """Motion of a body in the components of its frame at rest."""
+        state, choice = self.states[i], self.choices[i]
+        still = Turn(self.symbols.number(1.0), self._zero)
+        angle = state.angle
+        return turned(
+            state.rest, still, angle.speed, angle.acceleration, choice.diagonal, choice.doubled
+        )

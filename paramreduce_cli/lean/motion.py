@@ -1,0 +1,185 @@
+"""How a frame moves: its rates, and the matrix U that acts on everything fixed in it.
+
+U = skew(w') + skew(w)^2 gives the acceleration of a point at r as a + U r [Khalil1987]. Turning
+about an axis does not change U's column along it, so that column is turned instead of w'.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+from paramreduce_cli.lean.algebra import Scalar, Vector, add, dot
+from paramreduce_cli.lean.turns import ConstantTurn, Turn
+
+
+class Diagonal(StrEnum):
+    """How the diagonal of U is made."""
+
+    SQUARES = "squares"
+    """From the squares of all rates."""
+    FIRST = "first"
+    """zz is turned with its column; the square of the rate about y is not needed."""
+    SECOND = "second"
+    """The same without the square of the rate about x."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Rates of a frame in its own components.
+
+    Attributes:
+        omega: Angular velocity.
+        rate: Angular acceleration.
+        products: w_y w_z, w_x w_z, w_x w_y.
+        U: Rows.
+        steps: U_yy - U_zz, U_zz - U_xx, U_xx - U_yy.
+    """
+
+    omega: Vector
+    rate: Vector
+    products: Vector
+    U: tuple[Vector, Vector, Vector]
+    steps: Vector
+
+    def along_z(self) -> Vector:
+        """U z"""
+        return (self.U[0][2], self.U[1][2], self.U[2][2])
+
+    def moved(self, r: Vector) -> Vector:
+        """U r"""
+        return (dot(self.U[0], r), dot(self.U[1], r), dot(self.U[2], r))
+
+
+def motion(omega: Vector, rate: Vector) -> Motion:
+    """From the rates alone."""
+    products = (omega[1] * omega[2], omega[0] * omega[2], omega[0] * omega[1])
+    xx, yy, zz = (component * component for component in omega)
+    (yz, xz, xy), (x, y, z) = products, rate
+    U = (
+        (-(yy + zz), xy - z, xz + y),
+        (xy + z, -(xx + zz), yz - x),
+        (xz - y, yz + x, -(xx + yy)),
+    )
+    return Motion(omega, rate, products, U, (yy - zz, zz - xx, xx - yy))
+
+
+def turned(
+    frame: Motion, turn: Turn, speed: Scalar, acceleration: Scalar, diagonal: Diagonal, doubled: bool
+) -> Motion:
+    """The motion of a frame that turns about z against another.
+
+    Args:
+        frame: Motion of the other, in its own components.
+        turn: By what it is turned already.
+        speed: Of the turning, rad/s.
+        acceleration: Of the turning, rad/s^2.
+        diagonal: How the diagonal of U is made.
+        doubled: Whether U_zx and U_zy are made from 2 w_z, not from the angular acceleration.
+    """
+    x, y, _ = turn.back(frame.omega)
+    z = frame.omega[2] + speed
+    u_xz, u_yz, u_zz = turn.back(frame.along_z())
+    rate_z = frame.rate[2] + acceleration
+    yz, xz, xy = y * z, x * z, x * y
+    rate_x, rate_y = yz - u_yz, u_xz - xz
+    if doubled:
+        twice = 2 * z
+        u_zx, u_zy = twice * x - u_xz, twice * y - u_yz
+    else:
+        u_zx, u_zy = xz - rate_y, yz + rate_x
+    if diagonal is Diagonal.SQUARES:
+        xx, yy, zz = x * x, y * y, z * z
+        u_xx, u_yy, u_zz = -(yy + zz), -(xx + zz), -(xx + yy)
+        steps = (yy - zz, zz - xx, xx - yy)
+    elif diagonal is Diagonal.FIRST:
+        xx, zz = x * x, z * z
+        step = zz - xx
+        u_xx, u_yy = u_zz - step, -(xx + zz)
+        steps = (u_yy - u_zz, step, u_xx - u_yy)
+    else:
+        yy, zz = y * y, z * z
+        step = yy - zz
+        u_xx, u_yy = -(yy + zz), u_zz + step
+        steps = (step, u_zz - u_xx, u_xx - u_yy)
+    U = (
+        (u_xx, xy - rate_z, u_xz),
+        (xy + rate_z, u_yy, u_yz),
+        (u_zx, u_zy, u_zz),
+    )
+    return Motion((x, y, z), (rate_x, rate_y, rate_z), (yz, xz, xy), U, steps)
+
+
+def seen_through(turn: ConstantTurn, frame: Motion) -> Motion:
+    """The same motion in the components of a frame fixed in it."""
+    if not turn.is_permutation:
+        return motion(turn.back(frame.omega), turn.back(frame.rate))
+    axes = turn.pattern()
+
+    def component(i: int, j: int) -> Scalar:
+        (k, a), (m, b) = axes[i], axes[j]
+        return a * b * frame.U[k][m]
+
+    def product(i: int, j: int) -> Scalar:
+        (k, a), (m, b) = axes[i], axes[j]
+        return a * b * frame.products[3 - k - m]
+
+    def step(i: int, j: int) -> Scalar:
+        k, m = axes[i][0], axes[j][0]
+        value = frame.steps[3 - k - m]
+        return value if (k + 1) % 3 == m else -value
+
+    rows = [(component(i, 0), component(i, 1), component(i, 2)) for i in range(3)]
+    return Motion(
+        turn.back(frame.omega),
+        turn.back(frame.rate),
+        (product(1, 2), product(0, 2), product(0, 1)),
+        (rows[0], rows[1], rows[2]),
+        (step(1, 2), step(2, 0), step(0, 1)),
+    )
+
+
+@dataclass(frozen=True)
+class Turning:
+    """What turning about z at a speed and an acceleration adds to U, C = U_after - U_before.
+
+    Only three of its entries differ: ``-kappa`` in xx and yy, the acceleration off the diagonal,
+    and twice ``half`` in the row of z.
+
+    Attributes:
+        acceleration: rad/s^2.
+        kappa: Loss of the diagonal.
+        half: speed * w_x and speed * w_y.
+    """
+
+    acceleration: Scalar
+    kappa: Scalar
+    half: tuple[Scalar, Scalar]
+
+    def moved(self, r: Vector) -> Vector:
+        """C r"""
+        x, y, _ = r
+        return (
+            -(self.kappa * x) - self.acceleration * y,
+            self.acceleration * x - self.kappa * y,
+            2 * (self.half[0] * x + self.half[1] * y),
+        )
+
+
+def turning(frame: Motion, speed: Scalar, acceleration: Scalar) -> Turning:
+    """Of a frame that turns about z of another, whose motion is given."""
+    x, y, z = frame.omega
+    return Turning(acceleration, speed * (z + (z + speed)), (speed * x, speed * y))
+
+
+def slide(frame: Motion, speed: Scalar, acceleration: Scalar) -> Vector:
+    """Acceleration that sliding along z of a moving frame adds."""
+    twice = 2 * speed
+    return (twice * frame.omega[1], -(twice * frame.omega[0]), acceleration)
+
+
+def total(a: Vector, *others: Vector) -> Vector:
+    """The sum of vectors."""
+    for other in others:
+        a = add(a, other)
+    return a

@@ -1,0 +1,111 @@
+"""A mechanism's tree in frames that suit it: one on every joint's axis, parallel axes aligned.
+
+A body's frame here is its joint's, moved with the body, z along the axis. Seen from the frame
+of the body before, it is ``place``, ``turn`` (the joint's frame at rest), then the joint's
+motion. Frames are free up to a turn about their own z and the direction of z, so that an axis
+parallel to the one before gets no turn at all: its angle just adds to that one's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import BASE, FloatArray, Mechanism
+
+_EXACT = 1e-13
+"""Entries of rotation matrices nearer to 0 or 1 than this are meant to be that."""
+
+_FLIP = np.diag([1.0, -1.0, -1.0])
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint and the body it moves."""
+
+    parent: int
+    """Index of the joint before, :data:`BASE` for the base."""
+    revolute: bool
+    sign: int
+    """Of the coordinate, where z is against the joint's axis as described."""
+    offset: float
+    """Added to the signed coordinate, rad or m."""
+    place: FloatArray
+    """Origin in the frame of the body before, m, (3,)."""
+    turn: FloatArray
+    """Components in the joint's frame at rest to those in the frame of the body before, (3, 3)."""
+    parallel: bool
+    """Whether the axis is parallel to that of the joint before, on which its angle can be added."""
+    described: FloatArray
+    """Homogeneous transform from the body's frame as described to this one, (4, 4), m."""
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Joints with the parents before their children, in the order of the mechanism's bodies."""
+
+    joints: tuple[Joint, ...]
+    gravity: FloatArray
+    """In the base frame, m/s^2, (3,)."""
+    inertial: tuple[int, ...]
+    """Indices of the bodies that have parameters, in the order of these."""
+
+    def children(self, i: int) -> list[int]:
+        """Joints on a body."""
+        return [k for k, joint in enumerate(self.joints) if joint.parent == i]
+
+
+def lean_tree(mechanism: Mechanism) -> Tree:
+    """Choose the frames of a mechanism's tree."""
+    joints: list[Joint] = []
+    for body in mechanism.bodies:
+        before = None if body.parent == BASE else joints[body.parent]
+        placed = body.before if before is None else before.described @ body.before
+        turn, after, sign = _exact(placed[:3, :3]), body.after.copy(), 1
+        if before is not None and turn[2, 2] == -1.0:
+            turn, sign = turn @ _FLIP, -1
+            after[:3] = _FLIP @ after[:3]
+        offset, parallel = sign * body.offset, before is not None and turn[2, 2] == 1.0
+        if body.joint == "revolute" and before is not None:
+            turn, angle = _without_turn_about_z(turn)
+            offset += angle
+        elif parallel:
+            after[:3] = turn @ after[:3]
+            turn = np.eye(3)
+        after[:3, :3] = _exact(after[:3, :3])
+        joints.append(
+            Joint(
+                parent=body.parent,
+                revolute=body.joint == "revolute",
+                sign=sign,
+                offset=offset,
+                place=placed[:3, 3],
+                turn=turn,
+                parallel=parallel,
+                described=after,
+            )
+        )
+    return Tree(tuple(joints), mechanism.gravity, mechanism.inertial)
+
+
+def _exact(rotation: FloatArray) -> FloatArray:
+    """Without the rounding of quarter turns."""
+    nearest = np.round(rotation)
+    return np.where(np.abs(rotation - nearest) < _EXACT, nearest, rotation)
+
+
+def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
+    """Split off the angle of a turn about z that comes first, if it is in the way.
+
+    Turns by quarters cost nothing where they are; others, about other axes, need fewer products
+    without.
+    """
+    if np.all((turn == 0) | (np.abs(turn) == 1)) and turn[2, 2] != 1.0:
+        return turn, 0.0
+    if abs(turn[2, 2]) == 1.0:
+        angle = float(np.arctan2(turn[1, 0], turn[0, 0]))
+    else:
+        angle = float(np.arctan2(turn[2, 0], turn[2, 1]))
+    c, s = np.cos(angle), np.sin(angle)
+    return _exact(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle

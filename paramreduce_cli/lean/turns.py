@@ -1,0 +1,127 @@
+"""Turns of vectors and inertias: by a joint's angle about z, and by constant rotations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.lean.algebra import Scalar, Vector
+from paramreduce_cli.lean.inertia import Inertia
+from paramreduce_cli.records import FloatArray
+
+_QUARTER_TOLERANCE = 1e-14
+
+
+@dataclass(frozen=True)
+class Turn:
+    """A rotation about z; ``cosine`` and ``sine`` are expressions or exact constants."""
+
+    cosine: Scalar
+    sine: Scalar
+
+    def out(self, a: Vector) -> Vector:
+        """Rz a: from components in the turned frame to those before the turn."""
+        c, s = self.cosine, self.sine
+        return (c * a[0] - s * a[1], s * a[0] + c * a[1], a[2])
+
+    def back(self, a: Vector) -> Vector:
+        """Rz' a"""
+        c, s = self.cosine, self.sine
+        return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
+
+    def inertia(self, body: Inertia) -> Inertia:
+        """Rz I Rz', with the first moments.
+
+        The xx-yy-xy block turns by the double angle; with w = s (Ixx - Iyy) + 2 c Ixy it loses
+        s w in xx, gains it in yy, and xy becomes c w - Ixy.
+        """
+        c, s = self.cosine, self.sine
+        xz, yz, _ = self.out((body.xz, body.yz, body.zz))
+        if c.graph.number(c.value) == 0.0:
+            xx, yy, xy = body.yy, body.xx, -body.xy
+        elif not s:
+            xx, yy, xy = body.xx, body.yy, body.xy
+        else:
+            w = s * (body.xx - body.yy) + c * (2 * body.xy)
+            moved = s * w
+            xx, yy, xy = body.xx - moved, body.yy + moved, c * w - body.xy
+        return Inertia(body.m, self.out(body.d), xx, xy, xz, yy, yz, body.zz)
+
+
+def turn_by(angle: Scalar, offset: float) -> Turn:
+    """The turn by angle + offset; whole quarter turns cost nothing and are exact."""
+    quarters = round(offset / (np.pi / 2))
+    if abs(offset - quarters * np.pi / 2) > _QUARTER_TOLERANCE:
+        angle, quarters = angle + offset, 0
+    c, s = angle.cosine(), angle.sine()
+    for _ in range(quarters % 4):
+        c, s = -s, c
+    return Turn(c, s)
+
+
+class ConstantTurn:
+    """A constant rotation, C = Rz Rx Rz by angles of which most are quarter turns.
+
+    Args:
+        graph: Of the expressions.
+        rotation: (3, 3)
+    """
+
+    def __init__(self, graph: Graph, rotation: FloatArray) -> None:
+        self._rows = [[float(x) for x in row] for row in rotation]
+        self._columns = [[float(x) for x in row] for row in rotation.T]
+        self._turns = [Turn(*(Scalar(graph, graph.constant(x)) for x in cs)) for cs in _euler(rotation)]
+        self.is_permutation = bool(np.all((rotation == 0) | (np.abs(rotation) == 1)))
+
+    def out(self, a: Vector) -> Vector:
+        """C a"""
+        if self.is_permutation:
+            return _product(self._rows, a)
+        first, middle, last = self._turns
+        return last.out(_rolled(middle.out(_unrolled(first.out(a)))))
+
+    def back(self, a: Vector) -> Vector:
+        """C' a"""
+        if self.is_permutation:
+            return _product(self._columns, a)
+        first, middle, last = self._turns
+        return first.back(_rolled(middle.back(_unrolled(last.back(a)))))
+
+    def inertia(self, body: Inertia) -> Inertia:
+        """C I C', with the first moments."""
+        first, middle, last = self._turns
+        turned = last.inertia(middle.inertia(first.inertia(body).cycled()).cycled().cycled())
+        return turned.with_moment(self.out(body.d))
+
+    def pattern(self) -> list[tuple[int, int]]:
+        """Of a permutation C: for each axis before, which axis of C's columns it is, and its sign."""
+        return [
+            next((k, int(x)) for k, x in enumerate(column) if x != 0) for column in self._columns
+        ]
+
+
+def _euler(rotation: FloatArray) -> list[tuple[float, float]]:
+    """Cosines and sines of b, a, g with rotation = Rz(g) Rx(a) Rz(b)."""
+    cosine = float(rotation[2, 2])
+    sine = float(np.hypot(rotation[2, 0], rotation[2, 1]))
+    if sine == 0.0:
+        return [(float(rotation[0, 0]), cosine * float(rotation[1, 0])), (cosine, 0.0), (1.0, 0.0)]
+    first = (float(rotation[2, 1]) / sine, float(rotation[2, 0]) / sine)
+    last = (-float(rotation[1, 2]) / sine, float(rotation[0, 2]) / sine)
+    return [first, (cosine, sine), last]
+
+
+def _unrolled(a: Vector) -> Vector:
+    """Components with x in the place of z."""
+    return (a[1], a[2], a[0])
+
+
+def _rolled(a: Vector) -> Vector:
+    return (a[2], a[0], a[1])
+
+
+def _product(rows: list[list[float]], a: Vector) -> Vector:
+    x, y, z = (row[0] * a[0] + row[1] * a[1] + row[2] * a[2] for row in rows)
+    return (x, y, z)

@@ -1,0 +1,143 @@
+"""Forces and moments that inertias need to keep to a motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from paramreduce_cli.lean.algebra import Scalar, Vector, add, cross, scale
+from paramreduce_cli.lean.inertia import Inertia
+from paramreduce_cli.lean.motion import Motion, Turning
+
+
+class Gauge(StrEnum):
+    """Which part of a body's inertia, s (1 - z z'), is handed to the body before.
+
+    A hinge about z cannot tell it apart, so s is chosen for the rest to be simple.
+    """
+
+    NONE = "none"
+    YY = "yy"
+    """Iyy of the rest is zero."""
+    XX = "xx"
+    FLAT = "flat"
+    """Izz = Ixx + Iyy: all mass of the rest is in the plane of x and y."""
+    XX_ZZ = "xx=zz"
+    """Ixx = Izz"""
+    YY_ZZ = "yy=zz"
+
+
+def split_off(body: Inertia, gauge: Gauge) -> tuple[Scalar, Inertia]:
+    """The part s that is handed on and the rest of a body's inertia."""
+    if gauge is Gauge.YY:
+        s = body.yy
+        return s, replace(body, xx=body.xx - s, yy=s - s)
+    if gauge is Gauge.XX:
+        s = body.xx
+        return s, replace(body, xx=s - s, yy=body.yy - s)
+    if gauge is Gauge.XX_ZZ:
+        s = body.xx - body.zz
+        return s, replace(body, xx=body.zz, yy=body.yy - s)
+    if gauge is Gauge.YY_ZZ:
+        s = body.yy - body.zz
+        return s, replace(body, xx=body.xx - s, yy=body.zz)
+    if gauge is Gauge.FLAT:
+        half = 0.5 * (body.zz + (body.xx - body.yy))
+        s = body.xx - half
+        return s, replace(body, xx=half, yy=body.yy - s)
+    return body.xx - body.xx, body
+
+
+@dataclass(frozen=True)
+class Wrench:
+    """A force and a moment about one point, in one frame."""
+
+    force: Vector
+    moment: Vector
+
+    def __add__(self, other: Wrench) -> Wrench:
+        return Wrench(add(self.force, other.force), add(self.moment, other.moment))
+
+    def moved(self, r: Vector) -> Wrench:
+        """About another point, from which r leads to the present one."""
+        return Wrench(self.force, add(self.moment, cross(r, self.force)))
+
+
+def inertial_wrench(body: Inertia, frame: Motion, a: Vector, gauge: Gauge) -> Wrench:
+    """What a body that moves with a frame needs.
+
+    Args:
+        body: In the frame, about its origin.
+        frame: Its motion.
+        a: Acceleration of its origin, less gravity.
+        gauge: That the body's inertia is in; gives the cheapest form of the moment.
+    """
+    force = add(frame.moved(body.d), scale(body.m, a))
+    return Wrench(force, add(_spin(body, frame, gauge), cross(body.d, a)))
+
+
+def _spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
+    """I w' + w x (I w), with the products of w taken from U."""
+    U, step = frame.U, frame.steps
+    x, y, z = _diagonal_spin(body, frame, gauge)
+    return (
+        x + body.xz * U[1][0] - body.xy * U[2][0] + body.yz * step[0],
+        y + body.xy * U[2][1] - body.yz * U[0][1] + body.xz * step[1],
+        z + body.yz * U[0][2] - body.xz * U[1][2] + body.xy * step[2],
+    )
+
+
+def _diagonal_spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
+    U, (rx, ry, rz), (yz, xz, xy) = frame.U, frame.rate, frame.products
+    xx, yy, zz = body.xx, body.yy, body.zz
+    if gauge is Gauge.FLAT:
+        return (xx * U[2][1], -(yy * U[2][0]), yy * U[1][0] - xx * U[0][1])
+    if gauge is Gauge.XX_ZZ:
+        return (zz * U[2][1] - yy * yz, yy * ry, yy * xy - zz * U[0][1])
+    if gauge is Gauge.YY_ZZ:
+        return (xx * rx, xx * xz - zz * U[2][0], zz * U[1][0] - xx * xy)
+    return (
+        xx * rx + (zz - yy) * yz,
+        yy * ry + (xx - zz) * xz,
+        zz * rz + (yy - xx) * xy,
+    )
+
+
+def spin_about_z(body: Inertia, frame: Motion, a: Vector) -> Scalar:
+    """The moment about z that a body needs to move with a frame."""
+    U, d = frame.U, body.d
+    return (
+        body.zz * frame.rate[2]
+        + (body.yy - body.xx) * frame.products[2]
+        + body.yz * U[0][2]
+        - body.xz * U[1][2]
+        + body.xy * frame.steps[2]
+        + (d[0] * a[1] - d[1] * a[0])
+    )
+
+
+def force_along_z(body: Inertia, frame: Motion, a: Vector) -> Scalar:
+    """The force along z that a body needs to move with a frame."""
+    return frame.moved(body.d)[2] + body.m * a[2]
+
+
+def turning_wrench(body: Inertia, turning: Turning) -> Wrench:
+    """What turning about z adds to what a body needs.
+
+    With C = U_after - U_before and S the second moments, it is C d and the skew part of C S, of
+    which C leaves little: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and
+    the moment about z has nothing but the angular acceleration.
+    """
+    (h, k), acceleration, kappa = turning.half, turning.acceleration, turning.kappa
+    difference, twice = body.xx - body.yy, 2 * body.xy
+    moment = (
+        acceleration * body.xz - kappa * body.yz + (k * (body.zz + difference) - h * twice),
+        acceleration * body.yz + kappa * body.xz + (k * twice - h * (body.zz - difference)),
+        acceleration * body.zz,
+    )
+    return Wrench(turning.moved(body.d), moment)
+
+
+def pushed(body: Inertia, a: Vector) -> Wrench:
+    """What a body needs for an acceleration of all its points."""
+    return Wrench(scale(body.m, a), cross(body.d, a))
