@@ -28,3 +28,7 @@ class RankError(ParamreduceError):
 
 class ParamreduceWarning(UserWarning):
     """A remark for the user that does not stop the work."""
+
+
+class FormulationError(ParamreduceError):
+    """A lean model does not compute what it should."""

@@ -184,6 +184,14 @@ class BaseParameters:
 
 
 @dataclass(frozen=True)
+class Formulations:
+    """Lean ways to write a mechanism's dynamics: for each, what is chosen at every joint."""
+
+    inverse: tuple[tuple[Mapping[str, str | bool], ...], ...]
+    direct: tuple[tuple[Mapping[str, str | bool], ...], ...]
+
+
+@dataclass(frozen=True)
 class Model:
     """A mechanism with its standard parameters and their base."""
 
@@ -197,6 +205,7 @@ class Model:
     """Characteristic size of each joint's torque or force, (n_dof,), N m or N."""
     nominal_torque_given: bool
     """Whether the config gave it; if not, the estimation set's replaces it from `sample` on."""
+    formulations: Formulations
 
 
 @dataclass(frozen=True)
@@ -437,6 +446,8 @@ class HeuristicValidation(BySize):
     """Smallest over the samples."""
     operations_inverse: IntArray
     operations_direct: IntArray
+    operations_inverse_plain: IntArray
+    operations_direct_plain: IntArray
     operations_inverse_paper_rule: IntArray
     operations_direct_paper_rule: IntArray
 

@@ -13,7 +13,7 @@ LAYERS = [
     {"workflow", "runner"},
     {"pipeline"},
     {"stages", "artifacts"},
-    {"config", "robots", "excitation", "reduction", "report"},
+    {"config", "robots", "excitation", "reduction", "lean", "report"},
     {"multibody"},
     {"expressions"},
     {"records"},

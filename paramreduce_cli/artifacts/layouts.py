@@ -17,6 +17,7 @@ from paramreduce_cli.records import (
     Body,
     Closure,
     Constraint,
+    Formulations,
     HeuristicValidation,
     Loops,
     Mechanism,
@@ -112,6 +113,7 @@ def save_model(writer: Writer, model: Model) -> None:
     writer.dataset("nominal_torque", model.nominal_torque)
     writer.dataset("nominal_torque_given", model.nominal_torque_given)
     writer.dataset("mechanism", mechanism_to_json(mechanism))
+    writer.dataset("formulations", json.dumps(dataclasses.asdict(model.formulations)))
 
 
 def load_model(reader: Reader) -> Model:
@@ -129,6 +131,12 @@ def load_model(reader: Reader) -> Model:
         ),
         nominal_torque=reader.array("nominal_torque", 1),
         nominal_torque_given=bool(reader.array("nominal_torque_given")),
+        formulations=Formulations(
+            **{
+                name: tuple(tuple(choices) for choices in some)
+                for name, some in json.loads(reader.text("formulations")).items()
+            }
+        ),
     )
 
 

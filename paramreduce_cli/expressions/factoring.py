@@ -8,7 +8,7 @@ computed once [Breuer1969], and all is put together again. Results differ by rou
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
 
 from paramreduce_cli.expressions.graph import Graph
@@ -212,7 +212,7 @@ class _Assembly:
         return graph.call(node.operation, *self.built(node.operands))
 
 
-def _joined(values: list[int], join) -> int:  # noqa: ANN001
+def _joined(values: list[int], join: Callable[[int, int], int]) -> int:
     """Join terms two by two, so that few wait for others."""
     while len(values) > 1:
         pairs = [join(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]

@@ -145,5 +145,6 @@ class Graph:
     def count(self, outputs: list[int]) -> int:
         """Operations that outputs take: all their nodes but constants and inputs."""
         return sum(
-            self.nodes[node].operation not in ("constant", "input") for node in self.reached(outputs)
+            self.nodes[node].operation not in ("constant", "input")
+            for node in self.reached(outputs)
         )

@@ -103,6 +103,11 @@ class Program:
         )
         return cls(nodes, moved(outputs))
 
+    @property
+    def n_operations(self) -> int:
+        """Operations it takes as it stands."""
+        return sum(node.operation not in ("constant", "input") for node in self.nodes)
+
     def rebuilt(
         self,
         graph: Graph,

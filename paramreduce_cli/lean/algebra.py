@@ -42,11 +42,11 @@ class Scalar:
         return other.value if isinstance(other, Scalar) else self.graph.constant(other)
 
     def sine(self) -> Scalar:
-        """sin"""
+        """Sin"""
         return Scalar(self.graph, self.graph.call("sin", self.value))
 
     def cosine(self) -> Scalar:
-        """cos"""
+        """Cos"""
         return Scalar(self.graph, self.graph.call("cos", self.value))
 
 

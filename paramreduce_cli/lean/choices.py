@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum
+from typing import Any
 
 from paramreduce_cli.lean.motion import Diagonal
+from paramreduce_cli.lean.tree import Joint
 from paramreduce_cli.lean.wrench import Gauge
+from paramreduce_cli.records import BASE
 
 
 class Place(StrEnum):
@@ -45,39 +49,63 @@ class Choice:
     projected: bool = False
     """Whether wrenches are projected on all axes before from here, not handed on from body to body."""
 
-    @property
-    def places(self) -> tuple[Place, ...]:
-        """All that are chosen."""
-        return (self.mass, self.axial, self.radial, self.polar, self.tilt, self.plane)
 
+_PLACED = ("mass", "axial", "radial", "polar", "tilt", "plane")
+_TOGETHER = (("tilt", "plane"), ("polar", "tilt", "plane"), ("radial", "polar", "tilt", "plane"))
+"""Parts that are also moved to another place at once: one by one it may not pay."""
 
-PLACED = ("mass", "axial", "radial", "polar", "tilt", "plane")
-OPTIONS: dict[str, tuple] = {
+OPTIONS: dict[str, tuple[Any, ...]] = {
     "aligned": (False, True),
     "gauge": tuple(Gauge),
-    **{name: tuple(Place) for name in PLACED},
+    **{name: tuple(Place) for name in _PLACED},
     "diagonal": tuple(Diagonal),
     "doubled": (False, True),
     "reach_turned": (False, True),
     "projected": (False, True),
 }
+"""All values of every choice."""
 
 
-def alternatives(choice: Choice) -> list[Choice]:
-    """Choices that differ in one thing, or have several parts in one other place together."""
+def alternatives(choice: Choice, joint: Joint) -> list[Choice]:
+    """Choices at a joint that differ in one thing, or have several parts in one other place."""
+    names = _effective(choice, joint)
+    places = tuple(Place) if joint.revolute else (Place.OWN, Place.BEFORE)
     single = [
-        replace(choice, **{name: value})
-        for name, values in OPTIONS.items()
-        for value in values
-        if value != getattr(choice, name)
+        replace(choice, **{name: value})  # type: ignore[arg-type]
+        for name in names
+        for value in (places if name in _PLACED else OPTIONS[name])
     ]
-    groups = (("tilt", "plane"), ("polar", "tilt", "plane"), ("radial", "polar", "tilt", "plane"))
-    joint = [
-        replace(choice, **dict.fromkeys(group, place)) for group in groups for place in Place
+    together = [
+        replace(choice, **dict.fromkeys(group, place))  # type: ignore[arg-type]
+        for group in _TOGETHER
+        for place in places
     ]
-    return single + [c for c in joint if c != choice]
+    return [c for c in dict.fromkeys(single + together) if c != choice]
+
+
+def _effective(choice: Choice, joint: Joint) -> list[str]:
+    """What makes a difference at a joint."""
+    names = list(_PLACED)
+    if joint.revolute:
+        names += ["gauge", "diagonal", "doubled"]
+    if joint.parallel:
+        names += ["aligned"] + ["reach_turned"] * choice.aligned
+    if joint.parent != BASE:
+        names += ["projected"]
+    return names
 
 
 def to_data(choice: Choice) -> dict[str, str | bool]:
-    """As a mapping of plain values."""
-    return {f.name: getattr(choice, f.name) for f in fields(choice)}
+    """As plain values."""
+    return {
+        f.name: value if isinstance(value := getattr(choice, f.name), bool) else str(value)
+        for f in fields(choice)
+    }
+
+
+def from_data(data: Mapping[str, str | bool]) -> Choice:
+    """From plain values."""
+    kinds = {"gauge": Gauge, "diagonal": Diagonal, **dict.fromkeys(_PLACED, Place)}
+    return Choice(
+        **{name: kinds[name](value) if name in kinds else value for name, value in data.items()}  # type: ignore[arg-type]
+    )

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.inertia import Inertia
-from paramreduce_cli.lean.inverse import axial_part, hand_on, on_body_before, projections, turned_out
+from paramreduce_cli.lean.inverse import (
+    axial_part,
+    hand_on,
+    on_body_before,
+    projections,
+    turned_out,
+)
 from paramreduce_cli.lean.kinematics import JointState, Kinematics
 from paramreduce_cli.lean.wrench import Wrench
 from paramreduce_cli.records import BASE

@@ -67,9 +67,7 @@ class Inertia:
     def cycled(self) -> Inertia:
         """In axes renamed so that x becomes z, y becomes x and z becomes y."""
         x, y, z = self.d
-        return Inertia(
-            self.m, (y, z, x), self.yy, self.yz, self.xy, self.zz, self.xz, self.xx
-        )
+        return Inertia(self.m, (y, z, x), self.yy, self.yz, self.xy, self.zz, self.xz, self.xx)
 
     def with_moment(self, d: Vector) -> Inertia:
         """With other first moments."""

@@ -44,9 +44,7 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
         axial, rest = axial_part(own[i], choice, state)
         wrench = wrench_own[i]
         if kept := part(rest, choice, Place.OWN):
-            wrench = wrench + inertial_wrench(
-                kept, state.own, state.a_own, form(choice, Place.OWN)
-            )
+            wrench = wrench + inertial_wrench(kept, state.own, state.a_own, form(choice, Place.OWN))
         wrench = turned_out(wrench, state) + wrench_rest[i]
         if kept := part(rest, choice, Place.REST):
             wrench = wrench + inertial_wrench(

@@ -20,7 +20,7 @@ from paramreduce_cli.lean.motion import (
 )
 from paramreduce_cli.lean.tree import Joint, Tree
 from paramreduce_cli.lean.turns import ConstantTurn, Turn, turn_by
-from paramreduce_cli.records import BASE, PARAMETER_KINDS
+from paramreduce_cli.records import BASE, PARAMETER_KINDS, FloatArray
 
 _WIDTH = len(PARAMETER_KINDS)
 
@@ -45,7 +45,7 @@ class Symbols:
         """A constant."""
         return Scalar(self.graph, self.graph.constant(value))
 
-    def vector(self, values: Sequence[float]) -> Vector:
+    def vector(self, values: Sequence[float] | FloatArray) -> Vector:
         """Three constants."""
         x, y, z = (self.number(float(value)) for value in values)
         return (x, y, z)
@@ -234,7 +234,8 @@ class Kinematics:
             return {j: (w, add(v, cross(w, state.reach))) for j, (w, v) in screws.items()}
         turned_in = {j: (before.turn.back(w), before.turn.back(v)) for j, (w, v) in known.items()}
         moved = {
-            j: (w, add(v, cross(w, state.reach))) for j, (w, v) in {**turned_in, parent: own}.items()
+            j: (w, add(v, cross(w, state.reach)))
+            for j, (w, v) in {**turned_in, parent: own}.items()
         }
         return {j: (state.fixed.back(w), state.fixed.back(v)) for j, (w, v) in moved.items()}
 

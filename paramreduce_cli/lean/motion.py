@@ -65,7 +65,12 @@ def motion(omega: Vector, rate: Vector) -> Motion:
 
 
 def turned(
-    frame: Motion, turn: Turn, speed: Scalar, acceleration: Scalar, diagonal: Diagonal, doubled: bool
+    frame: Motion,
+    turn: Turn,
+    speed: Scalar,
+    acceleration: Scalar,
+    diagonal: Diagonal,
+    doubled: bool,
 ) -> Motion:
     """The motion of a frame that turns about z against another.
 

@@ -72,7 +72,9 @@ class ConstantTurn:
     def __init__(self, graph: Graph, rotation: FloatArray) -> None:
         self._rows = [[float(x) for x in row] for row in rotation]
         self._columns = [[float(x) for x in row] for row in rotation.T]
-        self._turns = [Turn(*(Scalar(graph, graph.constant(x)) for x in cs)) for cs in _euler(rotation)]
+        self._turns = [
+            Turn(*(Scalar(graph, graph.constant(x)) for x in cs)) for cs in _euler(rotation)
+        ]
         self.is_permutation = bool(np.all((rotation == 0) | (np.abs(rotation) == 1)))
 
     def out(self, a: Vector) -> Vector:

@@ -180,6 +180,8 @@ def _rows(r: HeuristicValidation) -> list[dict[str, Any]]:
             "operations": {
                 "inverse": int(r.operations_inverse[k]),
                 "direct": int(r.operations_direct[k]),
+                "inverse_plain": int(r.operations_inverse_plain[k]),
+                "direct_plain": int(r.operations_direct_plain[k]),
                 "inverse_paper_rule": int(r.operations_inverse_paper_rule[k]),
                 "direct_paper_rule": int(r.operations_direct_paper_rule[k]),
             },

@@ -309,14 +309,13 @@ def approximate_base_parameters(data: ReportData) -> Table:
 
 @table("operations")
 def operations(data: ReportData) -> Table:
-    """Operation counts by both rules for the full, the base and the selected model."""
+    """Operations of the full, the base and the selected model: lean, plain recursion, the paper's rule."""
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
-    keys = (
-        "operations_inverse",
-        "operations_inverse_paper_rule",
-        "operations_direct",
-        "operations_direct_paper_rule",
+    keys = tuple(
+        f"operations_{function}{rule}"
+        for function in ("inverse", "direct")
+        for rule in ("", "_plain", "_paper_rule")
     )
     affecting = int(data.model.affecting.sum())
     rows = [
@@ -332,5 +331,8 @@ def operations(data: ReportData) -> Table:
             *(str(int(getattr(result, key)[result.row(selected.n)])) for key in keys),
         ),
     ]
-    header = ("model", "n", "d", "d, signs counted", "[M, δ]", "[M, δ], signs counted")
+    header = (
+        "model", "n", "d", "d, plain", "d, plain, signs counted",
+        "[M, δ]", "[M, δ], plain", "[M, δ], plain, signs counted",
+    )  # fmt: skip
     return Table("Operations", header, tuple(rows))

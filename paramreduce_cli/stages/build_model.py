@@ -8,6 +8,8 @@ import numpy as np
 
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.lean.checking import check_formulations
+from paramreduce_cli.lean.search import formulations
 from paramreduce_cli.multibody.base_parameters import (
     affecting_columns,
     base_parameters,
@@ -50,13 +52,17 @@ def build_model(config: Config) -> Model:
     base = base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance)
     _check_named(config, mechanism, base)
     texts = _expressions(config, mechanism, base, states, rng)
+    affecting = affecting_columns(W)
+    lean = formulations(mechanism, affecting, base.columns)
+    check_formulations(mechanism, lean, np.flatnonzero(affecting), states, rng)
     return Model(
         mechanism=mechanism,
         values=values,
-        affecting=affecting_columns(W),
+        affecting=affecting,
         base=dataclasses.replace(base, expressions=tuple(texts)),
         nominal_torque=nominal,
         nominal_torque_given=given,
+        formulations=lean,
     )
 
 

@@ -2,35 +2,89 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cached_property
+
 import numpy as np
 
+from paramreduce_cli.config import Config
+from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import BoolArray, FloatArray
+from paramreduce_cli.records import FloatArray, IntArray, Model
+
+COUNTS = (
+    "operations_inverse",
+    "operations_direct",
+    "operations_inverse_plain",
+    "operations_direct_plain",
+    "operations_inverse_paper_rule",
+    "operations_direct_paper_rule",
+)
+"""What :meth:`Counts.all` counts: lean models, plain recursion, and that by the paper's rule."""
 
 
-def count_operations(
-    dynamics: Dynamics,
-    affecting: BoolArray,
-    expansion: FloatArray,
-    *,
-    independent: bool,
-    signs_free: bool = True,
-    direct: bool = True,
-) -> tuple[int, int]:
-    """Operations of the inverse and of the direct dynamics, zero for what is not asked for.
+class Counts:
+    """Operations of the inverse and direct dynamics; each model is counted once.
 
     Args:
-        dynamics: Of the mechanism.
-        affecting: Parameters that change the torques at all, (n_standard,).
-        expansion: Standard parameters from the values kept, (n_standard, n).
-        independent: See :meth:`Dynamics.count_operations`.
-        signs_free: Whether sign changes cost nothing.
-        direct: Whether the direct dynamics is counted too.
+        config: Says which functions are counted.
+        model: Of the mechanism.
     """
-    kept = np.flatnonzero(expansion.any(axis=1) & affecting)
+
+    def __init__(self, config: Config, model: Model) -> None:
+        self._independent = config.validation.operations == "independent"
+        self._model = model
+        self._known: dict[bytes, list[int]] = {}
+
+    @cached_property
+    def _plain(self) -> Dynamics:
+        return Dynamics(self._model.mechanism)
+
+    @cached_property
+    def _lean(self) -> LeanModels:
+        model = self._model
+        return LeanModels(model.mechanism, model.formulations, independent=self._independent)
+
+    def estimate(self, expansion: FloatArray) -> int:
+        """Of the lean inverse dynamics, nearly; for criteria, which ask for thousands of models.
+
+        Args:
+            expansion: Standard parameters from the values kept, (n_standard, n).
+        """
+        return self._lean.estimate(kept_and_tied(self._model, expansion)[0])
+
+    def all(self, expansion: FloatArray) -> list[int]:
+        """All of :data:`COUNTS`.
+
+        Args:
+            expansion: Standard parameters from the values kept, (n_standard, n).
+        """
+        key = expansion[:, np.lexsort(expansion)].tobytes()
+        if key not in self._known:
+            kept, same = kept_and_tied(self._model, expansion)
+            plain = [
+                count
+                for signs_free in (True, False)
+                for count in self._plain.count_operations(
+                    kept, same=same, signs_free=signs_free, independent=self._independent
+                )
+            ]
+            lean = [
+                f(kept, same=same).n_operations for f in (self._lean.inverse, self._lean.direct)
+            ]
+            self._known[key] = lean + plain
+        return self._known[key]
+
+
+def kept_and_tied(model: Model, expansion: FloatArray) -> tuple[IntArray, Mapping[int, int]]:
+    """Parameters that are not zero, and which of them have the value of another one.
+
+    Args:
+        model: Says which parameters change the torques at all.
+        expansion: Standard parameters from the values kept, (n_standard, n).
+    """
+    kept = np.flatnonzero(expansion.any(axis=1) & model.affecting)
     first = np.argmax(expansion != 0, axis=0)
     owner = first[np.argmax(expansion[kept] != 0, axis=1)]
     same = {int(k): int(other) for k, other in zip(kept, owner, strict=True) if k != other}
-    return dynamics.count_operations(
-        kept, same=same, signs_free=signs_free, independent=independent, direct=direct
-    )
+    return kept, same

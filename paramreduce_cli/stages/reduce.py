@@ -39,7 +39,7 @@ from paramreduce_cli.reduction.objective import Means, Objective
 from paramreduce_cli.reduction.task import Task
 from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.counting import count_operations
+from paramreduce_cli.stages.counting import Counts
 from paramreduce_cli.stages.problem import (
     effort,
     merged_factor,
@@ -142,6 +142,10 @@ class _Means(Means):
     def _dynamics(self) -> Dynamics:
         return Dynamics(self._modelled("of the heuristics")[1].mechanism)
 
+    @cached_property
+    def _counts(self) -> Counts:
+        return Counts(*self._modelled("operations"))
+
     def accelerations(self, most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""
         self._modelled("acceleration")
@@ -159,15 +163,8 @@ class _Means(Means):
         return AccelerationData(A @ expansion, B @ expansion, tau, ddz, nominal)
 
     def cost(self, kept: IntArray) -> int:
-        """Operations of the inverse dynamics by plain recursion."""
-        config, model = self._modelled("operations")
-        return count_operations(
-            self._dynamics,
-            model.affecting,
-            self._columns.expansion[:, kept],
-            independent=config.validation.operations == "independent",
-            direct=False,
-        )[0]
+        """Operations of the lean inverse dynamics, nearly."""
+        return self._counts.estimate(self._columns.expansion[:, kept])
 
 
 def _remark_on_proofs(proofs: Proofs | None) -> None:

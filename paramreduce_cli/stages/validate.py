@@ -15,7 +15,6 @@ from paramreduce_cli.multibody.observation import (
     thinned_blocks,
 )
 from paramreduce_cli.records import (
-    BoolArray,
     FloatArray,
     HeuristicValidation,
     IntArray,
@@ -37,7 +36,7 @@ from paramreduce_cli.reduction.task import Task
 from paramreduce_cli.reduction.task import run as run_heuristic
 from paramreduce_cli.reduction.torque import TorqueObjective
 from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.counting import count_operations
+from paramreduce_cli.stages.counting import COUNTS, Counts
 from paramreduce_cli.stages.problem import (
     effort,
     merged_factor,
@@ -51,12 +50,6 @@ _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _NODES = 50_000
 """Of each proof while stability is looked at; the best found is good enough there."""
-_COUNTS = (
-    "operations_inverse",
-    "operations_direct",
-    "operations_inverse_paper_rule",
-    "operations_direct_paper_rule",
-)
 
 
 @stage
@@ -84,12 +77,12 @@ def validate(
         return torque, acceleration
 
     estimation, validation = errors_on(samples.estimation), errors_on(samples.validation)
-    counts = _Counts(config, dynamics, model.affecting)
+    counts = Counts(config, model)
     heuristics = {}
     for name, found in reduction.heuristics.items():
         rows = models.rows[name]
         expansions = [reduction.expansion[:, subset] for subset in found.subsets]
-        operations = np.array([counts.of(expansion) for expansion in expansions])
+        operations = np.array([counts.all(expansion) for expansion in expansions])
         heuristics[name] = _judged(found.n, operations, estimation, validation, rows)
     full = _full_model(model, counts, estimation[1], validation[1])
     selected = select(config.selected, model, reduction, heuristics)
@@ -145,42 +138,6 @@ class _Models:
         self.columns: FloatArray = np.column_stack([*columns, model.values])
 
 
-class _Counts:
-    """Operations of IDM and DDM by our count, then by the paper's rule; each model once.
-
-    Args:
-        config: Says which functions are counted.
-        dynamics: Of the mechanism.
-        affecting: Parameters that change the torques at all, (n_standard,).
-    """
-
-    def __init__(self, config: Config, dynamics: Dynamics, affecting: BoolArray) -> None:
-        self._independent = config.validation.operations == "independent"
-        self._dynamics, self._affecting = dynamics, affecting
-        self._known: dict[bytes, list[int]] = {}
-
-    def of(self, expansion: FloatArray) -> list[int]:
-        """Four counts of a model.
-
-        Args:
-            expansion: Standard parameters from its values, (n_standard, n).
-        """
-        key = expansion[:, np.lexsort(expansion)].tobytes()
-        if key not in self._known:
-            self._known[key] = [
-                value
-                for signs_free in (True, False)
-                for value in count_operations(
-                    self._dynamics,
-                    self._affecting,
-                    expansion,
-                    independent=self._independent,
-                    signs_free=signs_free,
-                )
-            ]
-        return self._known[key]
-
-
 def _judged(
     n: IntArray,
     counts: IntArray,
@@ -204,17 +161,17 @@ def _judged(
         mass_matrix_smallest_eigenvalue=np.minimum(
             estimation[1].smallest_eigenvalue[rows], validation[1].smallest_eigenvalue[rows]
         ),
-        **dict(zip(_COUNTS, counts.T, strict=True)),
+        **dict(zip(COUNTS, counts.T, strict=True)),
     )
 
 
 def _full_model(
-    model: Model, counts: _Counts, estimation: AccelerationErrors, validation: AccelerationErrors
+    model: Model, counts: Counts, estimation: AccelerationErrors, validation: AccelerationErrors
 ) -> dict[str, int | float]:
     unit = np.eye(model.values.size)
-    full, base = counts.of(unit[:, model.affecting]), counts.of(unit[:, model.base.columns])
-    result: dict[str, int | float] = dict(zip(_COUNTS, full, strict=True))
-    result |= {f"base_{name}": value for name, value in zip(_COUNTS, base, strict=True)}
+    full, base = counts.all(unit[:, model.affecting]), counts.all(unit[:, model.base.columns])
+    result: dict[str, int | float] = dict(zip(COUNTS, full, strict=True))
+    result |= {f"base_{name}": value for name, value in zip(COUNTS, base, strict=True)}
     result["mass_matrix_condition"] = float(max(estimation.condition[-1], validation.condition[-1]))
     result["mass_matrix_smallest_eigenvalue"] = float(
         min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])

@@ -1,0 +1,61 @@
+"""Whether lean models compute what the straightforward ones do."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+
+from paramreduce_cli.errors import FormulationError
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism
+
+_TOLERANCE = 1e-10
+"""Of the largest value of each output; rounding leaves 1e-14."""
+
+
+def check_formulations(
+    mechanism: Mechanism,
+    formulations: Formulations,
+    kept: IntArray,
+    states: tuple[FloatArray, FloatArray, FloatArray],
+    rng: np.random.Generator,
+) -> None:
+    """Compare every formulation with plain recursion on the open tree.
+
+    Args:
+        mechanism: The mechanism.
+        formulations: To be checked, one by one.
+        kept: Indices of parameters that are not zero; they get random values.
+        states: q, dq, ddq, each (n_samples, n_q).
+        rng: Where the values come from.
+
+    Raises:
+        FormulationError: A formulation computes something else.
+    """
+    q, dq, ddq = states
+    phi = np.zeros(len(mechanism.parameter_names))
+    phi[kept] = rng.normal(size=kept.size)
+    plain = Dynamics(dataclasses.replace(mechanism, loops=None), once=True)
+    A, B = plain.direct_regressor(q, dq)
+    rows, columns = np.tril_indices(mechanism.n_q)
+    expected = {
+        "inverse": plain.inverse(q, dq, ddq, phi),
+        "direct": np.hstack([(A @ phi)[:, rows, columns], B @ phi]),
+    }
+    inputs = [*np.broadcast_to(phi, (q.shape[0], phi.size)).T, *q.T, *dq.T, *ddq.T]
+    for kind, wanted in expected.items():
+        for choices in getattr(formulations, kind):
+            one = dataclasses.replace(formulations, **{kind: (choices,)})
+            values = getattr(LeanModels(mechanism, one), kind)(kept).evaluated(inputs)
+            got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
+            error = np.max(np.abs(got - wanted), initial=0.0) / np.max(
+                np.abs(wanted), initial=1e-300
+            )
+            if not error <= _TOLERANCE:
+                raise FormulationError(
+                    f"a lean formulation of the {kind} dynamics is off by {error:.1e} of the largest "
+                    "value against plain recursion. This is a defect of paramreduce: please report it "
+                    "with the config."
+                )

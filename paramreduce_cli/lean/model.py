@@ -1,0 +1,143 @@
+"""Lean models of a mechanism: the leanest formulation for a set of parameters, as a program."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paramreduce_cli.expressions.factoring import factored
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.choices import from_data
+from paramreduce_cli.lean.projection import projected_direct, projected_inverse
+from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
+from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.records import Formulations, IntArray, Mechanism
+
+if TYPE_CHECKING:
+    from paramreduce_cli.expressions.live import LiveCount
+
+_NOTHING: Mapping[int, int] = MappingProxyType({})
+_NO_VALUES: Mapping[int, float] = MappingProxyType({})
+
+
+class LeanModels:
+    """Programs of the inverse and direct dynamics for any set of parameters.
+
+    Their inputs are the standard parameters, then q, dq and ddq, and for loops, if the independent
+    coordinates are asked for, the dependent rows of R, row by row, and of b.
+
+    Args:
+        mechanism: The mechanism.
+        formulations: To choose from.
+        independent: Whether d_z and [M_zz | delta_z] are meant, with R and b handed in, instead of
+            d_q and [M_qq | delta_q]; on an open tree they are the same.
+    """
+
+    def __init__(
+        self, mechanism: Mechanism, formulations: Formulations, *, independent: bool = False
+    ) -> None:
+        self._mechanism = mechanism
+        self._formulations = formulations
+        self._tree = lean_tree(mechanism)
+        self._projected = independent and mechanism.loops is not None
+        self.n_parameters = len(mechanism.parameter_names)
+
+    @cached_property
+    def _inverse(self) -> list[Program]:
+        return self._programs(
+            projected_inverse(self._mechanism) if self._projected else inverse_outputs,
+            self._formulations.inverse,
+        )
+
+    @cached_property
+    def _direct(self) -> list[Program]:
+        return self._programs(
+            projected_direct(self._mechanism) if self._projected else direct_outputs,
+            self._formulations.direct,
+        )
+
+    def _programs(
+        self, build: Build, choices: tuple[tuple[Mapping[str, str | bool], ...], ...]
+    ) -> list[Program]:
+        result = []
+        for some in choices:
+            graph = Graph()
+            outputs = build(self._tree, [from_data(data) for data in some], graph, ())
+            result.append(Program.of_graph(graph, outputs))
+        return result
+
+    def inverse(
+        self,
+        kept: IntArray,
+        *,
+        same: Mapping[int, int] = _NOTHING,
+        constants: Mapping[int, float] = _NO_VALUES,
+    ) -> Program:
+        """The inverse dynamics with some parameters; the torques, (n_q,) or (n_dof,).
+
+        Args:
+            kept: Indices of the parameters that are not zero.
+            same: Parameters that have the same value as another one.
+            constants: Values of the parameters that are known.
+        """
+        return self._leanest(self._inverse, kept, same, constants)
+
+    def direct(
+        self,
+        kept: IntArray,
+        *,
+        same: Mapping[int, int] = _NOTHING,
+        constants: Mapping[int, float] = _NO_VALUES,
+    ) -> Program:
+        """[M | delta] with some parameters: the lower triangle of M, row by row, then delta.
+
+        Args:
+            kept: Indices of the parameters that are not zero.
+            same: Parameters that have the same value as another one.
+            constants: Values of the parameters that are known.
+        """
+        return self._leanest(self._direct, kept, same, constants)
+
+    def estimate(self, kept: IntArray) -> int:
+        """Operations of the inverse dynamics, nearly: quick enough to compare thousands of subsets.
+
+        Args:
+            kept: Indices of the parameters that are not zero.
+        """
+        zero = np.ones(self.n_parameters, dtype=np.bool_)
+        zero[kept] = False
+        return min(count(zero) for count in self._live_counts)
+
+    @cached_property
+    def _live_counts(self) -> list[LiveCount]:
+        from paramreduce_cli.expressions.live import LiveCount
+
+        return [LiveCount(program) for program in self._inverse]
+
+    def _leanest(
+        self,
+        programs: list[Program],
+        kept: IntArray,
+        same: Mapping[int, int],
+        constants: Mapping[int, float],
+    ) -> Program:
+        """The formulation with the fewest operations, its sums and products rearranged."""
+        dropped = np.setdiff1d(np.arange(self.n_parameters), kept).tolist()
+        candidates = []
+        for program in programs:
+            graph = Graph()
+            outputs = program.rebuilt(graph, dropped, same=same, constants=constants)
+            candidates.append((graph.count(outputs), graph, outputs))
+        count, graph, outputs = min(candidates, key=lambda candidate: candidate[0])
+        while True:
+            target = Graph()
+            changed = factored(graph, outputs, target)
+            fewer = target.count(changed)
+            if fewer >= count:
+                return Program.of_graph(graph, outputs)
+            count, graph, outputs = fewer, target, changed

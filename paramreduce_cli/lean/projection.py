@@ -1,0 +1,78 @@
+"""From the dynamics of an open tree to that of its loops, with R and b as inputs.
+
+d_z = R' d_q, M_zz = R' M_qq R and delta_z = R' (delta_q + M_qq b) as in
+:mod:`paramreduce_cli.multibody.projection`; the independent rows of R are those of the identity
+and of b zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.choices import Choice
+from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
+from paramreduce_cli.lean.tree import Tree
+from paramreduce_cli.records import Mechanism
+
+_STATES = 3
+"""q, dq and ddq come before R and b among the inputs."""
+
+
+def projected_inverse(mechanism: Mechanism) -> Build:
+    """Torques in the independent coordinates."""
+
+    def build(
+        tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+    ) -> list[int]:
+        d_q = [Scalar(graph, v) for v in inverse_outputs(tree, choices, graph, dropped)]
+        R, _ = _tangent(mechanism, graph)
+        return [_dot(column, d_q, graph).value for column in zip(*R, strict=True)]
+
+    return build
+
+
+def projected_direct(mechanism: Mechanism) -> Build:
+    """The lower triangle of M_zz, row by row, then delta_z."""
+
+    def build(
+        tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+    ) -> list[int]:
+        n = mechanism.n_q
+        flat = [Scalar(graph, v) for v in direct_outputs(tree, choices, graph, dropped)]
+        lower, delta = flat[:-n], flat[-n:]
+        M = [
+            [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(n)]
+            for i in range(n)
+        ]
+        R, b = _tangent(mechanism, graph)
+        columns = list(zip(*R, strict=True))
+        MR = [[_dot(row, column, graph) for row in M] for column in columns]
+        bias = [delta[i] + _dot(M[i], b, graph) for i in range(n)]
+        M_zz = [_dot(columns[i], MR[j], graph) for i in range(len(columns)) for j in range(i + 1)]
+        return [x.value for x in [*M_zz, *(_dot(column, bias, graph) for column in columns)]]
+
+    return build
+
+
+def _tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """R, (n_q, n_dof), and b, (n_q,)."""
+    n_z, dependent = mechanism.n_dof, mechanism.dependent
+    zero, one = Scalar(graph, graph.constant(0.0)), Scalar(graph, graph.constant(1.0))
+    R = [[zero] * n_z for _ in range(mechanism.n_q)]
+    b = [zero] * mechanism.n_q
+    for j, i in enumerate(mechanism.independent):
+        R[i][j] = one
+    start = len(mechanism.parameter_names) + _STATES * mechanism.n_q
+    for k, i in enumerate(dependent):
+        R[i] = [Scalar(graph, graph.input(start + k * n_z + j)) for j in range(n_z)]
+        b[i] = Scalar(graph, graph.input(start + len(dependent) * n_z + k))
+    return R, b
+
+
+def _dot(a: Sequence[Scalar], b: Sequence[Scalar], graph: Graph) -> Scalar:
+    result = Scalar(graph, graph.constant(0.0))
+    for x, y in zip(a, b, strict=True):
+        result = result + x * y
+    return result

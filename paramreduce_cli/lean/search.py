@@ -1,0 +1,193 @@
+"""Find the choices that take the fewest operations.
+
+One joint after the other, from the tips inwards, the best alternative is taken until none saves
+anything. Subtrees on the base share nothing, so each is searched by itself, and equal ones once.
+What is best depends on the parameters that are kept; :func:`formulations` searches for all, for
+the base parameters and for the few that matter most: masses, first moments and the moments of
+inertia about the joints' own axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.lean.choices import Choice, Place, alternatives, to_data
+from paramreduce_cli.lean.direct import mass_matrix
+from paramreduce_cli.lean.inverse import torques
+from paramreduce_cli.lean.kinematics import Kinematics
+from paramreduce_cli.lean.tree import Joint, Tree, lean_tree
+from paramreduce_cli.records import (
+    BASE,
+    PARAMETER_KINDS,
+    BoolArray,
+    Formulations,
+    IntArray,
+    Mechanism,
+)
+
+Build = Callable[[Tree, Sequence[Choice], Graph, Collection[int]], list[int]]
+"""Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
+
+_WIDTH = len(PARAMETER_KINDS)
+_FIRST_MOMENTS = ("m", "mx", "my", "mz")
+_MOMENTS = ("Ixx", "Iyy", "Izz")
+_INVERSE_START = Choice()
+_DIRECT_START = Choice(
+    radial=Place.BEFORE, polar=Place.BEFORE, tilt=Place.BEFORE, plane=Place.BEFORE
+)
+"""The bias from the composite bodies that the mass matrix is made of."""
+
+
+def inverse_outputs(
+    tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+) -> list[int]:
+    """Torques, (n_q,)."""
+    kinematics = Kinematics(tree, choices, graph, dropped=dropped)
+    return [torque.value for torque in torques(kinematics)]
+
+
+def direct_outputs(
+    tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+) -> list[int]:
+    """The lower triangle of M, row by row, then delta."""
+    kinematics = Kinematics(tree, choices, graph, moving=False, dropped=dropped)
+    M = [entry.value for row in mass_matrix(kinematics) for entry in row]
+    return M + [torque.value for torque in torques(kinematics)]
+
+
+def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> Formulations:
+    """Search the formulations of a mechanism.
+
+    Args:
+        mechanism: Its tree is what counts.
+        affecting: Parameters that change the torques at all, (n_parameters,).
+        base: Indices of the base parameters.
+
+    Returns:
+        Choices for the inverse and for the direct dynamics, each different set once.
+    """
+    tree = lean_tree(mechanism)
+    everything = set(affecting.nonzero()[0].tolist())
+    few = everything & _main_parameters(tree)
+
+    def searched(build: Build, start: Choice) -> tuple[tuple[dict[str, str | bool], ...], ...]:
+        def dropping(kept: Collection[int]) -> set[int]:
+            return set(range(affecting.size)) - set(kept)
+
+        same = [start] * len(tree.joints)
+        full = best_choices(tree, build, same, dropping(everything))
+        found = [
+            full,
+            best_choices(tree, build, full, dropping(base.tolist())),
+            best_choices(tree, build, same, dropping(few)),
+        ]
+        return tuple(tuple(map(to_data, one)) for one in dict.fromkeys(map(tuple, found)))
+
+    return Formulations(
+        searched(inverse_outputs, _INVERSE_START), searched(direct_outputs, _DIRECT_START)
+    )
+
+
+def _main_parameters(tree: Tree) -> set[int]:
+    """Positions of masses, first moments and the moments of inertia about the joints' axes."""
+    result = set()
+    for order, body in enumerate(tree.inertial):
+        axis = np.abs(tree.joints[body].described[2, :3])
+        kinds = (*_FIRST_MOMENTS, _MOMENTS[int(np.argmax(axis))])
+        result |= {_WIDTH * order + PARAMETER_KINDS.index(kind) for kind in kinds}
+    return result
+
+
+def best_choices(
+    tree: Tree, build: Build, start: Sequence[Choice], dropped: Collection[int]
+) -> list[Choice]:
+    """Choices from which no single change saves an operation.
+
+    Args:
+        tree: The tree.
+        build: The model.
+        start: One choice per joint.
+        dropped: Positions of parameters that are zero.
+    """
+    result = list(start)
+    known: dict[tuple, list[Choice]] = {}
+    for branch in _branches(tree):
+        part, some = _restricted(tree, branch, dropped)
+        begin = [result[i] for i in branch]
+        key = (_signature(part), frozenset(some), tuple(begin))
+        if key not in known:
+            known[key] = _descended(part, build, begin, some)
+        for i, choice in zip(branch, known[key], strict=True):
+            result[i] = choice
+    return result
+
+
+def _descended(
+    tree: Tree, build: Build, start: Sequence[Choice], dropped: Collection[int]
+) -> list[Choice]:
+    choices, graph = list(start), Graph()
+
+    def count(candidate: Sequence[Choice]) -> int:
+        return graph.count(build(tree, candidate, graph, dropped))
+
+    best = count(choices)
+    waiting = len(choices)
+    i = len(choices) - 1
+    while waiting:
+        changed = False
+        while True:
+            options = alternatives(choices[i], tree.joints[i])
+            counts = [count([*choices[:i], option, *choices[i + 1 :]]) for option in options]
+            if min(counts, default=best) >= best:
+                break
+            best = min(counts)
+            choices[i] = options[counts.index(best)]
+            changed = True
+        waiting = len(choices) - 1 if changed else waiting - 1
+        i = (i - 1) % len(choices)
+    return choices
+
+
+def _branches(tree: Tree) -> list[list[int]]:
+    """Joints of every subtree on the base."""
+    roots: list[int] = []
+    for i, joint in enumerate(tree.joints):
+        roots.append(i if joint.parent == BASE else roots[joint.parent])
+    return [[i for i, root in enumerate(roots) if root == first] for first in sorted(set(roots))]
+
+
+def _restricted(
+    tree: Tree, branch: list[int], dropped: Collection[int]
+) -> tuple[Tree, frozenset[int]]:
+    """A subtree as a tree of its own, in the base turned as its first joint is."""
+    place = {i: k for k, i in enumerate(branch)}
+    order = {body: k for k, body in enumerate(tree.inertial)}
+    joints = [
+        replace(tree.joints[i], parent=place.get(tree.joints[i].parent, BASE)) for i in branch
+    ]
+    inertial = [i for i in branch if i in order]
+    some = {
+        _WIDTH * k + kind
+        for k, body in enumerate(inertial)
+        for kind in range(_WIDTH)
+        if _WIDTH * order[body] + kind in dropped
+    }
+    part = Tree(tuple(joints), tree.gravity, tuple(place[i] for i in inertial))
+    return part, frozenset(some)
+
+
+def _signature(tree: Tree) -> tuple:
+    """Equal for trees with equal counts."""
+
+    def of(joint: Joint) -> tuple:
+        placed = (joint.place.tobytes(), joint.turn.tobytes())
+        if joint.parent == BASE:
+            placed = ((joint.turn.T @ tree.gravity).round(12).tobytes(), b"")
+        moving = (joint.parent, joint.revolute, joint.sign, joint.offset, joint.parallel)
+        return (*moving, placed, joint.described.tobytes())
+
+    return (tuple(map(of, tree.joints)), tree.inertial)
