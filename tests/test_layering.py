@@ -13,7 +13,7 @@ LAYERS = [
     {"workflow", "runner"},
     {"pipeline"},
     {"stages", "artifacts"},
-    {"config", "robots", "excitation", "reduction", "lean", "report"},
+    {"config", "robots", "excitation", "reduction", "lean", "export", "report"},
     {"multibody"},
     {"expressions"},
     {"records"},

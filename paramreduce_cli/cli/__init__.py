@@ -10,6 +10,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli import files
+from paramreduce_cli.cli.export import export
 from paramreduce_cli.cli.stages import run, stage_command
 from paramreduce_cli.cli.terminal import err, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
@@ -72,6 +73,7 @@ for _stage in pipeline():
     cli.add_command(stage_command(_stage))
 for _command in (
     run,
+    export,
     files.schema,
     files.init,
     files.inspect,

@@ -92,6 +92,26 @@ def factored(graph: Graph, outputs: Sequence[int], target: Graph) -> list[int]:
     return _Assembly(graph, terms, target).built(outputs)
 
 
+def least(graph: Graph, outputs: list[int]) -> tuple[Graph, list[int]]:
+    """Factor values until it saves nothing any more.
+
+    Args:
+        graph: Where the values are; one in which signs are free.
+        outputs: The values.
+
+    Returns:
+        Another graph and the values in it.
+    """
+    count = graph.count(outputs)
+    while True:
+        target = Graph()
+        changed = factored(graph, outputs, target)
+        fewer = target.count(changed)
+        if fewer >= count:
+            return graph, outputs
+        count, graph, outputs = fewer, target, changed
+
+
 def _take_out_factors(terms: _Terms) -> None:
     uses = terms.uses()
     pending = sorted(terms.sums, reverse=True)

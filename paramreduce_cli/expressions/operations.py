@@ -13,7 +13,7 @@ Inputs can be declared zero (dropped parameters); what they annihilate is not co
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from types import MappingProxyType
 
@@ -108,26 +108,18 @@ class Program:
         """Operations it takes as it stands."""
         return sum(node.operation not in ("constant", "input") for node in self.nodes)
 
-    def rebuilt(
-        self,
-        graph: Graph,
-        zero_inputs: Collection[int] = (),
-        *,
-        same: Mapping[int, int] = _NOTHING,
-        constants: Mapping[int, float] = MappingProxyType({}),
-    ) -> list[int]:
+    def rebuilt(self, graph: Graph, substitute: Callable[[int], int] | None = None) -> list[int]:
         """Build the function again in another graph.
 
         Args:
             graph: Where its nodes go.
-            zero_inputs: Positions of inputs that are zero.
-            same: Positions of inputs that hold the same value as another one.
-            constants: Values of inputs that are known.
+            substitute: The value in that graph of an input, by position; the input of the same
+                position if there is none.
 
         Returns:
             The outputs.
         """
-        zero = frozenset(zero_inputs)
+        substitute = substitute or graph.input
         values: list[int] = []
         for operation, operands, number in self.nodes:
             arguments = [
@@ -138,13 +130,7 @@ class Program:
             elif operation == "+":
                 value = graph.add(*arguments)
             elif operation == "input":
-                position = same.get(int(number), int(number))
-                if int(number) in zero:
-                    value = ZERO
-                elif position in constants:
-                    value = graph.constant(constants[position])
-                else:
-                    value = graph.input(position)
+                value = substitute(int(number))
             elif operation == "constant":
                 value = graph.constant(number)
             elif operation == "-":
@@ -174,7 +160,12 @@ class Program:
             Non-repeated sums, products and function calls that reach an output.
         """
         graph = Graph(signs_free=signs_free)
-        return graph.count(self.rebuilt(graph, zero_inputs, same=same))
+        zero = frozenset(zero_inputs)
+
+        def substitute(position: int) -> int:
+            return ZERO if position in zero else graph.input(same.get(position, position))
+
+        return graph.count(self.rebuilt(graph, substitute))
 
     def evaluated(self, inputs: Sequence[FloatArray]) -> list[FloatArray]:
         """Values of the outputs for many samples.

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import factored
-from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
@@ -127,17 +127,19 @@ class LeanModels:
         constants: Mapping[int, float],
     ) -> Program:
         """The formulation with the fewest operations, its sums and products rearranged."""
-        dropped = np.setdiff1d(np.arange(self.n_parameters), kept).tolist()
+        left = frozenset(kept.tolist())
         candidates = []
         for program in programs:
             graph = Graph()
-            outputs = program.rebuilt(graph, dropped, same=same, constants=constants)
+
+            def substitute(position: int, graph: Graph = graph) -> int:
+                if position < self.n_parameters and position not in left:
+                    return ZERO
+                owner = same.get(position, position)
+                known = constants.get(owner)
+                return graph.input(owner) if known is None else graph.constant(known)
+
+            outputs = program.rebuilt(graph, substitute)
             candidates.append((graph.count(outputs), graph, outputs))
-        count, graph, outputs = min(candidates, key=lambda candidate: candidate[0])
-        while True:
-            target = Graph()
-            changed = factored(graph, outputs, target)
-            fewer = target.count(changed)
-            if fewer >= count:
-                return Program.of_graph(graph, outputs)
-            count, graph, outputs = fewer, target, changed
+        _, graph, outputs = min(candidates, key=lambda candidate: candidate[0])
+        return Program.of_graph(*least(graph, outputs))

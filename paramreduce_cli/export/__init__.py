@@ -1,0 +1,1 @@
+"""Reduced models as code: one exporter a file."""

@@ -1,0 +1,277 @@
+"""C99: a header, a source, a self-test and the files that build them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import jinja2
+import numpy as np
+
+from paramreduce_cli.export.exported import ExportedModel, about, binary, operand
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.registry import exporter
+
+BLOCK = 64
+"""States whose sines and cosines are kept at once in the batched functions."""
+
+_CALLS = {name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2")}
+
+
+@exporter("c")
+def c(model: ExportedModel) -> dict[str, bytes]:
+    """C99 without allocation and without globals; single states and batches of them."""
+    writer = _Writer(model)
+    context = writer.context()
+    result = {}
+    for template, name in (
+        ("model.h", f"{model.name}.h"),
+        ("model.c", f"{model.name}.c"),
+        ("test.c", f"{model.name}_test.c"),
+        ("Makefile", "Makefile"),
+        ("CMakeLists.txt", "CMakeLists.txt"),
+    ):
+        text = _environment().get_template(f"{template}.jinja").render(context)
+        result[name] = text.encode("ascii", "replace")
+    return result
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    def load(name: str) -> str:
+        return (files("paramreduce_cli.export") / "templates" / name).read_text(encoding="utf-8")
+
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(load),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+class _Writer:
+    """Texts of a model in C.
+
+    Args:
+        model: The model.
+    """
+
+    def __init__(self, model: ExportedModel) -> None:
+        self._model = model
+        self._suffix = "f" if model.single else ""
+
+    def context(self) -> dict[str, object]:
+        """What the templates use."""
+        model = self._model
+        return {
+            "name": model.name,
+            "guard": f"{model.name.upper()}_H",
+            "about": about(model),
+            "real": "float" if model.single else "double",
+            "f": self._suffix,
+            "block": BLOCK,
+            "n_q": len(model.coordinates),
+            "n_z": model.independent.size,
+            "n_d": len(model.dependent),
+            "n_phi": 0 if model.constant else len(model.parameters),
+            "dependent": model.dependent,
+            "independent": model.independent.tolist(),
+            "loops": bool(model.closures),
+            "values": [self.number(p.value) for p in model.parameters],
+            "signature": self.signature,
+            "batch_signature": self.batch_signature,
+            "batch_arguments": self.batch_arguments,
+            "shifted": self.shifted,
+            "body": self.body,
+            "test_arguments": self.test_arguments,
+            "test_batch_arguments": self.test_batch_arguments,
+            "functions": [self.function(f) for f in model.functions],
+            "closures": [self.function(f) for f in model.closures],
+            "cases": self.cases(),
+            "n_cases": len(next(iter(model.cases.values()))),
+            "tolerance": "1e-3f" if model.single else "1e-12",
+        }
+
+    def number(self, value: float) -> str:
+        """A constant."""
+        text = repr(float(value))
+        text = text if any(mark in text for mark in ".en") else f"{text}.0"
+        return f"{text}{self._suffix}"
+
+    def function(self, function: Function) -> dict[str, object]:
+        """Texts of a function for one state and for many."""
+        return {
+            "name": function.name,
+            "text": function.text,
+            "arguments": function.arguments,
+            "results": function.results,
+            "operations": function.program.n_operations,
+            "unused": [a.name for a in function.arguments if a.name not in function.used()],
+            "statements": self.statements(function),
+            "batched": self.batched(function),
+        }
+
+    def signature(self, f: Mapping[str, Any]) -> str:
+        """Arguments and results of a function of one state."""
+        type_ = f"{self._model.name}_real"
+        given = [f"const {type_} {a.name}[{a.size}]" for a in f["arguments"]]
+        return ", ".join([*given, *(f"{type_} {a.name}[{a.size}]" for a in f["results"])])
+
+    def batch_signature(self, f: Mapping[str, Any]) -> str:
+        """Of a function of many states."""
+        return f"size_t n, {self._pointers(f, '')}"
+
+    def batch_arguments(self, f: Mapping[str, Any]) -> str:
+        """Of a function of one block of them."""
+        return self._pointers(f, "restrict ")
+
+    def _pointers(self, f: Mapping[str, Any], mark: str) -> str:
+        type_ = f"{self._model.name}_real"
+        given = [
+            f"const {type_} phi[{a.size}]" if a.name == "phi" else f"const {type_} *{mark}{a.name}"
+            for a in f["arguments"]
+        ]
+        return ", ".join([*given, *(f"{type_} *{mark}{a.name}" for a in f["results"])])
+
+    def shifted(self, f: Mapping[str, Any]) -> str:
+        """Arguments of the function of a block that begins at ``start``."""
+        names = [a.name for a in (*f["arguments"], *f["results"])]
+        return ", ".join(name if name == "phi" else f"{name} + start" for name in names)
+
+    def body(self, f: Mapping[str, Any]) -> str:
+        """Of a function of one state."""
+        unused = [f"(void){name};" for name in f["unused"]]
+        return "\n".join(f"  {line}" for line in [*unused, *f["statements"]])
+
+    def test_arguments(self, f: Mapping[str, Any]) -> str:
+        """For state k of the self-test."""
+        given = [f"case_{a.name}[k]" for a in f["arguments"]]
+        return ", ".join([*given, *(f"{a.name}[k]" for a in f["results"])])
+
+    def test_batch_arguments(self, f: Mapping[str, Any]) -> str:
+        """For all states of the self-test."""
+        given = ["case_phi[0]" if a.name == "phi" else f"all_{a.name}" for a in f["arguments"]]
+        return ", ".join([*given, *(f"all_{a.name}" for a in f["results"])])
+
+    def statements(self, function: Function) -> list[str]:
+        """The body, one operation a line."""
+        names = self._leaves(function, batched=False)
+        lines = []
+        for number, line in self._operations(function, names):
+            lines.append(f"const {self._real} t{number} = {line};")
+        return lines + self._results(function, names)
+
+    @property
+    def _real(self) -> str:
+        return "float" if self._model.single else "double"
+
+    def _leaves(self, function: Function, *, batched: bool) -> dict[int, str]:
+        """Texts of constants and inputs; in batches, states are stored coordinate by coordinate."""
+        places = function.places(function.arguments)
+        names = {}
+        for number, node in enumerate(function.program.nodes):
+            if node.operation == "constant":
+                names[number] = self.number(node.number)
+            elif node.operation == "input":
+                array, k = places[int(node.number)]
+                column = batched and array.name != "phi"
+                names[number] = f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
+        return names
+
+    def _operations(self, function: Function, names: dict[int, str]) -> list[tuple[int, str]]:
+        lines = []
+        for number, node in function.steps():
+            if number in names:
+                continue
+            lines.append((number, self._expression(names, node.operation, node.operands)))
+            names[number] = f"t{number}"
+        return lines
+
+    def _expression(
+        self, names: Mapping[int, str], operation: str, operands: tuple[int, ...]
+    ) -> str:
+        if operation == "inv":
+            return f"1 / {names[operands[0] >> 1]}"
+        if operation in _CALLS:
+            listed = ", ".join(operand(names, value) for value in operands)
+            return f"{_CALLS[operation]}{self._suffix}({listed})"
+        return binary(names, operation, *operands)
+
+    def _results(self, function: Function, names: Mapping[int, str]) -> list[str]:
+        places = function.places(function.results)
+        return [
+            f"{array.name}[{k}] = {operand(names, value)};"
+            for (array, k), value in zip(places, function.program.outputs, strict=True)
+        ]
+
+    def batched(self, function: Function) -> dict[str, object]:
+        """The body in parts: what depends on parameters alone, angles, and all the rest."""
+        program = function.program
+        names = self._leaves(function, batched=True)
+        states, angles = _dependence(function)
+        once: list[str] = []
+        before: list[str] = []
+        rest: list[str] = []
+        waves: dict[int, int] = {}
+        for number, node in function.steps():
+            if node.operation in ("sin", "cos") and states[number]:
+                angle = node.operands[0] >> 1
+                row = waves.setdefault(angle, len(waves))
+                names[number] = f"{node.operation}_{row}[k]"
+                continue
+            line = self._expression(names, node.operation, node.operands)
+            names[number] = f"t{number}"
+            text = f"const {self._real} t{number} = {line};"
+            (rest if states[number] else once).append(text)
+        again = self._leaves(function, batched=True)
+        for number, node in function.steps():
+            if number in angles:
+                line = self._expression(again, node.operation, node.operands)
+                again[number] = f"a{number}"
+                before.append(f"const {self._real} a{number} = {line};")
+        filled = [(row, again[angle]) for angle, row in waves.items()]
+        outputs = list(dict.fromkeys(program.outputs))
+        rest += [f"out[{row}][k] = {operand(names, value)};" for row, value in enumerate(outputs)]
+        places = zip(function.places(function.results), program.outputs, strict=True)
+        return {
+            "once": once,
+            "before": before,
+            "angles": filled,
+            "rest": rest,
+            "outputs": outputs,
+            "copies": [(outputs.index(value), array.name, k) for (array, k), value in places],
+        }
+
+    def cases(self) -> dict[str, dict[str, object]]:
+        """Stored vectors of the self-test."""
+        return {
+            name: {
+                "size": int(np.prod(values.shape[1:])),
+                "rows": [", ".join(self.number(x) for x in np.ravel(row)) for row in values],
+            }
+            for name, values in self._model.cases.items()
+        }
+
+
+def _dependence(function: Function) -> tuple[list[bool], set[int]]:
+    """Which nodes depend on the state, and which operations the angles are made of."""
+    places = function.places(function.arguments)
+    states: list[bool] = []
+    angles: set[int] = set()
+    for node in function.program.nodes:
+        if node.operation == "input":
+            states.append(places[int(node.number)][0].name != "phi")
+        else:
+            states.append(any(states[value >> 1] for value in node.operands))
+    for node in reversed(function.program.nodes):
+        if node.operation in ("sin", "cos"):
+            angles.add(node.operands[0] >> 1)
+    for number in range(len(function.program.nodes) - 1, -1, -1):
+        if number in angles:
+            angles |= {value >> 1 for value in function.program.nodes[number].operands}
+    kept = {n for n in angles if function.program.nodes[n].operation not in ("constant", "input")}
+    return states, kept

@@ -1,0 +1,107 @@
+"""What every exporter is given, and what texts of all languages share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.records import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """A parameter of the model."""
+
+    name: str
+    value: float
+    unit: str
+    expression: str
+    """What it stands for, in standard parameters."""
+
+
+@dataclass(frozen=True)
+class ExportedModel:
+    """A model with all that its code says about it."""
+
+    robot: str
+    heading: tuple[str, ...]
+    """Where it comes from and what it is worth, line by line."""
+    coordinates: tuple[str, ...]
+    independent: IntArray
+    """Positions of the independent coordinates, (n_dof,)."""
+    parameters: tuple[Parameter, ...]
+    constant: bool
+    """Whether the values of the parameters are in the code."""
+    functions: tuple[Function, ...]
+    closures: tuple[Function, ...]
+    """Of a mechanism with loops; empty for a tree."""
+    single: bool
+    """Whether numbers have single precision, where the language has a choice."""
+    cases: Mapping[str, FloatArray]
+    """Arguments and results by the straightforward model for the self-test, (n_cases, ...); what has
+    the name of an argument is handed in, what has that of a result is compared."""
+
+    @property
+    def dependent(self) -> tuple[int, ...]:
+        """Positions of the dependent coordinates."""
+        known = set(self.independent.tolist())
+        return tuple(k for k in range(len(self.coordinates)) if k not in known)
+
+    @property
+    def name(self) -> str:
+        """The robot's name as an identifier."""
+        return identifier(self.robot)
+
+    def sizes(self) -> dict[str, Argument]:
+        """All arrays of all functions, by name."""
+        arrays = (a for f in (*self.functions, *self.closures) for a in (*f.arguments, *f.results))
+        return {array.name: array for array in arrays}
+
+
+def identifier(name: str) -> str:
+    """A name that every language takes for an identifier."""
+    word = re.sub(r"[^A-Za-z0-9_]", "_", name)
+    return word if re.match(r"[A-Za-z]", word) else f"robot_{word}"
+
+
+def plain(text: str) -> str:
+    """Text that cannot end a comment or a string: printable, without quotes, backslashes and */."""
+    kept = "".join(c if c.isprintable() else " " for c in text)
+    for bad, good in (("\\", "/"), ('"', "'"), ("*/", "* /"), ("/*", "/ *"), ("???", "? ? ?")):
+        kept = kept.replace(bad, good)
+    return kept
+
+
+def about(model: ExportedModel) -> list[str]:
+    """The lines that open every file."""
+    lines = [plain(line) for line in model.heading]
+    lines += ["", "Coordinates, in this order (rad or m):"]
+    independent = set(model.independent.tolist())
+    for k, name in enumerate(model.coordinates):
+        role = (
+            ""
+            if len(independent) == len(model.coordinates) or k not in independent
+            else " (independent)"
+        )
+        lines.append(f"  {k}: {plain(name)}{role}")
+    kind = "constants of the code" if model.constant else "in this order"
+    lines += ["", f"Parameters, {kind}:"]
+    for k, p in enumerate(model.parameters):
+        lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")
+    return lines
+
+
+def operand(names: Mapping[int, str], value: int) -> str:
+    """A signed reference as text."""
+    return f"-{names[value >> 1]}" if value & 1 else names[value >> 1]
+
+
+def binary(names: Mapping[int, str], operation: str, a: int, b: int) -> str:
+    """A sum or product as text."""
+    if operation == "+" and b & 1:
+        return f"{operand(names, a)} - {names[b >> 1]}"
+    if operation != "+" and b & 1:
+        return f"{operand(names, a)} {operation} (-{names[b >> 1]})"
+    return f"{operand(names, a)} {operation} {names[b >> 1]}"

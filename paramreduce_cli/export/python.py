@@ -1,0 +1,224 @@
+"""A NumPy module, and a self-test for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from paramreduce_cli.export.exported import ExportedModel, about, binary, operand
+from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.records import FloatArray
+from paramreduce_cli.registry import exporter
+
+_CALLS = {
+    "sin": "np.sin",
+    "cos": "np.cos",
+    "tan": "np.tan",
+    "asin": "np.arcsin",
+    "acos": "np.arccos",
+    "atan": "np.arctan",
+    "sqrt": "np.sqrt",
+    "atan2": "np.arctan2",
+}
+
+
+@exporter("python")
+def python(model: ExportedModel) -> dict[str, bytes]:
+    """A module that needs NumPy alone; functions take one state or arrays of states."""
+    lines = ['"""', *about(model), ""]
+    lines += [
+        "Arrays may have leading axes for many states; the last axis, or the last two of a matrix,",
+        "are those of one state.",
+        '"""',
+        "",
+        "import numpy as np",
+        "",
+        f"PHI = np.array({[p.value for p in model.parameters]})",
+        '"""Values of the parameters."""',
+    ]
+    for function in (*model.functions, *model.closures):
+        lines += ["", "", *_function(function, private=function in model.closures)]
+    if model.closures:
+        lines += ["", "", *_loops(model)]
+    text = "\n".join(lines) + "\n"
+    return {
+        f"{model.name}.py": text.encode(),
+        f"{model.name}_test.py": _test(model).encode(),
+    }
+
+
+def _function(function: Function, *, private: bool) -> list[str]:
+    arguments = ", ".join(a.name for a in function.arguments)
+    lines = [f"def {'_' * private}{function.name}({arguments}):"]
+    lines += [f'    """{function.text} {function.program.n_operations} operations.', ""]
+    lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
+    lines += ['    """']
+    names: dict[int, str] = {}
+    places = function.places(function.arguments)
+    for number, node in enumerate(function.program.nodes):
+        if node.operation == "constant":
+            names[number] = repr(float(node.number))
+        elif node.operation == "input":
+            array, k = places[int(node.number)]
+            names[number] = f"{array.name}[..., {_index(array, k)}]"
+    leaders = [a for a in function.arguments if a.name != "phi"]
+    lines += [f"    {a.name} = np.asarray({a.name})" for a in function.arguments]
+    for number, node in function.steps():
+        lines.append(f"    t{number} = {_expression(names, node.operation, node.operands)}")
+        names[number] = f"t{number}"
+    first = leaders[0]
+    lines.append(f"    many = {first.name}.shape[:-{len(first.shape)}]")
+    outputs = [operand(names, value) for value in function.program.outputs]
+    start = 0
+    for result in function.results:
+        some = outputs[start : start + result.size]
+        start += result.size
+        shape = ", ".join(map(str, result.shape))
+        lines.append(f"    {result.name} = np.empty((*many, {shape}))")
+        lines += [
+            f"    {result.name}[..., {_index(result, k)}] = {text}" for k, text in enumerate(some)
+        ]
+    returned = ", ".join(r.name for r in function.results)
+    return [*lines, f"    return {returned}"]
+
+
+def _documented(title: str, arrays: Sequence[Argument]) -> list[str]:
+    shapes = (", ".join(map(str, a.shape)) for a in arrays)
+    listed = [f"        {a.name}: {a.text}, ({s})" for a, s in zip(arrays, shapes, strict=True)]
+    return [f"    {title}:", *listed]
+
+
+def _index(array: Argument, k: int) -> str:
+    return ", ".join(str(int(i)) for i in np.unravel_index(k, array.shape))
+
+
+def _expression(names: dict[int, str], operation: str, operands: tuple[int, ...]) -> str:
+    if operation == "inv":
+        return f"1 / {names[operands[0] >> 1]}"
+    if operation in _CALLS:
+        return f"{_CALLS[operation]}({', '.join(operand(names, value) for value in operands)})"
+    return binary(names, operation, *operands)
+
+
+def _loops(model: ExportedModel) -> list[str]:
+    d, z = list(model.dependent), model.independent.tolist()
+    return f'''_DEPENDENT = {d}
+_INDEPENDENT = {z}
+
+
+def positions(z, guess):
+    """Close the loops at independent coordinates, by Newton's method.
+
+    Args:
+        z: Independent coordinates, ({len(z)})
+        guess: All coordinates near the solution, ({len(d) + len(z)})
+    Returns:
+        All coordinates.
+    Raises:
+        ValueError: The loops cannot be closed from there.
+    """
+    shape = (*np.shape(z)[:-1], {len(d) + len(z)})
+    q = np.array(np.broadcast_to(guess, shape), dtype=float)
+    q[..., _INDEPENDENT] = z
+    for _ in range(50):
+        gap, jacobian = _closure(q)
+        step = np.linalg.solve(jacobian, gap[..., None])[..., 0]
+        q[..., _DEPENDENT] -= step
+        if np.max(np.abs(step)) < 1e-12:
+            return q
+    raise ValueError("the loops cannot be closed from this guess")
+
+
+def velocities(q, dz):
+    """Solve the velocity problem.
+
+    Args:
+        q: Coordinates that close the loops, ({len(d) + len(z)})
+        dz: Independent velocities, ({len(z)})
+    Returns:
+        R: derivatives of the dependent by the independent coordinates, ({len(d)}, {len(z)})
+        dq: all velocities, ({len(d) + len(z)})
+    """
+    by_dependent, by_independent = _closure_jacobian(q)
+    R = -np.linalg.solve(by_dependent, by_independent)
+    return R, _whole(R @ np.asarray(dz)[..., None], dz)
+
+
+def accelerations(q, dq, R, ddz):
+    """Solve the acceleration problem.
+
+    Args:
+        q: Coordinates, ({len(d) + len(z)})
+        dq: velocities, same shape
+        R: from the velocity problem, ({len(d)}, {len(z)})
+        ddz: independent accelerations, ({len(z)})
+    Returns:
+        b: accelerations of the dependent coordinates at ddz = 0, ({len(d)})
+        ddq: all accelerations, ({len(d) + len(z)})
+    """
+    by_dependent, _ = _closure_jacobian(q)
+    b = np.linalg.solve(by_dependent, _closure_bias(q, dq)[..., None])
+    return b[..., 0], _whole(R @ np.asarray(ddz)[..., None] + b, ddz)
+
+
+def _whole(dependent, independent):
+    independent = np.asarray(independent)
+    result = np.empty((*independent.shape[:-1], {len(d) + len(z)}))
+    result[..., _INDEPENDENT] = independent
+    result[..., _DEPENDENT] = dependent[..., 0]
+    return result'''.split("\n")
+
+
+def _test(model: ExportedModel) -> str:
+    sizes = model.sizes()
+
+    def literal(name: str, values: FloatArray) -> str:
+        shape = sizes[name].shape if name in sizes else values.shape[1:]
+        rows = np.reshape(values, (len(values), *shape))
+        return f"{name} = np.array({rows.tolist()!r})"
+
+    lines = [f'"""Self-test of {model.name}.py against an independent formulation."""', ""]
+    lines += ["import numpy as np", f"import {model.name} as model", "", "failures = 0", ""]
+    lines += [literal(name, values) for name, values in model.cases.items()]
+    lines += [
+        "",
+        "",
+        "def compare(what, got, expected):",
+        "    global failures",
+        "    off = np.max(np.abs(got - expected)) / max(np.max(np.abs(expected)), 1e-300)",
+        "    good = off <= 1e-12",
+        "    print('ok  ' if good else 'FAIL', what, f'off by {off:.1e}')",
+        "    failures += not good",
+        "",
+        "",
+    ]
+    for function in model.functions:
+        arguments = ", ".join(a.name for a in function.arguments)
+        many = f"model.{function.name}({arguments})"
+        one = ", ".join(f"{a.name}[0]" for a in function.arguments)
+        if len(function.results) == 1:
+            (r,) = function.results
+            lines.append(f"compare({function.name!r}, {many}, {r.name})")
+            lines.append(
+                f"compare('{function.name}, one state', model.{function.name}({one}), {r.name}[0])"
+            )
+        else:
+            lines.append(f"got = {many}")
+            lines += [
+                f"compare('{function.name}, {r.name}', got[{k}], {r.name})"
+                for k, r in enumerate(function.results)
+            ]
+    if model.closures:
+        lines += [
+            "found = model.positions(z, guess)",
+            "compare('positions, q', found, q)",
+            "tangent, rates = model.velocities(q, dz)",
+            "compare('velocities, R', tangent, R)",
+            "compare('velocities, dq', rates, dq)",
+            "drift, rates = model.accelerations(q, dq, R, ddz)",
+            "compare('accelerations, b', drift, b)",
+            "compare('accelerations, ddq', rates, ddq)",
+        ]
+    lines += ["raise SystemExit(1 if failures else 0)"]
+    return "\n".join(lines) + "\n"

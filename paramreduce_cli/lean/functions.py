@@ -1,0 +1,204 @@
+"""The functions that a model consists of, for a set of parameters, ready for export."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import casadi as ca
+import numpy as np
+
+from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.expressions.graph import ZERO, Graph
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.multibody.closures import closure_equations
+from paramreduce_cli.records import Formulations, IntArray, Mechanism
+
+_NO_VALUES: Mapping[int, float] = {}
+
+
+class LeanFunctions:
+    """Functions of a reduced model.
+
+    Args:
+        mechanism: The mechanism.
+        formulations: Of its dynamics.
+        kept: Standard parameters that are not zero, ascending.
+        owner: For each of them the position of its value in ``phi``.
+        values: The values in ``phi`` if they are to be constants.
+    """
+
+    def __init__(
+        self,
+        mechanism: Mechanism,
+        formulations: Formulations,
+        kept: IntArray,
+        owner: IntArray,
+        values: tuple[float, ...] | None = None,
+    ) -> None:
+        self._mechanism = mechanism
+        self._models = LeanModels(mechanism, formulations, independent=True)
+        self._kept, self._owner = kept, owner
+        self._values = values
+        self._n_values = int(owner.max(initial=-1)) + 1
+        loops = mechanism.loops is not None
+        q, z = mechanism.n_q, mechanism.n_dof
+        d = q - z
+        self._phi = Argument("phi", (self._n_values,), "parameters")
+        unit = "rad or m"
+        self._states = (
+            Argument("q", (q,), f"coordinates, {unit}"),
+            Argument("dq", (q,), f"their velocities, {unit} per s"),
+            Argument("ddq", (q,), f"their accelerations, {unit} per s^2"),
+        )
+        self._R = Argument(
+            "R", (d, z), "derivatives of the dependent by the independent coordinates"
+        )
+        self._b = Argument("b", (d,), "accelerations of the dependent coordinates at ddz = 0")
+        self._loops = (self._R, self._b) if loops else ()
+
+    def inverse(self) -> Function:
+        """Torques of a motion."""
+        z = self._mechanism.n_dof
+        tau = Argument("tau", (z,), "torques or forces, N m or N")
+        text = "Torques of the independent coordinates for a motion."
+        return self._function(
+            "inverse_dynamics", text, self._models.inverse, (tau,), lambda outputs: outputs
+        )
+
+    def direct(self) -> Function:
+        """Mass matrix and bias."""
+        z = self._mechanism.n_dof
+        M = Argument("M", (z, z), "mass matrix")
+        delta = Argument("delta", (z,), "torques without acceleration, N m or N")
+
+        def whole(outputs: list[int]) -> list[int]:
+            lower, bias = outputs[:-z], outputs[-z:]
+            rows = range(z)
+            full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
+            return full + bias
+
+        text = "Mass matrix and bias: tau = M ddz + delta."
+        return self._function("direct_dynamics", text, self._models.direct, (M, delta), whole)
+
+    def regressor(self) -> Function:
+        """Torques as a linear map of the parameters."""
+        n, z = self._n_values, self._mechanism.n_dof
+        same, start = self._ties(), self._models.n_parameters
+        program = self._models.inverse(self._kept, same=same)
+        leaders = {int(p): int(o) for p, o in zip(self._kept, self._owner, strict=True)}
+        graph = Graph()
+        columns = []
+        for value in range(n):
+
+            def substitute(position: int, value: int = value) -> int:
+                if position >= start:
+                    return graph.input(position - start)
+                return graph.constant(1.0) if leaders[position] == value else ZERO
+
+            columns.append(program.rebuilt(graph, substitute))
+        outputs = [columns[j][i] for i in range(z) for j in range(n)]
+        graph, outputs = least(graph, outputs)
+        K = Argument("K", (z, n), "torques for unit values of the parameters")
+        function = Function(
+            "regressor",
+            "Torques as a linear map of the parameters: tau = K phi.",
+            (*self._states, *self._loops),
+            (K,),
+            Program.of_graph(graph, outputs),
+        )
+        return self._trimmed(function)
+
+    def _function(
+        self,
+        name: str,
+        text: str,
+        model: Callable[..., Program],
+        results: tuple[Argument, ...],
+        arranged: Callable[[list[int]], list[int]],
+    ) -> Function:
+        constants = _NO_VALUES
+        if self._values is not None:
+            leaders = self._leaders()
+            constants = {leaders[j]: value for j, value in enumerate(self._values)}
+        program = model(self._kept, same=self._ties(), constants=constants)
+        owner = dict(zip(self._kept.tolist(), self._owner.tolist(), strict=True))
+        start, n = self._models.n_parameters, self._n_values
+        graph = Graph()
+
+        def substitute(position: int) -> int:
+            return graph.input(owner[position] if position < start else position - start + n)
+
+        outputs = arranged(program.rebuilt(graph, substitute))
+        return self._trimmed(
+            Function(
+                name,
+                text,
+                (self._phi, *self._states, *self._loops),
+                results,
+                Program.of_graph(graph, outputs),
+            )
+        )
+
+    def _leaders(self) -> list[int]:
+        """The first standard parameter of every value."""
+        return [int(self._kept[np.argmax(self._owner == j)]) for j in range(self._n_values)]
+
+    def _ties(self) -> dict[int, int]:
+        leaders = self._leaders()
+        pairs = zip(self._kept.tolist(), self._owner.tolist(), strict=True)
+        return {p: leaders[o] for p, o in pairs if p != leaders[o]}
+
+    def _trimmed(self, function: Function) -> Function:
+        """Without arguments that its kind never needs; the others stay, used or not."""
+        needed = {
+            "inverse_dynamics": {"phi", "q", "dq", "ddq", "R"},
+            "direct_dynamics": {"phi", "q", "dq", "R", "b"},
+            "regressor": {"q", "dq", "ddq", "R"},
+        }[function.name]
+        if self._values is not None:
+            needed = needed - {"phi"}
+        for argument in function.arguments:
+            if argument.name not in needed:
+                function = function.without(argument.name)
+        return function
+
+    def closures(self) -> list[Function]:
+        """What the position, velocity and acceleration problems of loops are made of."""
+        mechanism = self._mechanism
+        q, dq = ca.SX.sym("q", mechanism.n_q), ca.SX.sym("dq", mechanism.n_q)
+        equations = closure_equations(mechanism, q)
+        jacobian = ca.jacobian(equations, q)
+        gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
+        d, z = list(mechanism.dependent), list(mechanism.independent)
+        n_d = len(d)
+        gap = Argument("Phi", (n_d,), "how far the loops are from being closed")
+        J_d = Argument("Phi_d", (n_d, n_d), "its derivatives by the dependent coordinates")
+        J_z = Argument("Phi_z", (n_d, len(z)), "its derivatives by the independent coordinates")
+        right = Argument("gamma", (n_d,), "what is left of its second derivative, negative")
+        by_d, by_z = (ca.vec(ca.densify(jacobian[:, some]).T) for some in (d, z))
+        states = self._states[:1], self._states[:2]
+        return [
+            _of_casadi("closure", "The equations that close the loops.", [q], states[0],
+                       [equations, by_d], (gap, J_d)),
+            _of_casadi("closure_jacobian", "Derivatives of the equations.", [q], states[0],
+                       [by_d, by_z], (J_d, J_z)),
+            _of_casadi("closure_bias", "Right side of the acceleration problem.", [q, dq],
+                       states[1], [gamma], (right,)),
+        ]  # fmt: skip
+
+
+def _of_casadi(
+    name: str,
+    text: str,
+    inputs: list[ca.SX],
+    arguments: tuple[Argument, ...],
+    outputs: list[ca.SX],
+    results: tuple[Argument, ...],
+) -> Function:
+    function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
+    graph = Graph()
+    values = Program.of_function(function).rebuilt(graph)
+    graph, values = least(graph, values)
+    return Function(name, text, arguments, results, Program.of_graph(graph, values))

@@ -1,0 +1,239 @@
+"""export: a reduced model as code, checked against the straightforward one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli import __version__
+from paramreduce_cli.errors import ConfigError, FormulationError
+from paramreduce_cli.export.exported import ExportedModel, Parameter
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.lean.functions import LeanFunctions
+from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.relations import approximate_expressions
+from paramreduce_cli.records import FloatArray, IntArray, Model, Reduction, Validation
+from paramreduce_cli.registry import exporter
+
+WHAT = {
+    "idm": ("inverse",),
+    "ddm": ("direct",),
+    "both": ("inverse", "direct"),
+    "regressor": ("regressor",),
+}
+"""Functions of each kind of export."""
+
+_CASES = 16
+"""States in the self-test."""
+_CHECKED = 200
+"""States on which the functions are checked before they are written."""
+_TOLERANCE = 1e-10
+_GUESS = 0.01
+"""How far off the guesses of the position problem are in the self-test, rad or m."""
+_UNITS = {"m": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
+
+
+@dataclass(frozen=True)
+class Chosen:
+    """A model to be exported.
+
+    Attributes:
+        title: What it is called.
+        names: Of its parameters.
+        values: Of these, in SI units.
+        expressions: What each of them is made of.
+        expansion: Standard parameters from the values, (n_standard, n).
+    """
+
+    title: str
+    names: tuple[str, ...]
+    values: FloatArray
+    expressions: tuple[str, ...]
+    expansion: FloatArray
+
+
+def chosen_model(
+    text: str | None, model: Model, reduction: Reduction | None, validation: Validation | None
+) -> Chosen:
+    """The model that is asked for.
+
+    Args:
+        text: ``full``, ``base`` or ``HEURISTIC:N``; None for the selected one.
+        model: Of the robot.
+        reduction: Where reduced models are; not needed for ``full`` and ``base``.
+        validation: Says which one is selected.
+
+    Raises:
+        ConfigError: There is none of that name.
+    """
+    names = model.mechanism.parameter_names
+    unit = np.eye(len(names))
+    if text == "full":
+        kept = np.flatnonzero(model.affecting)
+        own = tuple(names[k] for k in kept)
+        return Chosen("full model", own, model.values[kept], own, unit[:, kept])
+    if text == "base":
+        columns = model.base.columns
+        others = np.setdiff1d(np.arange(len(names)), columns)
+        values = model.values[columns] + model.base.beta @ model.values[others]
+        own = tuple(names[k] for k in columns)
+        return Chosen("base parameters", own, values, model.base.expressions, unit[:, columns])
+    assert reduction is not None
+    if text is None:
+        assert validation is not None
+        heuristic, size = validation.selected.heuristic, validation.selected.n
+    else:
+        heuristic, _, number = text.partition(":")
+        size = int(number) if number.isdigit() else -1
+    found = reduction.heuristics.get(heuristic)
+    row = None if found is None else found.row(size)
+    if found is None or row is None:
+        known = ", ".join(f"{name}:1...{s.n[-1]}" for name, s in reduction.heuristics.items())
+        raise ConfigError(f"--model {text}: there is full, base, {known}.")
+    subset = found.subsets[row]
+    expressions = approximate_expressions(
+        reduction.names,
+        subset,
+        found.beta[row],
+        np.linalg.pinv(reduction.expansion) @ model.values,
+    )
+    return Chosen(
+        f"{heuristic} with {size} parameters, torque error {100 * found.torque_error[row]:.3g} % on "
+        "the estimation set",
+        tuple(reduction.names[k] for k in subset),
+        found.parameters[row],
+        tuple(expressions),
+        reduction.expansion[:, subset],
+    )
+
+
+def export(
+    model: Model, chosen: Chosen, *, kind: str, what: str, constant: bool, single: bool
+) -> dict[str, bytes]:
+    """Files of a model in some language.
+
+    Args:
+        model: Of the robot.
+        chosen: The model that is exported.
+        kind: Name of the exporter.
+        what: Of :data:`WHAT`.
+        constant: Whether the values of the parameters are part of the code.
+        single: Whether numbers have single precision.
+
+    Raises:
+        FormulationError: The functions do not compute what the straightforward model does.
+    """
+    mechanism = model.mechanism
+    kept, owner = _kept(model, chosen)
+    lean = LeanFunctions(
+        mechanism,
+        model.formulations,
+        kept,
+        owner,
+        tuple(float(v) for v in chosen.values) if constant else None,
+    )
+    functions = tuple(getattr(lean, name)() for name in WHAT[what])
+    rng = np.random.default_rng(0)
+    check(functions, cases(model, chosen, _CHECKED, rng))
+    results = {r.name for f in functions for r in f.results}
+    known = {"tau", "M", "delta", "K"}
+    stored = cases(model, chosen, _CASES, rng)
+    exported = ExportedModel(
+        robot=mechanism.robot,
+        heading=(
+            f"{mechanism.robot}: {chosen.title}.",
+            f"Made by paramreduce {__version__}.",
+        ),
+        coordinates=mechanism.generalised_names,
+        independent=np.array(mechanism.independent, dtype=np.int64),
+        parameters=tuple(
+            Parameter(name, float(value), _UNITS.get(name.split("_", 1)[0], "kg m^2"), expression)
+            for name, value, expression in zip(
+                chosen.names, chosen.values, chosen.expressions, strict=True
+            )
+        ),
+        constant=constant,
+        functions=functions,
+        closures=tuple(lean.closures()) if mechanism.loops is not None else (),
+        single=single,
+        cases={k: v for k, v in stored.items() if k in results or k not in known},
+    )
+    files: dict[str, bytes] = exporter[kind](exported)
+    return files
+
+
+def _kept(model: Model, chosen: Chosen) -> tuple[IntArray, IntArray]:
+    """Standard parameters that are not zero, and the value that each of them has."""
+    kept = np.flatnonzero(chosen.expansion.any(axis=1))
+    return kept, np.argmax(chosen.expansion[kept] != 0, axis=1).astype(np.int64)
+
+
+def cases(
+    model: Model, chosen: Chosen, count: int, rng: np.random.Generator
+) -> dict[str, FloatArray]:
+    """Random states with the results of plain recursion, by the names of the functions' arrays.
+
+    Args:
+        model: Of the robot.
+        chosen: The model.
+        count: Number of states.
+        rng: Where they come from.
+    """
+    mechanism = model.mechanism
+    q, dq, ddq = random_states(mechanism, count, rng)
+    plain = Dynamics(mechanism, once=True)
+    phi = chosen.expansion @ chosen.values
+    A, B = plain.direct_regressor(q, dq)
+    K = plain.regressor(q, dq, ddq)
+    result = {
+        "phi": np.tile(chosen.values, (count, 1)),
+        "q": q,
+        "dq": dq,
+        "ddq": ddq,
+        "tau": K @ phi,
+        "M": A @ phi,
+        "delta": B @ phi,
+        "K": K @ chosen.expansion,
+    }
+    if mechanism.loops is None:
+        return result
+    dependent, independent = list(mechanism.dependent), list(mechanism.independent)
+    R = Coordinates(mechanism, once=True).tangent(q)
+    R = R.reshape(count, mechanism.n_q, mechanism.n_dof)[:, dependent]
+    b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
+    guess = q.copy()
+    guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
+    z = {name: result[name][:, independent] for name in ("q", "dq", "ddq")}
+    loops = {"z": z["q"], "dz": z["dq"], "ddz": z["ddq"], "guess": guess, "R": R, "b": b}
+    return result | loops
+
+
+def check(functions: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:
+    """Compare functions with stored results.
+
+    Raises:
+        FormulationError: They are not the same.
+    """
+    for function in functions:
+        inputs = [
+            column
+            for argument in function.arguments
+            for column in stored[argument.name].reshape(-1, argument.size).T
+        ]
+        values = function.program.evaluated(inputs)
+        start = 0
+        for result in function.results:
+            wanted = stored[result.name].reshape(-1, result.size)
+            some = values[start : start + result.size]
+            start += result.size
+            got = np.column_stack([np.broadcast_to(value, wanted.shape[0]) for value in some])
+            error = np.max(np.abs(got - wanted)) / max(float(np.max(np.abs(wanted))), 1e-300)
+            if not error <= _TOLERANCE:
+                raise FormulationError(
+                    f"{function.name}: {result.name} is off by {error:.1e} of its largest value against "
+                    "plain recursion. This is a defect of paramreduce: please report it with the config."
+                )
