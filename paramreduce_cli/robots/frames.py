@@ -7,7 +7,8 @@ import numpy as np
 from paramreduce_cli.records import FloatArray
 
 _EXACT = (0.0, 0.5, 1.0)
-_SNAP = 4 * np.finfo(float).eps
+_SNAP = 1e-10
+"""Angles written with ten digits or more are meant to be what they are near to."""
 
 
 def rotation_x(angle: float) -> FloatArray:
