@@ -22,6 +22,7 @@ COMMANDS = [stage.name for stage in pipeline()] + [
     "compare",
     "table",
     "graph",
+    "export",
 ]
 TWO_LINK = CONFIGS / "two_link.yaml"
 

@@ -44,14 +44,16 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
         axial, rest = axial_part(own[i], choice, state)
         wrench = wrench_own[i]
         if kept := part(rest, choice, Place.OWN):
-            wrench = wrench + inertial_wrench(kept, state.own, state.a_own, form(choice, Place.OWN))
+            wrench = wrench + inertial_wrench(
+                kept, state.own, state.a_own, form(state, choice, Place.OWN)
+            )
         wrench = turned_out(wrench, state) + wrench_rest[i]
         if kept := part(rest, choice, Place.REST):
             wrench = wrench + inertial_wrench(
                 state.turn.inertia(kept),
                 kinematics.spun(i),
                 state.a_rest,
-                form(choice, Place.REST),
+                form(state, choice, Place.REST),
             )
         handed = part(rest, choice, Place.BEFORE)
         if handed:
@@ -116,9 +118,9 @@ def part(body: Inertia, choice: Choice, place: Place) -> Inertia:
     )
 
 
-def form(choice: Choice, place: Place) -> Gauge:
+def form(state: JointState, choice: Choice, place: Place) -> Gauge:
     """What is known of the moments of inertia at a place."""
-    if not choice.polar is choice.plane is place:
+    if not (state.joint.revolute and choice.polar is choice.plane is place):
         return Gauge.NONE
     if place is Place.OWN or choice.gauge is Gauge.FLAT:
         return choice.gauge

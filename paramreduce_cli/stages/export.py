@@ -34,6 +34,8 @@ _CHECKED = 200
 _TOLERANCE = 1e-10
 _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
+_LOOPS = {"z", "dz", "ddz", "guess", "q", "dq", "ddq", "R", "b"}
+"""What the position, velocity and acceleration problems take and give."""
 _UNITS = {"m": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
 
 
@@ -139,8 +141,9 @@ def export(
     functions = tuple(getattr(lean, name)() for name in WHAT[what])
     rng = np.random.default_rng(0)
     check(functions, cases(model, chosen, _CHECKED, rng))
-    results = {r.name for f in functions for r in f.results}
-    known = {"tau", "M", "delta", "K"}
+    used = {a.name for f in functions for a in (*f.arguments, *f.results)}
+    if mechanism.loops is not None:
+        used |= _LOOPS
     stored = cases(model, chosen, _CASES, rng)
     exported = ExportedModel(
         robot=mechanism.robot,
@@ -160,7 +163,7 @@ def export(
         functions=functions,
         closures=tuple(lean.closures()) if mechanism.loops is not None else (),
         single=single,
-        cases={k: v for k, v in stored.items() if k in results or k not in known},
+        cases={name: values for name, values in stored.items() if name in used},
     )
     files: dict[str, bytes] = exporter[kind](exported)
     return files

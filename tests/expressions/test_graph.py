@@ -1,0 +1,114 @@
+"""Graphs and their factoring: values stay, operations get no more."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from paramreduce_cli.expressions.factoring import factored, least
+from paramreduce_cli.expressions.graph import ZERO, Graph
+from paramreduce_cli.expressions.operations import Program
+
+INPUTS = 5
+
+
+@st.composite
+def expressions(draw):
+    """A graph of sums, differences, products and sines, and some of its values."""
+    graph = Graph()
+    values = [graph.input(k) for k in range(INPUTS)]
+    values += [graph.constant(c) for c in (2.0, -0.5)]
+    index = st.integers(0, 10**6)
+    for _ in range(draw(st.integers(1, 40))):
+        a, b = (values[draw(index) % len(values)] for _ in range(2))
+        kind = draw(st.sampled_from("+-**s"))
+        if kind == "s":
+            values.append(graph.call("sin", a))
+        else:
+            join = {"+": graph.add, "-": graph.subtract, "*": graph.multiply}[kind]
+            values.append(join(a, b))
+    outputs = [values[-1 - k] for k in range(draw(st.integers(1, min(6, len(values)))))]
+    return graph, outputs
+
+
+def evaluated(graph, outputs, seed=0):
+    rng = np.random.default_rng(seed)
+    inputs = list(rng.uniform(-1, 1, size=(INPUTS, 7)))
+    values = Program.of_graph(graph, outputs).evaluated(inputs)
+    return np.array([np.broadcast_to(value, 7) for value in values])
+
+
+@settings(max_examples=150, deadline=None)
+@given(expressions())
+def test_factoring_keeps_values(made):
+    graph, outputs = made
+    target = Graph()
+    changed = factored(graph, outputs, target)
+    expected = evaluated(graph, outputs)
+    np.testing.assert_allclose(
+        evaluated(target, changed), expected, rtol=1e-9, atol=1e-9 * (1 + np.abs(expected).max())
+    )
+
+
+@settings(max_examples=100, deadline=None)
+@given(expressions())
+def test_the_least_form_never_takes_more(made):
+    graph, outputs = made
+    target, changed = least(graph, outputs)
+    assert target.count(changed) <= graph.count(outputs)
+
+
+@settings(max_examples=100, deadline=None)
+@given(expressions())
+def test_a_program_builds_the_same_graph_again(made):
+    graph, outputs = made
+    program = Program.of_graph(graph, outputs)
+    again = Graph()
+    rebuilt = program.rebuilt(again)
+    assert again.count(rebuilt) <= graph.count(outputs) == program.n_operations
+    np.testing.assert_allclose(
+        evaluated(again, rebuilt), evaluated(graph, outputs), rtol=1e-9, atol=1e-9
+    )
+
+
+def test_signs_and_constants_vanish():
+    graph = Graph()
+    x, y = graph.input(0), graph.input(1)
+    assert graph.add(x, graph.negate(x)) == ZERO
+    assert graph.multiply(graph.negate(x), graph.negate(y)) == graph.multiply(y, x)
+    assert graph.subtract(x, y) == graph.negate(graph.subtract(y, x))
+    assert graph.multiply(graph.constant(0.0), x) == ZERO
+    half = graph.multiply(graph.constant(0.5), x)
+    assert graph.multiply(graph.constant(2.0), half) == x
+    assert graph.number(graph.call("cos", ZERO)) == 1.0
+    assert graph.call("cos", graph.negate(x)) == graph.call("cos", x)
+
+
+@pytest.mark.parametrize(
+    ("terms", "expected"),
+    [
+        # a b + a c = a (b + c)
+        ([[(0, 1), (0, 2)]], 2),
+        # a b + a c + a d, a taken out once
+        ([[(0, 1), (0, 2), (0, 3)]], 3),
+        # a b c and a b d share a b
+        ([[(0, 1, 2)], [(0, 1, 3)]], 3),
+        # (a + b) + c and (a + c) + b are one
+        ([[(0,), (1,), (2,)], [(0,), (2,), (1,)]], 2),
+        # a + b + c and a + b + d share a + b
+        ([[(0,), (1,), (2,)], [(0,), (3,), (1,)]], 3),
+    ],
+)
+def test_the_laws_of_sums_and_products(terms, expected):
+    graph = Graph()
+    outputs = []
+    for total in terms:
+        value = ZERO
+        for factors in total:
+            product = graph.constant(1.0)
+            for factor in factors:
+                product = graph.multiply(product, graph.input(factor))
+            value = graph.add(value, product)
+        outputs.append(value)
+    target, changed = least(graph, outputs)
+    assert target.count(changed) == expected

@@ -1,0 +1,236 @@
+"""Formulations against plain recursion, and what they take."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from conftest import CONFIGS, MECHANISMS
+from oracles import textbook
+from trees import random_tree
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import FormulationError
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean import checking
+from paramreduce_cli.lean.choices import OPTIONS, Choice, alternatives, from_data, to_data
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.search import direct_outputs, formulations, inverse_outputs
+from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Formulations
+from paramreduce_cli.stages.build_model import build_model
+
+SEEDS = range(12)
+
+
+def random_choices(count, rng):
+    return [
+        Choice(**{name: values[rng.integers(len(values))] for name, values in OPTIONS.items()})
+        for _ in range(count)
+    ]
+
+
+def relative(values, expected):
+    got = np.column_stack([np.broadcast_to(value, expected.shape[0]) for value in values])
+    return np.abs(got - expected).max() / np.abs(expected).max()
+
+
+def compared(mechanism, choices, rng, samples=30):
+    """Errors of d and of [M | delta] against plain recursion, relative to the largest value."""
+    q, dq, ddq = rng.normal(size=(3, samples, mechanism.n_q))
+    phi = rng.normal(size=len(mechanism.parameter_names))
+    plain = Dynamics(mechanism, once=True)
+    A, B = plain.direct_regressor(q, dq)
+    inputs = [*np.tile(phi, (samples, 1)).T, *q.T, *dq.T, *ddq.T]
+    tree = lean_tree(mechanism)
+
+    def evaluated(build):
+        graph = Graph()
+        return Program.of_graph(graph, build(tree, choices, graph)).evaluated(inputs)
+
+    rows, columns = np.tril_indices(mechanism.n_q)
+    direct = np.hstack([(A @ phi)[:, rows, columns], B @ phi])
+    return (
+        relative(evaluated(inverse_outputs), plain.inverse(q, dq, ddq, phi)),
+        relative(evaluated(direct_outputs), direct),
+    )
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_any_choices_on_any_tree_are_the_same_dynamics(seed):
+    rng = np.random.default_rng(seed)
+    mechanism = random_tree(seed)
+    for _ in range(5):
+        choices = random_choices(mechanism.n_q, rng)
+        assert max(compared(mechanism, choices, rng)) < 1e-12
+
+
+@pytest.mark.parametrize("name", list(MECHANISMS))
+def test_any_choices_on_arms_are_the_same_dynamics(name):
+    rng = np.random.default_rng(1)
+    mechanism = MECHANISMS[name]()
+    for _ in range(10):
+        choices = random_choices(mechanism.n_q, rng)
+        assert max(compared(mechanism, choices, rng)) < 1e-12
+
+
+def test_choices_survive_being_written_down():
+    rng = np.random.default_rng(0)
+    for choice in random_choices(20, rng):
+        assert from_data(to_data(choice)) == choice
+
+
+def test_alternatives_differ_and_come_once():
+    joint = lean_tree(MECHANISMS["puma"]()).joints[2]
+    found = alternatives(Choice(), joint)
+    assert Choice() not in found
+    assert len(set(found)) == len(found)
+    assert Choice(aligned=True) in found
+
+
+def test_parallel_and_opposite_axes_are_found():
+    config = load_config(CONFIGS / "puma560.yaml")
+    joints = lean_tree(build_model(config).mechanism).joints
+    assert [joint.parallel for joint in joints] == [False, False, True, False, False, False]
+
+
+@pytest.fixture(scope="module")
+def puma():
+    return build_model(load_config(CONFIGS / "puma560.yaml"))
+
+
+@pytest.fixture(scope="module")
+def hexaglide():
+    return build_model(load_config(CONFIGS / "hexaglide.yaml"))
+
+
+PAPERS_PUMA = (
+    "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
+).split()
+PAPERS_HEXAGLIDE = (
+    "m_P Izz_P m_4 mz_1 m_5 mz_2 mz_6 m_3 mz_P mx_1 m_2 mz_4 m_6 Ixx_1 Iyy_P Ixx_P m_1"
+).split()
+FEW_OPERATIONS = (
+    "m_P mz_P Ixx_P Iyy_P Izz_P m_1 m_2 m_3 m_4 m_5 m_6 mz_1 Iyy_2 Iyy_5 Ixx_6 Iyy_6"
+).split()
+
+
+def counts(model, kept):
+    """d and [M | delta] of the leanest formulations."""
+    if isinstance(kept, list):
+        kept = np.sort([model.mechanism.parameter_names.index(name) for name in kept])
+    lean = LeanModels(model.mechanism, model.formulations)
+    return lean.inverse(kept).n_operations, lean.direct(kept).n_operations
+
+
+def test_operations_of_the_puma(puma):
+    for kept, inverse, direct in (
+        (np.flatnonzero(puma.affecting), 510, 580),
+        (np.sort(puma.base.columns), 450, 540),
+        (PAPERS_PUMA, 340, 435),
+    ):
+        found = counts(puma, kept)
+        assert found[0] <= inverse
+        assert found[1] <= direct
+
+
+def test_operations_of_the_hexaglide(hexaglide):
+    for kept, inverse, direct in (
+        (np.flatnonzero(hexaglide.affecting), 560, 520),
+        (np.sort(hexaglide.base.columns), 540, 500),
+        (PAPERS_HEXAGLIDE, 225, 205),
+        (FEW_OPERATIONS, 150, 140),
+    ):
+        found = counts(hexaglide, kept)
+        assert found[0] <= inverse
+        assert found[1] <= direct
+
+
+def test_any_subset_of_a_formulation_is_the_reduced_model(puma):
+    rng = np.random.default_rng(4)
+    mechanism = puma.mechanism
+    for n in (5, 15, 30):
+        kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
+        states = tuple(rng.normal(size=(3, 40, mechanism.n_q)))
+        checking.check_formulations(mechanism, puma.formulations, kept, states, rng)
+
+
+def test_a_wrong_formulation_is_an_error(puma, monkeypatch):
+    rng = np.random.default_rng(0)
+    states = tuple(rng.normal(size=(3, 10, 6)))
+    kept = np.flatnonzero(puma.affecting)
+    right = checking.Dynamics.inverse
+    monkeypatch.setattr(checking.Dynamics, "inverse", lambda self, *a: right(self, *a) * (1 + 1e-8))
+    with pytest.raises(FormulationError, match="off by 1"):
+        checking.check_formulations(puma.mechanism, puma.formulations, kept, states, rng)
+
+
+def test_tied_and_known_parameters_take_less(puma):
+    kept = np.flatnonzero(puma.affecting)
+    lean = LeanModels(puma.mechanism, puma.formulations)
+    whole = lean.inverse(kept).n_operations
+    same = {int(k): int(kept[5]) for k in kept[20:30]}
+    assert lean.inverse(kept, same=same).n_operations <= whole
+    values = {int(k): float(k) / 7 for k in kept}
+    assert lean.inverse(kept, constants=values).n_operations < whole
+
+
+def test_estimates_are_near_the_counts(puma):
+    rng = np.random.default_rng(2)
+    lean = LeanModels(puma.mechanism, puma.formulations)
+    for n in (6, 12, 18, 30, 45):
+        kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
+        count = lean.inverse(kept).n_operations
+        assert count <= lean.estimate(kept) <= 1.1 * count + 10
+
+
+@pytest.mark.parametrize("name", ["standard", "tree"])
+def test_lean_models_take_less_than_textbooks(name):
+    mechanism = MECHANISMS[name]()
+    everything = np.arange(len(mechanism.parameter_names))
+    dynamics = Dynamics(mechanism, once=True)
+    rng = np.random.default_rng(0)
+    K = dynamics.regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
+    affecting = np.abs(K).max(axis=(0, 1)) > 1e-9
+    kept = everything[affecting]
+    found = formulations(mechanism, affecting, kept)
+    lean = LeanModels(mechanism, found)
+    inverse, direct = textbook.count(mechanism, kept)
+    assert lean.inverse(kept).n_operations <= 0.85 * inverse
+    assert lean.direct(kept).n_operations <= 0.6 * direct
+
+
+def test_equal_branches_get_equal_choices(hexaglide):
+    names = [body.name for body in hexaglide.mechanism.bodies]
+    for some in (*hexaglide.formulations.inverse, *hexaglide.formulations.direct):
+        first = names.index("1")
+        for leg in range(2, 7):
+            assert some[names.index(str(leg))] == some[first]
+
+
+def test_the_search_repeats_itself(puma):
+    again = formulations(puma.mechanism, puma.affecting, puma.base.columns)
+    assert again == puma.formulations
+
+
+def test_unknown_choices_are_refused():
+    with pytest.raises(ValueError, match="nowhere"):
+        from_data({"mass": "nowhere"})
+
+
+def test_textbook_oracle_is_plain_recursion(puma):
+    mechanism = dataclasses.replace(puma.mechanism)
+    inverse, direct = textbook.count(mechanism, np.flatnonzero(puma.affecting))
+    plain = Dynamics(mechanism).count_operations(np.flatnonzero(puma.affecting))
+    assert plain[0] < inverse
+    assert plain[1] < direct
+
+
+def test_formulations_of_nothing_chosen_still_count():
+    mechanism = random_tree(3)
+    default = tuple(to_data(Choice()) for _ in range(mechanism.n_q))
+    lean = LeanModels(mechanism, Formulations((default,), (default,)))
+    kept = np.arange(len(mechanism.parameter_names))
+    assert lean.inverse(kept).n_operations > 0
+    assert lean.inverse(kept[:0]).n_operations == 0
