@@ -21,6 +21,9 @@ def random_tree(seed, n_joints=6):
             placement[:3, :3] = Rotation.from_euler(
                 "x", rng.integers(4) * 90, degrees=True
             ).as_matrix()
+        if rng.random() < 0.1:
+            tilt = 10.0 ** rng.uniform(-9, -3)
+            placement[:3, :3] = Rotation.from_euler("xy", [tilt, -tilt]).as_matrix()
         placement[:3, 3] = rng.normal(size=3) * (rng.random(3) < 0.6)
         kind = "revolute" if rng.random() < 0.7 else "prismatic"
         axis = tuple(float(x) for x in AXES[rng.integers(len(AXES))])

@@ -91,6 +91,7 @@ class _Writer:
             "test_batch_arguments": self.test_batch_arguments,
             "functions": [self.function(f) for f in model.functions],
             "closures": [self.function(f) for f in model.closures],
+            "waves": any(self.batched(f)["angles"] for f in model.functions),
             "cases": self.cases(),
             "n_cases": len(next(iter(model.cases.values()))),
             "tolerance": "1e-3f" if model.single else "1e-12",
@@ -212,7 +213,7 @@ class _Writer:
         """The body in parts: what depends on parameters alone, angles, and all the rest."""
         program = function.program
         names = self._leaves(function, batched=True)
-        states, angles = _dependence(function)
+        states, angles, needed = _dependence(function)
         once: list[str] = []
         before: list[str] = []
         rest: list[str] = []
@@ -222,6 +223,8 @@ class _Writer:
                 angle = node.operands[0] >> 1
                 row = waves.setdefault(angle, len(waves))
                 names[number] = f"{node.operation}_{row}[k]"
+                continue
+            if number not in needed:
                 continue
             line = self._expression(names, node.operation, node.operands)
             names[number] = f"t{number}"
@@ -257,21 +260,24 @@ class _Writer:
         }
 
 
-def _dependence(function: Function) -> tuple[list[bool], set[int]]:
-    """Which nodes depend on the state, and which operations the angles are made of."""
+def _dependence(function: Function) -> tuple[list[bool], set[int], set[int]]:
+    """Which nodes depend on the state, which ones the angles are made of, which all the rest."""
     places = function.places(function.arguments)
+    nodes = function.program.nodes
     states: list[bool] = []
-    angles: set[int] = set()
-    for node in function.program.nodes:
+    for node in nodes:
         if node.operation == "input":
             states.append(places[int(node.number)][0].name != "phi")
         else:
             states.append(any(states[value >> 1] for value in node.operands))
-    for node in reversed(function.program.nodes):
-        if node.operation in ("sin", "cos"):
-            angles.add(node.operands[0] >> 1)
-    for number in range(len(function.program.nodes) - 1, -1, -1):
-        if number in angles:
-            angles |= {value >> 1 for value in function.program.nodes[number].operands}
-    kept = {n for n in angles if function.program.nodes[n].operation not in ("constant", "input")}
-    return states, kept
+    angles: set[int] = set()
+    needed = {value >> 1 for value in function.program.outputs}
+    for number in range(len(nodes) - 1, -1, -1):
+        below = {value >> 1 for value in nodes[number].operands}
+        if nodes[number].operation in ("sin", "cos") and states[number]:
+            angles |= below
+        else:
+            angles |= below if number in angles else set()
+            needed |= below if number in needed else set()
+    operations = {number for number, _ in function.steps()}
+    return states, angles & operations, needed

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import keyword
 import re
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -60,10 +62,25 @@ class ExportedModel:
         return {array.name: array for array in arrays}
 
 
+_TAKEN = {
+    "numpy",
+    "all",
+    "clean",
+    "edit_cache",
+    "help",
+    "install",
+    "package",
+    "rebuild_cache",
+    "test",
+}
+"""Names of files and targets that exported code itself uses."""
+
+
 def identifier(name: str) -> str:
-    """A name that every language takes for an identifier."""
+    """A name that every language takes for an identifier, and that means nothing else there."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    return word if re.match(r"[A-Za-z]", word) else f"robot_{word}"
+    taken = keyword.iskeyword(word) or word in _TAKEN or word in sys.stdlib_module_names
+    return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"
 
 
 def plain(text: str) -> str:

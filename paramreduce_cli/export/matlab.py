@@ -181,7 +181,7 @@ def _test(model: ExportedModel) -> str:
         "",
         "function bad = differs(what, got, expected, all)",
         "off = max(abs(got(:) - expected(:))) / max([max(abs(all(:))), 1e-300]);",
-        "bad = ~(off <= 1e-12);",
+        "bad = ~(off <= 1e-12) || any(isnan(got(:)));",
         "if bad",
         "  fprintf('FAIL %s: off by %.1e\\n', what, off);",
         "end",

@@ -7,6 +7,7 @@ computed once [Breuer1969], and all is put together again. Results differ by rou
 
 from __future__ import annotations
 
+import heapq
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
@@ -167,10 +168,15 @@ def _share_pairs(terms: _Terms, table: dict[int, list[int]]) -> None:
     for number, values in table.items():
         for pair in _pairs(values):
             where[pair].add(number)
-    while where:
-        pair, owners = min(where.items(), key=lambda item: (-len(item[1]), item[0]))
-        if len(owners) < _MORE_THAN_ONE:
-            break
+    heap = [(-len(owners), pair) for pair, owners in where.items() if len(owners) > 1]
+    heapq.heapify(heap)
+    while heap:
+        count, pair = heapq.heappop(heap)
+        owners = where[pair]
+        if len(owners) != -count:
+            if len(owners) > 1:
+                heapq.heappush(heap, (-len(owners), pair))
+            continue
         whole = min((n for n in owners if len(table[n]) == len(pair)), default=None)
         shared = terms.new(table, list(pair)) if whole is None else 2 * whole
         sign = 0 if whole is None else min(table[whole]) & 1
@@ -184,11 +190,8 @@ def _share_pairs(terms: _Terms, table: dict[int, list[int]]) -> None:
             values.append(shared ^ sign ^ flip)
             for new in _pairs(values):
                 where[new].add(number)
-        if whole is None:
-            where[pair].add(shared >> 1)
-        # Once taken, a pair is not taken again.
-        if len(where[pair]) < _MORE_THAN_ONE:
-            del where[pair]
+                if len(where[new]) > 1:
+                    heapq.heappush(heap, (-len(where[new]), new))
 
 
 def _take_pair(values: list[int], pair: tuple[int, int]) -> int:
@@ -210,26 +213,38 @@ class _Assembly:
         self._built: dict[int, int] = {}
 
     def built(self, values: Sequence[int]) -> list[int]:
-        """The values in the target graph."""
-        return [self._value(value) for value in values]
+        """The values in the target graph, operands before what uses them."""
+        pending = [value >> 1 for value in reversed(values)]
+        while pending:
+            number = pending[-1]
+            missing = [v >> 1 for v in self._operands(number) if v >> 1 not in self._built]
+            if missing and number not in self._built:
+                pending += reversed(missing)
+                continue
+            pending.pop()
+            if number not in self._built:
+                self._built[number] = self._number(number)
+        return self._known(values)
 
-    def _value(self, value: int) -> int:
-        number = value >> 1
-        if number not in self._built:
-            self._built[number] = self._number(number)
-        return self._target.negate(self._built[number]) if value & 1 else self._built[number]
+    def _known(self, values: Sequence[int]) -> list[int]:
+        negate, built = self._target.negate, self._built
+        return [negate(built[v >> 1]) if v & 1 else built[v >> 1] for v in values]
+
+    def _operands(self, number: int) -> Sequence[int]:
+        terms = self._terms.sums.get(number) or self._terms.products.get(number)
+        return terms or self._source.nodes[number].operands
 
     def _number(self, number: int) -> int:
         graph = self._target
         for table, join in ((self._terms.sums, graph.add), (self._terms.products, graph.multiply)):
             if number in table:
-                return _joined(self.built(table[number]), join)
+                return _joined(self._known(table[number]), join)
         node = self._source.nodes[number]
         if node.operation == "constant":
             return graph.constant(node.number)
         if node.operation == "input":
             return graph.input(int(node.number))
-        return graph.call(node.operation, *self.built(node.operands))
+        return graph.call(node.operation, *self._known(node.operands))
 
 
 def _joined(values: list[int], join: Callable[[int, int], int]) -> int:

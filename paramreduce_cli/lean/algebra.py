@@ -75,8 +75,3 @@ def cross(a: Vector, b: Vector) -> Vector:
         a[2] * b[0] - a[0] * b[2],
         a[0] * b[1] - a[1] * b[0],
     )
-
-
-def is_zero(a: Vector) -> bool:
-    """Whether all components are the constant zero."""
-    return not (a[0] or a[1] or a[2])

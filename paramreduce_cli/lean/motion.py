@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from paramreduce_cli.lean.algebra import Scalar, Vector, add, dot
+from paramreduce_cli.lean.algebra import Scalar, Vector, dot
 from paramreduce_cli.lean.turns import ConstantTurn, Turn
 
 
@@ -181,10 +181,3 @@ def slide(frame: Motion, speed: Scalar, acceleration: Scalar) -> Vector:
     """Acceleration that sliding along z of a moving frame adds."""
     twice = 2 * speed
     return (twice * frame.omega[1], -(twice * frame.omega[0]), acceleration)
-
-
-def total(a: Vector, *others: Vector) -> Vector:
-    """The sum of vectors."""
-    for other in others:
-        a = add(a, other)
-    return a

@@ -63,10 +63,11 @@ def lean_tree(mechanism: Mechanism) -> Tree:
         before = None if body.parent == BASE else joints[body.parent]
         placed = body.before if before is None else before.described @ body.before
         turn, after, sign = _exact(placed[:3, :3]), body.after.copy(), 1
-        if before is not None and turn[2, 2] == -1.0:
+        parallel = before is not None and not _tilts(turn)
+        if parallel and turn[2, 2] < 0:
             turn, sign = turn @ _FLIP, -1
             after[:3] = _FLIP @ after[:3]
-        offset, parallel = sign * body.offset, before is not None and turn[2, 2] == 1.0
+        offset = sign * body.offset
         if body.joint == "revolute" and before is not None:
             turn, angle = _without_turn_about_z(turn)
             offset += angle
@@ -95,15 +96,20 @@ def _exact(rotation: FloatArray) -> FloatArray:
     return np.where(np.abs(rotation - nearest) < _EXACT, nearest, rotation)
 
 
+def _tilts(rotation: FloatArray) -> bool:
+    """Whether a rotation moves the z axis, however little: the cosine alone would not show it."""
+    return bool(np.any(rotation[[2, 2, 0, 1], [0, 1, 2, 2]]))
+
+
 def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
     """Split off the angle of a turn about z that comes first, if it is in the way.
 
     Turns by quarters cost nothing where they are; others, about other axes, need fewer products
     without.
     """
-    if np.all((turn == 0) | (np.abs(turn) == 1)) and turn[2, 2] != 1.0:
+    if np.all((turn == 0) | (np.abs(turn) == 1)) and _tilts(turn):
         return turn, 0.0
-    if abs(turn[2, 2]) == 1.0:
+    if not _tilts(turn):
         angle = float(np.arctan2(turn[1, 0], turn[0, 0]))
     else:
         angle = float(np.arctan2(turn[2, 0], turn[2, 1]))

@@ -12,6 +12,8 @@ from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.records import FloatArray
 
 _QUARTER_TOLERANCE = 1e-14
+_SLIGHT = 1e-3
+"""Sine of a tilt below which rounding would show in the angles of the turns before and after it."""
 
 
 @dataclass(frozen=True)
@@ -76,26 +78,40 @@ class ConstantTurn:
             Turn(*(Scalar(graph, graph.constant(x)) for x in cs)) for cs in _euler(rotation)
         ]
         self.is_permutation = bool(np.all((rotation == 0) | (np.abs(rotation) == 1)))
+        self._slight = 0 < float(np.hypot(rotation[2, 0], rotation[2, 1])) < _SLIGHT
 
     def out(self, a: Vector) -> Vector:
         """C a"""
-        if self.is_permutation:
+        if self.is_permutation or self._slight:
             return _product(self._rows, a)
         first, middle, last = self._turns
         return last.out(_rolled(middle.out(_unrolled(first.out(a)))))
 
     def back(self, a: Vector) -> Vector:
         """C' a"""
-        if self.is_permutation:
+        if self.is_permutation or self._slight:
             return _product(self._columns, a)
         first, middle, last = self._turns
         return first.back(_rolled(middle.back(_unrolled(last.back(a)))))
 
     def inertia(self, body: Inertia) -> Inertia:
         """C I C', with the first moments."""
+        if self._slight:
+            return self._multiplied(body)
         first, middle, last = self._turns
         turned = last.inertia(middle.inertia(first.inertia(body).cycled()).cycled().cycled())
         return turned.with_moment(self.out(body.d))
+
+    def _multiplied(self, body: Inertia) -> Inertia:
+        """C I C' without the angles of C."""
+        tensor: list[Vector] = [
+            (body.xx, body.xy, body.xz),
+            (body.xy, body.yy, body.yz),
+            (body.xz, body.yz, body.zz),
+        ]
+        half = [self.out(row) for row in tensor]
+        x, y, z = (self.out((half[0][k], half[1][k], half[2][k])) for k in range(3))
+        return Inertia(body.m, self.out(body.d), x[0], x[1], x[2], y[1], y[2], z[2])
 
     def pattern(self) -> list[tuple[int, int]]:
         """Of a permutation C: for each axis before, which axis of C's columns it is, and its sign."""

@@ -8,14 +8,14 @@ import rich.box
 import rich.console
 import rich.table
 
-from tests.benchmarks import gradients, memory, selection
+from tests.benchmarks import gradients, lean_code, memory, selection
 
 
 def main():
     table = rich.table.Table(title="Ratios, all measured in this run", box=rich.box.SIMPLE)
     for heading in ("what", "ratio", "at most", ""):
         table.add_column(heading)
-    for benchmark in (selection, gradients, memory):
+    for benchmark in (selection, gradients, memory, lean_code):
         for what, ratio, limit in benchmark.rows():
             shown = f"{ratio:.3f}" if ratio > 0.01 else f"1/{1 / ratio:.0f}"
             most = f"{limit:g}" if limit >= 1 else f"1/{1 / limit:.0f}"

@@ -105,15 +105,63 @@ def hexaglide():
     return build_model(load_config(CONFIGS / "hexaglide.yaml"))
 
 
-PAPERS_PUMA = (
-    "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
-).split()
-PAPERS_HEXAGLIDE = (
-    "m_P Izz_P m_4 mz_1 m_5 mz_2 mz_6 m_3 mz_P mx_1 m_2 mz_4 m_6 Ixx_1 Iyy_P Ixx_P m_1"
-).split()
-FEW_OPERATIONS = (
-    "m_P mz_P Ixx_P Iyy_P Izz_P m_1 m_2 m_3 m_4 m_5 m_6 mz_1 Iyy_2 Iyy_5 Ixx_6 Iyy_6"
-).split()
+PAPERS_PUMA = [
+    "m_3",
+    "Izz_5",
+    "Izz_3",
+    "my_6",
+    "mx_6",
+    "my_5",
+    "mx_2",
+    "my_4",
+    "Izz_4",
+    "my_3",
+    "Izz_6",
+    "Ixx_3",
+    "Ixz_2",
+    "mx_4",
+    "Ixx_4",
+    "mx_5",
+    "Iyy_3",
+    "my_2",
+]
+PAPERS_HEXAGLIDE = [
+    "m_P",
+    "Izz_P",
+    "m_4",
+    "mz_1",
+    "m_5",
+    "mz_2",
+    "mz_6",
+    "m_3",
+    "mz_P",
+    "mx_1",
+    "m_2",
+    "mz_4",
+    "m_6",
+    "Ixx_1",
+    "Iyy_P",
+    "Ixx_P",
+    "m_1",
+]
+FEW_OPERATIONS = [
+    "m_P",
+    "mz_P",
+    "Ixx_P",
+    "Iyy_P",
+    "Izz_P",
+    "m_1",
+    "m_2",
+    "m_3",
+    "m_4",
+    "m_5",
+    "m_6",
+    "mz_1",
+    "Iyy_2",
+    "Iyy_5",
+    "Ixx_6",
+    "Iyy_6",
+]
 
 
 def counts(model, kept):

@@ -86,9 +86,14 @@ def test_summary_holds_what_a_regression_job_compares(summary):
         assert row["n"] == 4
         assert {"estimation", "validation"} <= set(row["torque_error"])
         assert {"estimation", "validation"} <= set(row["acceleration_error"])
-        assert {"inverse", "direct", "inverse_paper_rule", "direct_paper_rule"} == set(
-            row["operations"]
-        )
+        assert {
+            "inverse",
+            "direct",
+            "inverse_plain",
+            "direct_plain",
+            "inverse_paper_rule",
+            "direct_paper_rule",
+        } == set(row["operations"])
 
 
 def test_summary_agrees_with_the_samples(summary, two_link_results):

@@ -1,0 +1,144 @@
+"""Exported models of the PUMA 560 against Pinocchio's algorithms, called from C++.
+
+The driver takes minutes to compile, so it is kept in the user's cache under a digest of all that
+goes into it. Eigen and Pinocchio's headers come with their wheels.
+"""
+
+import dataclasses
+import hashlib
+import os
+import shutil
+import subprocess
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.records import PARAMETER_KINDS
+from paramreduce_cli.stages.build_model import build_model
+from paramreduce_cli.stages.export import Chosen, chosen_model, export
+
+ROOT = Path(__file__).resolve().parents[2]
+DRIVER = Path(__file__).with_suffix(".cpp")
+FLAGS = ["-O3", "-march=native", "-DNDEBUG"]
+DEFINITIONS = [
+    "BOOST_MPL_LIMIT_LIST_SIZE=30",
+    "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
+    "BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
+    "BOOST_FUSION_INVOKE_MAX_ARITY=12",
+]
+"""Of Pinocchio's headers, as its CMake targets say."""
+FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
+DYNAMIC = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+"""Pinocchio's order."""
+
+
+def sources():
+    """All files of the driver, by name."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParamreduceWarning)
+        model = build_model(load_config(ROOT / "configs" / "puma560.yaml"))
+    names = model.mechanism.parameter_names
+    kept = [names.index(name) for name in FS_18.split()]
+    some = tuple(names[k] for k in kept)
+    expansion = np.eye(len(names))[:, kept]
+    chosen = {
+        "full": chosen_model("full", model, None, None),
+        "base": chosen_model("base", model, None, None),
+        "fs18": Chosen("the paper's FS-18", some, model.values[kept], some, expansion),
+    }
+    files = {"lean_code.cpp": DRIVER.read_bytes(), "arm.h": arm(model).encode()}
+    for name, one in chosen.items():
+        for what, robot in (("both", name), ("regressor", f"{name}_K")):
+            mechanism = dataclasses.replace(model.mechanism, robot=robot)
+            named = dataclasses.replace(model, mechanism=mechanism)
+            made = export(named, one, kind="c", what=what, constant=False, single=False)
+            files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
+    return files
+
+
+def arm(model):
+    """The arm's numbers for Pinocchio's model."""
+
+    def listed(values):
+        if isinstance(values, list):
+            return "{" + ", ".join(map(listed, values)) + "}"
+        return repr(float(values))
+
+    bodies = model.mechanism.bodies
+    places = [body.before[:3].tolist() for body in bodies]
+    table = model.values.reshape(len(bodies), len(PARAMETER_KINDS))
+    inertias = [[row[PARAMETER_KINDS.index(kind)] for kind in DYNAMIC] for row in table]
+    return (
+        f"static const double gravity[3] = {listed(model.mechanism.gravity.tolist())};\n"
+        f"static const double places[6][3][4] = {listed(places)};\n"
+        f"static const double inertias[6][10] = {listed(inertias)};\n"
+    )
+
+
+def headers():
+    """Folders of Pinocchio's and Eigen's headers."""
+    import pinocchio
+
+    prefix = next(p for p in Path(pinocchio.__file__).parents if p.name == "cmeel.prefix")
+    return [prefix / "include", prefix / "include" / "eigen3"]
+
+
+def driver():
+    """The compiled driver."""
+    files = sources()
+    digest = hashlib.sha256()
+    for name, content in sorted(files.items()):
+        digest.update(name.encode() + content)
+    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "paramreduce"
+    folder = cache / "benchmark" / digest.hexdigest()[:16]
+    program = folder / "lean_code"
+    if program.exists():
+        return program
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+    objects = []
+    for name in sorted(files):
+        if name.endswith(".c"):
+            command = ["gcc", "-std=gnu99", *FLAGS, "-c", name, "-o", f"{name}.o"]
+            subprocess.run(command, cwd=folder, check=True)
+            objects.append(f"{name}.o")
+    includes = [f"-I{path}" for path in headers()]
+    defined = [f"-D{one}" for one in DEFINITIONS]
+    command = ["g++", "-std=c++17", "-w", *FLAGS, *defined, *includes, "lean_code.cpp", *objects]
+    subprocess.run([*command, "-o", "building", "-lm"], cwd=folder, check=True)
+    (folder / "building").rename(program)
+    return program
+
+
+def measured():
+    """Nanoseconds a state by name."""
+    lines = subprocess.run([driver()], capture_output=True, text=True, check=True).stdout
+    return {name: float(value) for name, value in map(str.split, lines.splitlines())}
+
+
+def rows():
+    if shutil.which("gcc") is None or shutil.which("g++") is None:
+        print("lean code: left out, gcc and g++ are not installed")
+        return
+    t = measured()
+    if not t["difference"] < 1e-9:
+        raise SystemExit(f"Pinocchio and the exported model differ by {t['difference']}")
+    for name in ("full", "base", "fs18"):
+        at_most = 1 / 6 if name == "fs18" else 1 / 4
+        yield f"{name} d / rnea", t[f"{name}_idm"] / t["rnea"], at_most
+        at_most = 1 / 8 if name == "fs18" else 1 / 6
+        yield f"{name} [M, delta] / crba + bias", t[f"{name}_ddm"] / t["crba_bias"], at_most
+        yield f"{name} [M, delta] / aba", t[f"{name}_ddm"] / t["aba"], 1.0
+        yield f"{name} regressor / Pinocchio's", t[f"{name}_regressor"] / t["regressor"], 1.0
+        for kind, what in (("idm", "d"), ("ddm", "[M, delta]")):
+            ratio = t[f"{name}_{kind}_batch"] / t[f"{name}_{kind}"]
+            yield f"{name} {what}, batched / single", ratio, 1 / 3
+
+
+if __name__ == "__main__":
+    for key, value in measured().items():
+        print(key, value)
