@@ -374,6 +374,17 @@ class ValidationSection(Section):
     """Estimation and validation errors are said to part where one is this much larger than the other."""
 
 
+class TrackingSection(Section):
+    """Computed-torque control with the full and with the selected model, in simulation."""
+
+    bandwidth: Positive = 20.0
+    """Of the feedback, critically damped, rad/s."""
+    control_period: Positive = 0.001
+    """Time between two torques, s."""
+    moves: Annotated[int, Field(ge=1, le=20)] = 4
+    """How many moves from rest to rest the arm makes."""
+
+
 class ReportSection(Section):
     """What the report looks like."""
 
@@ -385,6 +396,8 @@ class ReportSection(Section):
         "png",
     ]
     """File formats of the figures."""
+    tracking: TrackingSection | None = None
+    """Whether control with the exported models is demonstrated, for open trees."""
     poses: Annotated[list[PerJoint], Field(min_length=1)] | None = None
     """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
 

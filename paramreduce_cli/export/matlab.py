@@ -94,7 +94,16 @@ q({z}) = z;
 for step = 1:50
   [Phi, Phi_d] = {name}_closure(q);
   change = Phi_d \\ Phi;
-  q({d}) = q({d}) - change;
+  share = 1;
+  for halved = 0:10
+    trial = q;
+    trial({d}) = q({d}) - share * change;
+    if norm({name}_closure(trial)) <= norm(Phi) || max(abs(change)) < 1e-6
+      break;
+    end
+    share = share / 2;
+  end
+  q = trial;
   if max(abs(change)) < 1e-12
     return;
   end

@@ -123,8 +123,21 @@ def positions(z, guess):
     q[..., _INDEPENDENT] = z
     for _ in range(50):
         gap, jacobian = _closure(q)
-        step = np.linalg.solve(jacobian, gap[..., None])[..., 0]
-        q[..., _DEPENDENT] -= step
+        before = np.sum(gap**2, axis=-1)
+        try:
+            step = np.linalg.solve(jacobian, gap[..., None])[..., 0]
+        except np.linalg.LinAlgError as error:
+            raise ValueError("singular: the loops cannot be closed from this guess") from error
+        near = np.max(np.abs(step), axis=-1) < 1e-6
+        share = np.ones(shape[:-1])
+        for _ in range(10):
+            trial = q.copy()
+            trial[..., _DEPENDENT] -= share[..., None] * step
+            worse = (np.sum(_closure(trial)[0] ** 2, axis=-1) > before) & ~near
+            if not np.any(worse):
+                break
+            share = np.where(worse, share / 2, share)
+        q = trial
         if np.max(np.abs(step)) < 1e-12:
             return q
     raise ValueError("the loops cannot be closed from this guess")

@@ -66,7 +66,7 @@ class BatchFunction:
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
         self._out_sizes = [x.numel() for x in outputs]
-        self._library = None if once else _load(self._function)
+        self._library = None if once else load(_c_text(self._function))
 
     def __call__(self, *arrays: FloatArray) -> list[FloatArray]:
         """Evaluate.
@@ -149,13 +149,21 @@ def _folder_of_this_process() -> Path:
     return Path(_temporary_folder().name)
 
 
-def _load(function: ca.Function) -> ctypes.CDLL | None:
+def load(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL | None:
+    """Compile C text to a library, or take it from the cache.
+
+    Args:
+        text: All of it.
+        flags: Of the compiler.
+
+    Returns:
+        The library; None without a compiler, or if it fails.
+    """
     cc = compiler()
     if cc is None:
         return None
-    text = _c_text(function)
     digest = hashlib.sha256(
-        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
+        "\n".join([text, *cc, *flags, ca.CasadiMeta.version()]).encode()
     ).hexdigest()
     try:
         folder = cache_folder()
@@ -169,7 +177,7 @@ def _load(function: ca.Function) -> ctypes.CDLL | None:
                 return ctypes.CDLL(str(library))
             except OSError:
                 library.unlink(missing_ok=True)  # damaged: compile it again
-        _compile(cc, text, library)
+        _compile([*cc, *flags], text, library)
         return ctypes.CDLL(str(library))
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)
@@ -194,14 +202,14 @@ def _c_text(function: ca.Function) -> str:
     return generator.dump() + loop
 
 
-def _compile(cc: tuple[str, ...], text: str, library: Path) -> None:
+def _compile(command: list[str], text: str, library: Path) -> None:
     """Compile beside the target and rename, so that parallel runs never load half a file."""
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         source = Path(folder, "kernel.c")
         source.write_text(text)
         built = Path(folder, "kernel.so")
         subprocess.run(
-            [*cc, *_FLAGS, str(source), "-o", str(built), "-lm"],
+            [*command, str(source), "-o", str(built), "-lm"],
             check=True,
             capture_output=True,
             text=True,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import casadi as ca
-import numpy as np
 
 from paramreduce_cli.expressions.factoring import least
 from paramreduce_cli.expressions.functions import Argument, Function
@@ -26,7 +25,8 @@ class LeanFunctions:
         formulations: Of its dynamics.
         kept: Standard parameters that are not zero, ascending.
         owner: For each of them the position of its value in ``phi``.
-        values: The values in ``phi`` if they are to be constants.
+        values: The values in ``phi``.
+        constant: Whether they are part of the functions.
     """
 
     def __init__(
@@ -35,13 +35,15 @@ class LeanFunctions:
         formulations: Formulations,
         kept: IntArray,
         owner: IntArray,
-        values: tuple[float, ...] | None = None,
+        values: tuple[float, ...],
+        *,
+        constant: bool = False,
     ) -> None:
         self._mechanism = mechanism
         self._models = LeanModels(mechanism, formulations, independent=True)
         self._kept, self._owner = kept, owner
-        self._values = values
-        self._n_values = int(owner.max(initial=-1)) + 1
+        self._values = values if constant else None
+        self._n_values = len(values)
         loops = mechanism.loops is not None
         q, z = mechanism.n_q, mechanism.n_dof
         d = q - z
@@ -120,8 +122,7 @@ class LeanFunctions:
     ) -> Function:
         constants = _NO_VALUES
         if self._values is not None:
-            leaders = self._leaders()
-            constants = {leaders[j]: value for j, value in enumerate(self._values)}
+            constants = {leader: self._values[j] for j, leader in self._leaders().items()}
         program = model(self._kept, same=self._ties(), constants=constants)
         owner = dict(zip(self._kept.tolist(), self._owner.tolist(), strict=True))
         start, n = self._models.n_parameters, self._n_values
@@ -141,9 +142,12 @@ class LeanFunctions:
             )
         )
 
-    def _leaders(self) -> list[int]:
-        """The first standard parameter of every value."""
-        return [int(self._kept[np.argmax(self._owner == j)]) for j in range(self._n_values)]
+    def _leaders(self) -> dict[int, int]:
+        """The first standard parameter of every value that has any."""
+        result: dict[int, int] = {}
+        for parameter, value in zip(self._kept.tolist(), self._owner.tolist(), strict=True):
+            result.setdefault(value, parameter)
+        return result
 
     def _ties(self) -> dict[int, int]:
         leaders = self._leaders()

@@ -16,13 +16,44 @@ from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
-from paramreduce_cli.records import Formulations, IntArray, Mechanism
+from paramreduce_cli.records import BoolArray, Formulations, IntArray, Mechanism
 
 if TYPE_CHECKING:
     from paramreduce_cli.expressions.live import LiveCount
 
 _NOTHING: Mapping[int, int] = MappingProxyType({})
 _NO_VALUES: Mapping[int, float] = MappingProxyType({})
+_NEAR = 1.03
+"""Estimates further apart than that are not the wrong way round."""
+
+
+class _Variants:
+    """The same model in all formulations.
+
+    Args:
+        programs: One of each.
+    """
+
+    def __init__(self, programs: list[Program]) -> None:
+        self._programs = programs
+
+    @cached_property
+    def _counts(self) -> list[LiveCount]:
+        from paramreduce_cli.expressions.live import LiveCount  # Numba is slow to load
+
+        return [LiveCount(program) for program in self._programs]
+
+    def estimates(self, zero: BoolArray) -> list[int]:
+        """Operations of each, nearly, with some parameters zero."""
+        return [count(zero) for count in self._counts]
+
+    def promising(self, zero: BoolArray) -> list[Program]:
+        """Those that may turn out to be the leanest."""
+        if len(self._programs) == 1:
+            return self._programs
+        estimates = self.estimates(zero)
+        most = _NEAR * min(estimates)
+        return [p for p, count in zip(self._programs, estimates, strict=True) if count <= most]
 
 
 class LeanModels:
@@ -48,28 +79,28 @@ class LeanModels:
         self.n_parameters = len(mechanism.parameter_names)
 
     @cached_property
-    def _inverse(self) -> list[Program]:
-        return self._programs(
+    def _inverse(self) -> _Variants:
+        return self._variants(
             projected_inverse(self._mechanism) if self._projected else inverse_outputs,
             self._formulations.inverse,
         )
 
     @cached_property
-    def _direct(self) -> list[Program]:
-        return self._programs(
+    def _direct(self) -> _Variants:
+        return self._variants(
             projected_direct(self._mechanism) if self._projected else direct_outputs,
             self._formulations.direct,
         )
 
-    def _programs(
+    def _variants(
         self, build: Build, choices: tuple[tuple[Mapping[str, str | bool], ...], ...]
-    ) -> list[Program]:
-        result = []
+    ) -> _Variants:
+        programs = []
         for some in choices:
             graph = Graph()
             outputs = build(self._tree, [from_data(data) for data in some], graph, ())
-            result.append(Program.of_graph(graph, outputs))
-        return result
+            programs.append(Program.of_graph(graph, outputs))
+        return _Variants(programs)
 
     def inverse(
         self,
@@ -109,19 +140,16 @@ class LeanModels:
         Args:
             kept: Indices of the parameters that are not zero.
         """
+        return min(self._inverse.estimates(self._dropped(kept)))
+
+    def _dropped(self, kept: IntArray) -> BoolArray:
         zero = np.ones(self.n_parameters, dtype=np.bool_)
         zero[kept] = False
-        return min(count(zero) for count in self._live_counts)
-
-    @cached_property
-    def _live_counts(self) -> list[LiveCount]:
-        from paramreduce_cli.expressions.live import LiveCount
-
-        return [LiveCount(program) for program in self._inverse]
+        return zero
 
     def _leanest(
         self,
-        programs: list[Program],
+        variants: _Variants,
         kept: IntArray,
         same: Mapping[int, int],
         constants: Mapping[int, float],
@@ -129,7 +157,7 @@ class LeanModels:
         """The formulation with the fewest operations, its sums and products rearranged."""
         left = frozenset(kept.tolist())
         candidates = []
-        for program in programs:
+        for program in variants.promising(self._dropped(kept)):
             graph = Graph()
 
             def substitute(position: int, graph: Graph = graph) -> int:

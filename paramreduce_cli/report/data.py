@@ -15,6 +15,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
+from paramreduce_cli.report.tracking import Tracking
 
 
 @dataclass(frozen=True)
@@ -69,6 +70,8 @@ class ReportData:
     validation: Validation
     motion: Motion
     skeletons: tuple[Skeleton, ...]
+    tracking: Tracking | None
+    """Where it was asked for."""
 
 
 def first_motion(

@@ -363,6 +363,37 @@ def operations(data: ReportData) -> Figure:
     return drawn
 
 
+@figure("tracking")
+def tracking(data: ReportData) -> Figure:
+    """Computed-torque control on a path that is in neither set: how far each joint is off with the full and with the selected model in the controller, and what one evaluation of the exported model takes."""
+    result = data.tracking
+    assert result is not None
+    drawn = Figure(figsize=(8.4, 4.6))
+    top, *below = drawn.subplots(
+        1 + len(result.errors), 1, sharex=True, height_ratios=[1.2] + [1] * len(result.errors)
+    )
+    for j in range(result.path.z.shape[1]):
+        colour = _JOINT_COLOURS[j % len(_JOINT_COLOURS)]
+        label = _joint_label(data, j)
+        top.plot(result.path.time, result.path.z[:, j], color=colour, label=label)
+        for axes, errors in zip(below, result.errors.values(), strict=True):
+            axes.plot(result.path.time, 1e3 * errors[:, j], color=colour, linewidth=1.0)
+    top.set_ylabel("path, rad or m")
+    _legend_beside(top)
+    for axes, (name, errors) in zip(below, result.errors.items(), strict=True):
+        rms = 1e3 * float(np.sqrt(np.mean(errors**2)))
+        spent = 1e9 * result.seconds[name]
+        axes.set_ylabel("off, mrad or mm")
+        axes.set_title(
+            f"{name}: {rms:.3g} mrad rms, at most {1e3 * float(np.abs(errors).max()):.3g}; "
+            f"{spent:.3g} ns a step in {result.language}",
+            fontsize=9.5,
+            loc="left",
+        )
+    below[-1].set_xlabel("time, s")
+    return drawn
+
+
 @figure("error-vs-operations")
 def error_vs_operations(data: ReportData) -> Figure:
     """Torque error on the estimation set against the operations it costs."""

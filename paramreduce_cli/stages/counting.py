@@ -81,10 +81,24 @@ def kept_and_tied(model: Model, expansion: FloatArray) -> tuple[IntArray, Mappin
 
     Args:
         model: Says which parameters change the torques at all.
-        expansion: Standard parameters from the values kept, (n_standard, n).
+        expansion: Standard parameters from the values kept, ones and zeros, (n_standard, n).
+    """
+    kept, owner = kept_and_owner(model, expansion)
+    first: dict[int, int] = {}
+    for k, value in zip(kept.tolist(), owner.tolist(), strict=True):
+        first.setdefault(value, k)
+    pairs = zip(kept.tolist(), owner.tolist(), strict=True)
+    return kept, {k: first[value] for k, value in pairs if first[value] != k}
+
+
+def kept_and_owner(model: Model, expansion: FloatArray) -> tuple[IntArray, IntArray]:
+    """Parameters that are not zero, and the column of the expansion that each is the value of.
+
+    Args:
+        model: Says which parameters change the torques at all.
+        expansion: Standard parameters from the values kept, ones and zeros, (n_standard, n).
     """
     kept = np.flatnonzero(expansion.any(axis=1) & model.affecting)
-    first = np.argmax(expansion != 0, axis=0)
-    owner = first[np.argmax(expansion[kept] != 0, axis=1)]
-    same = {int(k): int(other) for k, other in zip(kept, owner, strict=True) if k != other}
-    return kept, same
+    if expansion.shape[1] == 0:
+        return kept, kept
+    return kept, np.argmax(expansion[kept] != 0, axis=1).astype(np.int64)

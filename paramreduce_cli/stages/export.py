@@ -16,8 +16,9 @@ from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.multibody.relations import approximate_expressions
-from paramreduce_cli.records import FloatArray, IntArray, Model, Reduction, Validation
+from paramreduce_cli.records import FloatArray, Model, Reduction, Validation
 from paramreduce_cli.registry import exporter
+from paramreduce_cli.stages.counting import kept_and_owner
 
 WHAT = {
     "idm": ("inverse",),
@@ -130,15 +131,7 @@ def export(
         FormulationError: The functions do not compute what the straightforward model does.
     """
     mechanism = model.mechanism
-    kept, owner = _kept(model, chosen)
-    lean = LeanFunctions(
-        mechanism,
-        model.formulations,
-        kept,
-        owner,
-        tuple(float(v) for v in chosen.values) if constant else None,
-    )
-    functions = tuple(getattr(lean, name)() for name in WHAT[what])
+    functions = exported_functions(model, chosen, what, constant=constant)
     rng = np.random.default_rng(0)
     check(functions, cases(model, chosen, _CHECKED, rng))
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
@@ -161,7 +154,9 @@ def export(
         ),
         constant=constant,
         functions=functions,
-        closures=tuple(lean.closures()) if mechanism.loops is not None else (),
+        closures=tuple(_functions_of(model, chosen, constant=constant).closures())
+        if mechanism.loops is not None
+        else (),
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
     )
@@ -169,10 +164,27 @@ def export(
     return files
 
 
-def _kept(model: Model, chosen: Chosen) -> tuple[IntArray, IntArray]:
-    """Standard parameters that are not zero, and the value that each of them has."""
-    kept = np.flatnonzero(chosen.expansion.any(axis=1))
-    return kept, np.argmax(chosen.expansion[kept] != 0, axis=1).astype(np.int64)
+def exported_functions(
+    model: Model, chosen: Chosen, what: str, *, constant: bool
+) -> tuple[Function, ...]:
+    """Functions of a model.
+
+    Args:
+        model: Of the robot.
+        chosen: The model.
+        what: Of :data:`WHAT`.
+        constant: Whether the values of the parameters are part of them.
+    """
+    lean = _functions_of(model, chosen, constant=constant)
+    return tuple(getattr(lean, name)() for name in WHAT[what])
+
+
+def _functions_of(model: Model, chosen: Chosen, *, constant: bool) -> LeanFunctions:
+    kept, owner = kept_and_owner(model, chosen.expansion)
+    values = tuple(float(v) for v in chosen.values)
+    return LeanFunctions(
+        model.mechanism, model.formulations, kept, owner, values, constant=constant
+    )
 
 
 def cases(

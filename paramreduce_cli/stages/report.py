@@ -35,6 +35,8 @@ from paramreduce_cli.report.data import (
 from paramreduce_cli.report.figures import render
 from paramreduce_cli.report.page import render_page
 from paramreduce_cli.report.summary import summary_of
+from paramreduce_cli.report.tracking import Tracking
+from paramreduce_cli.stages.tracking import tracked
 
 _POSES = 3
 
@@ -56,6 +58,8 @@ def report(
     images = {}
     formats = [str(name) for name in config.report.formats]
     for name, draw in registry.figure.items():
+        if name == "tracking" and data.tracking is None:
+            continue
         encoded = render(draw, data, sorted({*formats, "svg"}))
         images[name] = ((draw.__doc__ or name).strip(), encoded["svg"])
         files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
@@ -89,7 +93,21 @@ def _gather(
         validation=validation,
         motion=motion,
         skeletons=tuple(_skeleton(model, q) for q in _shown_poses(config, model, motion)),
+        tracking=_tracking(config, model, reduction, validation, motion),
     )
+
+
+def _tracking(
+    config: Config, model: Model, reduction: Reduction, validation: Validation, motion: Motion
+) -> Tracking | None:
+    section = config.report.tracking
+    if section is None:
+        return None
+    if model.mechanism.loops is not None:
+        raise ConfigError(
+            "report.tracking: is for open trees, and this mechanism has loops. Leave it out."
+        )
+    return tracked(section, model, reduction, validation, motion)
 
 
 def _shown_poses(config: Config, model: Model, motion: Motion) -> list[FloatArray]:
