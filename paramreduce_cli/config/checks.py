@@ -51,6 +51,15 @@ def _bodies(config: Config) -> Iterator[Problem]:
         seen.add(name)
 
 
+def _tracking(config: Config) -> Iterator[Problem]:
+    tree = config.description.tree
+    if config.report.tracking is not None and tree is not None and tree.closures:
+        yield (
+            ("report", "tracking"),
+            "is for open trees, and this mechanism has loops; leave it out",
+        )
+
+
 def _loops(config: Config) -> Iterator[Problem]:
     tree = config.description.tree
     if tree is None:
@@ -265,6 +274,7 @@ def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
 
 _CHECKS: tuple[Check, ...] = (
     _loops,
+    _tracking,
     _constraints,
     _groups,
     _symmetries,

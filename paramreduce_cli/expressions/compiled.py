@@ -149,12 +149,11 @@ def _folder_of_this_process() -> Path:
     return Path(_temporary_folder().name)
 
 
-def load(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL | None:
+def load(text: str) -> ctypes.CDLL | None:
     """Compile C text to a library, or take it from the cache.
 
     Args:
         text: All of it.
-        flags: Of the compiler.
 
     Returns:
         The library; None without a compiler, or if it fails.
@@ -163,7 +162,7 @@ def load(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL | None:
     if cc is None:
         return None
     digest = hashlib.sha256(
-        "\n".join([text, *cc, *flags, ca.CasadiMeta.version()]).encode()
+        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
     ).hexdigest()
     try:
         folder = cache_folder()
@@ -177,7 +176,7 @@ def load(text: str, flags: tuple[str, ...] = _FLAGS) -> ctypes.CDLL | None:
                 return ctypes.CDLL(str(library))
             except OSError:
                 library.unlink(missing_ok=True)  # damaged: compile it again
-        _compile([*cc, *flags], text, library)
+        _compile([*cc, *_FLAGS], text, library)
         return ctypes.CDLL(str(library))
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)

@@ -41,9 +41,9 @@ class Inertia:
         return any(bool(value) for value in (self.m, *self.d, *tensor))
 
     def shifted(self, r: Vector) -> Inertia:
-        """The same about another point; r is from that point to the present one [parallel axes].
+        """The same about another point; r is from that point to the present one.
 
-        With the first moments h before and h' = h + m r after, the tensor gains
+        The theorem of parallel axes: with the first moments h before and h' = h + m r after, the tensor gains
         (r . (h + h')) 1 - (r h' + h' r') with one h and one h', which is symmetric.
         """
         old = self.d

@@ -103,10 +103,6 @@ def _tracking(
     section = config.report.tracking
     if section is None:
         return None
-    if model.mechanism.loops is not None:
-        raise ConfigError(
-            "report.tracking: is for open trees, and this mechanism has loops. Leave it out."
-        )
     return tracked(section, model, reduction, validation, motion)
 
 

@@ -20,7 +20,6 @@ from paramreduce_cli.stages.export import chosen_model, export, exported_functio
 _SEED = 7
 _SHARE = 0.8
 """Of the validation set's range that the path keeps to."""
-_FLAGS = ("-O3", "-march=native", "-std=c99", "-fPIC", "-shared")
 _ROUNDS = 20
 
 _TIMER = """
@@ -87,7 +86,7 @@ def _controller(
     stem = next(file[:-2] for file in files if file.endswith(".h"))
     header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
     text = header + source.replace(f'#include "{stem}.h"', "")
-    library = load(text + _TIMER.format(name=stem, n=model.mechanism.n_q), _FLAGS)
+    library = load(text + _TIMER.format(name=stem, n=model.mechanism.n_q))
     if library is None:
         (function,) = exported_functions(model, chosen, "idm", constant=False)
         return _interpreted(function, phi, path)
