@@ -227,8 +227,17 @@ def cases(
     return result | loops
 
 
-def check(functions: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:
+def check(
+    functions: tuple[Function, ...],
+    stored: Mapping[str, FloatArray],
+    tolerance: float = _TOLERANCE,
+) -> None:
     """Compare functions with stored results.
+
+    Args:
+        functions: To be checked.
+        stored: Their arguments and expected results, (n_states, ...) by name.
+        tolerance: Of the largest value of each result.
 
     Raises:
         FormulationError: They are not the same.
@@ -247,7 +256,7 @@ def check(functions: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> 
             start += result.size
             got = np.column_stack([np.broadcast_to(value, wanted.shape[0]) for value in some])
             error = np.max(np.abs(got - wanted)) / max(float(np.max(np.abs(wanted))), 1e-300)
-            if not error <= _TOLERANCE:
+            if not error <= tolerance:
                 raise FormulationError(
                     f"{function.name}: {result.name} is off by {error:.1e} of its largest value against "
                     "plain recursion. This is a defect of paramreduce: please report it with the config."

@@ -15,7 +15,14 @@ from paramreduce_cli.export.exported import identifier, plain
 from paramreduce_cli.export.latex import mathematics, symbol
 from paramreduce_cli.registry import exporter
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.export import WHAT, cases, chosen_model, export
+from paramreduce_cli.stages.export import (
+    WHAT,
+    cases,
+    check,
+    chosen_model,
+    export,
+    exported_functions,
+)
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 needs_octave = pytest.mark.skipif(
@@ -77,6 +84,15 @@ def test_c_of_closed_loops_solves_them(hexaglide, tmp_path):
     done = c_test("hexaglide", tmp_path)
     assert done.returncode == 0, done.stdout
     assert "positions, q" in done.stdout
+
+
+@pytest.mark.parametrize("name", ["puma560", "hexaglide"])
+def test_functions_are_the_reference_on_a_thousand_states(name, hexaglide):
+    model = hexaglide if name == "hexaglide" else build_model(load_config(CONFIGS / f"{name}.yaml"))
+    chosen = chosen_model("full", model, None, None)
+    functions = exported_functions(model, chosen, "both", constant=False)
+    stored = cases(model, chosen, 1000, np.random.default_rng(11))
+    check(functions, stored, 1e-12)
 
 
 @needs_gcc

@@ -79,4 +79,4 @@ def test_loops_are_refused(invoke, tmp_path):
         "--set", "trajectories.count=1", "--set", "trajectories.max_iterations=20",
     )  # fmt: skip
     assert code == 2
-    assert "report.tracking: is for open trees" in err.replace("\n", " ")
+    assert "report.tracking is for open trees" in err.replace("\n", " ")
