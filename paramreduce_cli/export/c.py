@@ -10,14 +10,13 @@ from typing import Any
 import jinja2
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about, binary, operand
-from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.language import FUNCTIONS, Language, signed
+from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.registry import exporter
 
 BLOCK = 64
 """States whose sines and cosines are kept at once in the batched functions."""
-
-_CALLS = {name: name for name in ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2")}
 
 
 @exporter("c")
@@ -160,59 +159,30 @@ class _Writer:
 
     def statements(self, function: Function) -> list[str]:
         """The body, one operation a line."""
-        names = self._leaves(function, batched=False)
-        lines = []
-        for number, line in self._operations(function, names):
-            lines.append(f"const {self._real} t{number} = {line};")
-        return lines + self._results(function, names)
+        steps, outputs = self._language(batched=False).body(function)
+        lines = [f"const {self._real} {name} = {text};" for name, text in steps]
+        places = zip(function.places(function.results), outputs, strict=True)
+        return lines + [f"{array.name}[{k}] = {text};" for (array, k), text in places]
 
     @property
     def _real(self) -> str:
         return "float" if self._model.single else "double"
 
-    def _leaves(self, function: Function, *, batched: bool) -> dict[int, str]:
-        """Texts of constants and inputs; in batches, states are stored coordinate by coordinate."""
-        places = function.places(function.arguments)
-        names = {}
-        for number, node in enumerate(function.program.nodes):
-            if node.operation == "constant":
-                names[number] = self.number(node.number)
-            elif node.operation == "input":
-                array, k = places[int(node.number)]
-                column = batched and array.name != "phi"
-                names[number] = f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
-        return names
+    def _language(self, *, batched: bool) -> Language:
+        """In batches, states are stored coordinate by coordinate."""
 
-    def _operations(self, function: Function, names: dict[int, str]) -> list[tuple[int, str]]:
-        lines = []
-        for number, node in function.steps():
-            if number in names:
-                continue
-            lines.append((number, self._expression(names, node.operation, node.operands)))
-            names[number] = f"t{number}"
-        return lines
+        def element(array: Argument, k: int) -> str:
+            column = batched and array.name != "phi"
+            return f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
 
-    def _expression(
-        self, names: Mapping[int, str], operation: str, operands: tuple[int, ...]
-    ) -> str:
-        if operation == "inv":
-            return f"1 / {names[operands[0] >> 1]}"
-        if operation in _CALLS:
-            listed = ", ".join(operand(names, value) for value in operands)
-            return f"{_CALLS[operation]}{self._suffix}({listed})"
-        return binary(names, operation, *operands)
-
-    def _results(self, function: Function, names: Mapping[int, str]) -> list[str]:
-        places = function.places(function.results)
-        return [
-            f"{array.name}[{k}] = {operand(names, value)};"
-            for (array, k), value in zip(places, function.program.outputs, strict=True)
-        ]
+        calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS}
+        return Language(calls, self.number, element)
 
     def batched(self, function: Function) -> dict[str, object]:
         """The body in parts: what depends on parameters alone, angles, and all the rest."""
         program = function.program
-        names = self._leaves(function, batched=True)
+        language = self._language(batched=True)
+        names = language.leaves(function)
         states, angles, needed = _dependence(function)
         once: list[str] = []
         before: list[str] = []
@@ -226,19 +196,18 @@ class _Writer:
                 continue
             if number not in needed:
                 continue
-            line = self._expression(names, node.operation, node.operands)
+            text = f"const {self._real} t{number} = {language.expression(names, node)};"
             names[number] = f"t{number}"
-            text = f"const {self._real} t{number} = {line};"
             (rest if states[number] else once).append(text)
-        again = self._leaves(function, batched=True)
+        again = language.leaves(function)
         for number, node in function.steps():
             if number in angles:
-                line = self._expression(again, node.operation, node.operands)
+                text = f"const {self._real} a{number} = {language.expression(again, node)};"
                 again[number] = f"a{number}"
-                before.append(f"const {self._real} a{number} = {line};")
+                before.append(text)
         filled = [(row, again[angle]) for angle, row in waves.items()]
         outputs = list(dict.fromkeys(program.outputs))
-        rest += [f"out[{row}][k] = {operand(names, value)};" for row, value in enumerate(outputs)]
+        rest += [f"out[{row}][k] = {signed(names, value)};" for row, value in enumerate(outputs)]
         places = zip(function.places(function.results), program.outputs, strict=True)
         return {
             "once": once,

@@ -108,17 +108,3 @@ def about(model: ExportedModel) -> list[str]:
     for k, p in enumerate(model.parameters):
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")
     return lines
-
-
-def operand(names: Mapping[int, str], value: int) -> str:
-    """A signed reference as text."""
-    return f"-{names[value >> 1]}" if value & 1 else names[value >> 1]
-
-
-def binary(names: Mapping[int, str], operation: str, a: int, b: int) -> str:
-    """A sum or product as text."""
-    if operation == "+" and b & 1:
-        return f"{operand(names, a)} - {names[b >> 1]}"
-    if operation != "+" and b & 1:
-        return f"{operand(names, a)} {operation} (-{names[b >> 1]})"
-    return f"{operand(names, a)} {operation} {names[b >> 1]}"

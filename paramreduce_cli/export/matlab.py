@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about, binary, operand
+from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.language import FUNCTIONS, Language
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import exporter
@@ -39,24 +40,13 @@ def _function(model: ExportedModel, function: Function) -> str:
         for array in (*function.arguments, *function.results)
     ]
     lines += _comment([*documented, "", *about(model)])
-    names: dict[int, str] = {}
-    places = function.places(function.arguments)
-    for number, node in enumerate(function.program.nodes):
-        if node.operation == "constant":
-            names[number] = repr(float(node.number))
-        elif node.operation == "input":
-            array, k = places[int(node.number)]
-            names[number] = _element(array, k)
-    for number, node in function.steps():
-        lines.append(f"t{number} = {_expression(names, node.operation, node.operands)};")
-        names[number] = f"t{number}"
+    steps, outputs = _LANGUAGE.body(function)
+    lines += [f"{name} = {text};" for name, text in steps]
     for result in function.results:
         rows, columns = (*result.shape, 1)[:2]
         lines.append(f"{result.name} = zeros({rows}, {columns});")
-    for (array, k), value in zip(
-        function.places(function.results), function.program.outputs, strict=True
-    ):
-        lines.append(f"{_element(array, k)} = {operand(names, value)};")
+    for (array, k), text in zip(function.places(function.results), outputs, strict=True):
+        lines.append(f"{_element(array, k)} = {text};")
     return "\n".join([*lines, "end"])
 
 
@@ -65,12 +55,7 @@ def _element(array: Argument, k: int) -> str:
     return f"{array.name}({indices})"
 
 
-def _expression(names: dict[int, str], operation: str, operands: tuple[int, ...]) -> str:
-    if operation == "inv":
-        return f"1 / {names[operands[0] >> 1]}"
-    if operation in ("+", "*", "/"):
-        return binary(names, operation, *operands)
-    return f"{operation}({', '.join(operand(names, value) for value in operands)})"
+_LANGUAGE = Language({name: name for name in FUNCTIONS}, repr, _element)
 
 
 def _parameters(model: ExportedModel) -> str:

@@ -6,20 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about, binary, operand
+from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.language import FUNCTIONS, Language
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.registry import exporter
 
 _CALLS = {
-    "sin": "np.sin",
-    "cos": "np.cos",
-    "tan": "np.tan",
-    "asin": "np.arcsin",
-    "acos": "np.arccos",
-    "atan": "np.arctan",
-    "sqrt": "np.sqrt",
-    "atan2": "np.arctan2",
+    name: f"np.{name.replace('a', 'arc', 1) if name[0] == 'a' else name}" for name in FUNCTIONS
 }
 
 
@@ -54,22 +48,12 @@ def _function(function: Function, *, private: bool) -> list[str]:
     lines += [f'    """{function.text} {function.program.n_operations} operations.', ""]
     lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
     lines += ['    """']
-    names: dict[int, str] = {}
-    places = function.places(function.arguments)
-    for number, node in enumerate(function.program.nodes):
-        if node.operation == "constant":
-            names[number] = repr(float(node.number))
-        elif node.operation == "input":
-            array, k = places[int(node.number)]
-            names[number] = f"{array.name}[..., {_index(array, k)}]"
     leaders = [a for a in function.arguments if a.name != "phi"]
     lines += [f"    {a.name} = np.asarray({a.name})" for a in function.arguments]
-    for number, node in function.steps():
-        lines.append(f"    t{number} = {_expression(names, node.operation, node.operands)}")
-        names[number] = f"t{number}"
+    steps, outputs = _LANGUAGE.body(function)
+    lines += [f"    {name} = {text}" for name, text in steps]
     first = leaders[0]
     lines.append(f"    many = {first.name}.shape[:-{len(first.shape)}]")
-    outputs = [operand(names, value) for value in function.program.outputs]
     start = 0
     for result in function.results:
         some = outputs[start : start + result.size]
@@ -93,12 +77,7 @@ def _index(array: Argument, k: int) -> str:
     return ", ".join(str(int(i)) for i in np.unravel_index(k, array.shape))
 
 
-def _expression(names: dict[int, str], operation: str, operands: tuple[int, ...]) -> str:
-    if operation == "inv":
-        return f"1 / {names[operands[0] >> 1]}"
-    if operation in _CALLS:
-        return f"{_CALLS[operation]}({', '.join(operand(names, value) for value in operands)})"
-    return binary(names, operation, *operands)
+_LANGUAGE = Language(_CALLS, repr, lambda array, k: f"{array.name}[..., {_index(array, k)}]")
 
 
 def _loops(model: ExportedModel) -> list[str]:
