@@ -10,7 +10,7 @@ import hashlib
 import json
 import time
 import types
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -255,17 +255,24 @@ class Runner:
     def _look_at_inputs(self, stage: Stage) -> None:
         """Refuse inputs of another layout; say which ones do not fit what they were made from."""
         for entry in stage.artifacts:
-            stamp = self.store.stamp(entry.type)
-            if self.config is None or stamp is None:
-                continue
-            path = self.store.path(entry.type)
-            check_schema(path, stamp)
-            changed = [f"another {name} section" for name in self._changed_sections(stamp)]
-            changed += [f"another {name}" for name in self._changed_artifacts(entry.type, stamp)]
-            if changed:
-                self.remark(
-                    f"{path} was made with {' and '.join(changed)}; `paramreduce run` rebuilds it"
-                )
+            for text in self.remarks_on(entry.type):
+                self.remark(text)
+
+    def remarks_on(self, record: type) -> Iterator[str]:
+        """What a record's file does not fit that it was made from; nothing where there is none.
+
+        Raises:
+            ArtifactError: It is of another layout.
+        """
+        stamp = self.store.stamp(record)
+        if self.config is None or stamp is None:
+            return
+        path = self.store.path(record)
+        check_schema(path, stamp)
+        changed = [f"another {name} section" for name in self._changed_sections(stamp)]
+        changed += [f"another {name}" for name in self._changed_artifacts(record, stamp)]
+        if changed:
+            yield f"{path} was made with {' and '.join(changed)}; `paramreduce run` rebuilds it"
 
     def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
         """Files of the folder that are not those a record was made from."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import hashlib
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from paramreduce_cli.artifacts.hdf5 import Stamp
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 
+_LISTING = ".exported.json"
 SUMMARY = "report/summary.json"
 
 
@@ -39,6 +41,26 @@ def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
     for name in set(former) - files:
         if not Path(name).is_absolute() and ".." not in Path(name).parts:
             (folder / name).unlink(missing_ok=True)
+
+
+def save_files(folder: Path, files: Mapping[str, bytes]) -> None:
+    """Write files of one kind to a folder, and remove those of the same kind that were there before.
+
+    What was written is listed in a hidden file, so that nothing else is touched.
+    """
+    listing = folder / _LISTING
+    try:
+        former = set(load_json(listing)) if listing.exists() else set()
+    except (ArtifactError, TypeError):
+        former = set()
+    for name, content in files.items():
+        with atomically(folder / name) as path:
+            path.write_bytes(content)
+    for name in former - set(files):
+        if Path(str(name)).name == name:
+            (folder / name).unlink(missing_ok=True)
+    with atomically(listing) as path:
+        path.write_text(json.dumps(sorted(files)), encoding="utf-8")
 
 
 def summary_stamp(path: Path) -> Stamp | None:

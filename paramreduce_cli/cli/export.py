@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import click
 
-from paramreduce_cli.artifacts.atomic import atomically
+from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.cli.stages import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
-from paramreduce_cli.config import load_config
+from paramreduce_cli.config import Config, load_config
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import Model, Reduction, Validation
 from paramreduce_cli.registry import exporter
+from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages.export import WHAT, chosen_model
 from paramreduce_cli.stages.export import export as exported
 
@@ -60,17 +64,29 @@ def export(
     store = Store(results or Path("results") / loaded.robot)
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
-    model = load_file(store.path(Model), Model, loaded.robot, "build-model")[0]
-    reduction = validation = None
+    records: list[type] = [Model]
     if text not in ("full", "base"):
-        reduction = load_file(store.path(Reduction), Reduction, loaded.robot, "reduce")[0]
-        if text is None:
-            path = store.path(Validation)
-            validation = load_file(path, Validation, loaded.robot, "validate")[0]
-    chosen = chosen_model(text, model, reduction, validation)
-    files = exported(model, chosen, kind=kind, what=what, constant=constants, single=single)
+        records += [Reduction] if text is not None else [Reduction, Validation]
+    loading = {record: _loaded(loaded, store, record) for record in records}
+    chosen = chosen_model(text, loading[Model], loading.get(Reduction), loading.get(Validation))
+    stamp = store.stamp(records[-1])
+    files = exported(
+        loading[Model],
+        chosen,
+        kind=kind,
+        what=what,
+        constant=constants,
+        single=single,
+        origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
+    )
     folder = output or store.folder / "export" / kind
-    for name, content in files.items():
-        with atomically(folder / name) as path:
-            path.write_bytes(content)
+    save_files(folder, files)
     say(f"{chosen.title}: {', '.join(files)} in {folder}")
+
+
+def _loaded(config: Config, store: Store, record: type) -> Any:
+    """A record that fits the config: what goes onto a controller had better be up to date."""
+    found = load_file(store.path(record), record, config.robot, maker_of(record))[0]
+    for remark in Runner(config, store, jobs=1).remarks_on(record):
+        raise ArtifactError(f"{remark}.")
+    return found

@@ -90,6 +90,7 @@ class _Writer:
             "test_batch_arguments": self.test_batch_arguments,
             "functions": [self.function(f) for f in model.functions],
             "closures": [self.function(f) for f in model.closures],
+            "stack": self.stack(),
             "waves": any(self.batched(f)["angles"] for f in model.functions),
             "cases": self.cases(),
             "n_cases": len(next(iter(model.cases.values()))),
@@ -127,7 +128,7 @@ class _Writer:
 
     def batch_arguments(self, f: Mapping[str, Any]) -> str:
         """Of a function of one block of them."""
-        return self._pointers(f, "restrict ")
+        return self._pointers(f, "RESTRICT ")
 
     def _pointers(self, f: Mapping[str, Any], mark: str) -> str:
         type_ = f"{self._model.name}_real"
@@ -178,7 +179,7 @@ class _Writer:
         calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS}
         return Language(calls, self.number, element)
 
-    def batched(self, function: Function) -> dict[str, object]:
+    def batched(self, function: Function) -> dict[str, Any]:
         """The body in parts: what depends on parameters alone, angles, and all the rest."""
         program = function.program
         language = self._language(batched=True)
@@ -217,6 +218,15 @@ class _Writer:
             "outputs": outputs,
             "copies": [(outputs.index(value), array.name, k) for (array, k), value in places],
         }
+
+    def stack(self) -> int:
+        """Of the batched functions, kB, at most: block arrays and as much again for temporaries."""
+        arrays = max(
+            3 * len(body["angles"]) + len(body["outputs"])
+            for body in map(self.batched, self._model.functions)
+        )
+        width = 4 if self._model.single else 8
+        return int(np.ceil(2 * arrays * BLOCK * width / 1024))
 
     def cases(self) -> dict[str, dict[str, object]]:
         """Stored vectors of the self-test."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import keyword
 import re
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from paramreduce_cli.expressions.functions import Argument, Function
@@ -31,6 +31,8 @@ class ExportedModel:
     heading: tuple[str, ...]
     """Where it comes from and what it is worth, line by line."""
     coordinates: tuple[str, ...]
+    units: tuple[str, ...]
+    """Of these, rad or m."""
     independent: IntArray
     """Positions of the independent coordinates, (n_dof,)."""
     parameters: tuple[Parameter, ...]
@@ -94,17 +96,24 @@ def plain(text: str) -> str:
 def about(model: ExportedModel) -> list[str]:
     """The lines that open every file."""
     lines = [plain(line) for line in model.heading]
-    lines += ["", "Coordinates, in this order (rad or m):"]
-    independent = set(model.independent.tolist())
-    for k, name in enumerate(model.coordinates):
-        role = (
-            ""
-            if len(independent) == len(model.coordinates) or k not in independent
-            else " (independent)"
-        )
-        lines.append(f"  {k}: {plain(name)}{role}")
+    lines += [
+        "",
+        "Coordinates, in this order; forces are in N m where they are in rad, in N where in m:",
+    ]
+    lines += _listed(model, range(len(model.coordinates)))
+    if model.closures:
+        lines += ["", "Independent coordinates, in the order of z, dz, ddz, tau, M, delta and K:"]
+        lines += _listed(model, model.independent.tolist())
+        lines += ["", "Dependent coordinates, in the order of the rows of R and b:"]
+        lines += _listed(model, model.dependent)
     kind = "constants of the code" if model.constant else "in this order"
-    lines += ["", f"Parameters, {kind}:"]
+    lines += ["", f"Parameters, {kind}; each is followed by what it is made of (to six digits):"]
     for k, p in enumerate(model.parameters):
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")
     return lines
+
+
+def _listed(model: ExportedModel, positions: Iterable[int]) -> list[str]:
+    return [
+        f"  {k}: {plain(model.coordinates[i])}, {model.units[i]}" for k, i in enumerate(positions)
+    ]

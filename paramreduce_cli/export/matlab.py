@@ -73,13 +73,13 @@ def _loops(model: ExportedModel) -> dict[str, str]:
 % Close the loops at independent coordinates, by Newton's method.
 % z: independent coordinates, {len(z)}
 % guess: all coordinates near the solution, {n}
-% q: all coordinates, {n}
+% q: all coordinates, {n}; from a guess far off, perhaps another assembly of the mechanism
 q = guess(:);
 q({z}) = z;
 for step = 1:50
   [Phi, Phi_d] = {name}_closure(q);
   change = Phi_d \\ Phi;
-  share = 1;
+  share = min(1, 0.6 / max(max(abs(change)), realmin));
   for halved = 0:10
     trial = q;
     trial({d}) = q({d}) - share * change;

@@ -17,6 +17,15 @@ _CALLS = {
 }
 
 
+_CHECKED = """
+def _array(name, values, shape):
+    array = np.asarray(values, dtype=float)
+    if array.shape[-len(shape) :] != shape:
+        raise ValueError(f"{name} has shape {array.shape}; its last axes must be {shape}")
+    return array
+""".strip().split("\n")
+
+
 @exporter("python")
 def python(model: ExportedModel) -> dict[str, bytes]:
     """A module that needs NumPy alone; functions take one state or arrays of states."""
@@ -31,6 +40,7 @@ def python(model: ExportedModel) -> dict[str, bytes]:
         f"PHI = np.array({[p.value for p in model.parameters]})",
         '"""Values of the parameters."""',
     ]
+    lines += ["", "", *_CHECKED]
     for function in (*model.functions, *model.closures):
         lines += ["", "", *_function(function, private=function in model.closures)]
     if model.closures:
@@ -48,12 +58,12 @@ def _function(function: Function, *, private: bool) -> list[str]:
     lines += [f'    """{function.text} {function.program.n_operations} operations.', ""]
     lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
     lines += ['    """']
-    leaders = [a for a in function.arguments if a.name != "phi"]
-    lines += [f"    {a.name} = np.asarray({a.name})" for a in function.arguments]
+    leaders = function.arguments
+    lines += [f"    {a.name} = _array({a.name!r}, {a.name}, {a.shape})" for a in function.arguments]
     steps, outputs = _LANGUAGE.body(function)
     lines += [f"    {name} = {text}" for name, text in steps]
-    first = leaders[0]
-    lines.append(f"    many = {first.name}.shape[:-{len(first.shape)}]")
+    shapes = ", ".join(f"{a.name}.shape[:-{len(a.shape)}]" for a in leaders)
+    lines.append(f"    many = np.broadcast_shapes({shapes})")
     start = 0
     for result in function.results:
         some = outputs[start : start + result.size]
@@ -96,6 +106,8 @@ def positions(z, guess):
         All coordinates.
     Raises:
         ValueError: The loops cannot be closed from there.
+
+    From a guess far off, the solution may be another assembly of the mechanism.
     """
     shape = (*np.shape(z)[:-1], {len(d) + len(z)})
     q = np.array(np.broadcast_to(guess, shape), dtype=float)
@@ -107,8 +119,9 @@ def positions(z, guess):
             step = np.linalg.solve(jacobian, gap[..., None])[..., 0]
         except np.linalg.LinAlgError as error:
             raise ValueError("singular: the loops cannot be closed from this guess") from error
-        near = np.max(np.abs(step), axis=-1) < 1e-6
-        share = np.ones(shape[:-1])
+        largest = np.max(np.abs(step), axis=-1)
+        near = largest < 1e-6
+        share = np.minimum(1.0, 0.6 / np.maximum(largest, 1e-300))
         for _ in range(10):
             trial = q.copy()
             trial[..., _DEPENDENT] -= share[..., None] * step

@@ -7,7 +7,12 @@ import dataclasses
 import numpy as np
 
 from paramreduce_cli.errors import FormulationError
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.choices import from_data
+from paramreduce_cli.lean.search import direct_outputs, inverse_outputs
+from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism
 
@@ -45,10 +50,15 @@ def check_formulations(
         "direct": np.hstack([(A @ phi)[:, rows, columns], B @ phi]),
     }
     inputs = [*np.broadcast_to(phi, (q.shape[0], phi.size)).T, *q.T, *dq.T, *ddq.T]
+    tree = lean_tree(mechanism)
+    dropped = np.setdiff1d(np.arange(phi.size), kept).tolist()
+    builds = {"inverse": inverse_outputs, "direct": direct_outputs}
     for kind, wanted in expected.items():
         for choices in getattr(formulations, kind):
-            one = dataclasses.replace(formulations, **{kind: (choices,)})
-            values = getattr(LeanModels(mechanism, one), kind)(kept).evaluated(inputs)
+            graph = Graph()
+            outputs = builds[kind](tree, [from_data(data) for data in choices], graph, dropped)
+            program = Program.of_graph(*least(graph, outputs))
+            values = program.evaluated(inputs)
             got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
             error = np.max(np.abs(got - wanted), initial=0.0) / np.max(
                 np.abs(wanted), initial=1e-300

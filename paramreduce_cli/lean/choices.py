@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any
 
-from paramreduce_cli.lean.motion import Diagonal
+from paramreduce_cli.lean.motion import Diagonal, Rates
 from paramreduce_cli.lean.tree import Joint
 from paramreduce_cli.lean.wrench import Gauge
 from paramreduce_cli.records import BASE
@@ -43,7 +43,7 @@ class Choice:
     plane: Place = Place.OWN
     """Ixx, Ixy, Iyy"""
     diagonal: Diagonal = Diagonal.SQUARES
-    doubled: bool = False
+    rates: Rates = Rates.COLUMN
     reach_turned: bool = False
     """Whether the place of an aligned joint is turned, not its acceleration."""
     projected: bool = False
@@ -59,7 +59,7 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
     "gauge": tuple(Gauge),
     **{name: tuple(Place) for name in _PLACED},
     "diagonal": tuple(Diagonal),
-    "doubled": (False, True),
+    "rates": tuple(Rates),
     "reach_turned": (False, True),
     "projected": (False, True),
 }
@@ -87,7 +87,7 @@ def _effective(choice: Choice, joint: Joint) -> list[str]:
     """What makes a difference at a joint."""
     names = list(_PLACED)
     if joint.revolute:
-        names += ["gauge", "diagonal", "doubled"]
+        names += ["gauge", "diagonal", "rates"]
     if joint.parallel:
         names += ["aligned"] + ["reach_turned"] * choice.aligned
     if joint.parent != BASE:
@@ -105,7 +105,7 @@ def to_data(choice: Choice) -> dict[str, str | bool]:
 
 def from_data(data: Mapping[str, str | bool]) -> Choice:
     """From plain values."""
-    kinds = {"gauge": Gauge, "diagonal": Diagonal, **dict.fromkeys(_PLACED, Place)}
+    kinds = {"gauge": Gauge, "diagonal": Diagonal, "rates": Rates, **dict.fromkeys(_PLACED, Place)}
     return Choice(
         **{name: kinds[name](value) if name in kinds else value for name, value in data.items()}  # type: ignore[arg-type]
     )

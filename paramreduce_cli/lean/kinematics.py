@@ -195,9 +195,7 @@ class Kinematics:
             angle=angle,
             turn=turn,
             rest=rest,
-            own=turned(
-                rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.doubled
-            ),
+            own=turned(rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.rates),
             adds=turning(rest, angle.speed, angle.acceleration),
             a_rest=a,
             a_own=turn.back(a),
@@ -245,5 +243,5 @@ class Kinematics:
         still = Turn(self.symbols.number(1.0), self._zero)
         angle = state.angle
         return turned(
-            state.rest, still, angle.speed, angle.acceleration, choice.diagonal, choice.doubled
+            state.rest, still, angle.speed, angle.acceleration, choice.diagonal, choice.rates
         )

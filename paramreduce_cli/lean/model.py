@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from functools import cached_property
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import BoolArray, Formulations, IntArray, Mechanism
 
 if TYPE_CHECKING:
@@ -64,7 +66,7 @@ class LeanModels:
 
     Args:
         mechanism: The mechanism.
-        formulations: To choose from.
+        formulations: To choose from, beside plain recursion, which may be the leanest of a few parameters.
         independent: Whether d_z and [M_zz | delta_z] are meant, with R and b handed in, instead of
             d_q and [M_qq | delta_q]; on an open tree they are the same.
     """
@@ -79,28 +81,42 @@ class LeanModels:
         self.n_parameters = len(mechanism.parameter_names)
 
     @cached_property
+    def _plain(self) -> tuple[Program, Program]:
+        return Dynamics(replace(self._mechanism, loops=None)).programs
+
+    @cached_property
     def _inverse(self) -> _Variants:
-        return self._variants(
-            projected_inverse(self._mechanism) if self._projected else inverse_outputs,
-            self._formulations.inverse,
-        )
+        lean = self._programs(inverse_outputs, self._formulations.inverse)
+        return self._variants([*lean, self._plain[0]], projected_inverse)
 
     @cached_property
     def _direct(self) -> _Variants:
-        return self._variants(
-            projected_direct(self._mechanism) if self._projected else direct_outputs,
-            self._formulations.direct,
-        )
+        lean = self._programs(direct_outputs, self._formulations.direct)
+        return self._variants([*lean, self._plain[1]], projected_direct)
 
-    def _variants(
+    def _programs(
         self, build: Build, choices: tuple[tuple[Mapping[str, str | bool], ...], ...]
-    ) -> _Variants:
-        programs = []
+    ) -> list[Program]:
+        result = []
         for some in choices:
             graph = Graph()
             outputs = build(self._tree, [from_data(data) for data in some], graph, ())
-            programs.append(Program.of_graph(graph, outputs))
-        return _Variants(programs)
+            result.append(Program.of_graph(graph, outputs))
+        return result
+
+    def _variants(
+        self,
+        programs: list[Program],
+        project: Callable[[Mechanism, Graph, Sequence[int]], list[int]],
+    ) -> _Variants:
+        result = []
+        for program in programs:
+            graph = Graph()
+            outputs = program.rebuilt(graph)
+            if self._projected:
+                outputs = project(self._mechanism, graph, outputs)
+            result.append(Program.of_graph(graph, outputs))
+        return _Variants(result)
 
     def inverse(
         self,

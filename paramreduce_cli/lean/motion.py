@@ -13,6 +13,17 @@ from paramreduce_cli.lean.algebra import Scalar, Vector, dot
 from paramreduce_cli.lean.turns import ConstantTurn, Turn
 
 
+class Rates(StrEnum):
+    """How angular accelerations, and U with them, go from frame to frame."""
+
+    COLUMN = "column"
+    """U's column along the axis is turned."""
+    DOUBLED = "doubled"
+    """The same, and U_zx and U_zy are made from 2 w_z, not from the angular acceleration."""
+    DIRECT = "direct"
+    """The angular acceleration itself is turned."""
+
+
 class Diagonal(StrEnum):
     """How the diagonal of U is made."""
 
@@ -70,7 +81,7 @@ def turned(
     speed: Scalar,
     acceleration: Scalar,
     diagonal: Diagonal,
-    doubled: bool,
+    rates: Rates,
 ) -> Motion:
     """The motion of a frame that turns about z against another.
 
@@ -80,19 +91,24 @@ def turned(
         speed: Of the turning, rad/s.
         acceleration: Of the turning, rad/s^2.
         diagonal: How the diagonal of U is made.
-        doubled: Whether U_zx and U_zy are made from 2 w_z, not from the angular acceleration.
+        rates: How the angular acceleration gets here.
     """
     x, y, _ = turn.back(frame.omega)
     z = frame.omega[2] + speed
-    u_xz, u_yz, u_zz = turn.back(frame.along_z())
     rate_z = frame.rate[2] + acceleration
     yz, xz, xy = y * z, x * z, x * y
-    rate_x, rate_y = yz - u_yz, u_xz - xz
-    if doubled:
+    u_zz = frame.U[2][2]
+    if rates is Rates.DIRECT:
+        before_x, before_y, _ = turn.back(frame.rate)
+        rate_x, rate_y = before_x + y * speed, before_y - x * speed
+        u_xz, u_yz = xz + rate_y, yz - rate_x
+    else:
+        u_xz, u_yz, _ = turn.back(frame.along_z())
+        rate_x, rate_y = yz - u_yz, u_xz - xz
+    u_zx, u_zy = xz - rate_y, yz + rate_x
+    if rates is Rates.DOUBLED:
         twice = 2 * z
         u_zx, u_zy = twice * x - u_xz, twice * y - u_yz
-    else:
-        u_zx, u_zy = xz - rate_y, yz + rate_x
     if diagonal is Diagonal.SQUARES:
         xx, yy, zz = x * x, y * y, z * z
         u_xx, u_yy, u_zz = -(yy + zz), -(xx + zz), -(xx + yy)

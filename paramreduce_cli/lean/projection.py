@@ -7,53 +7,35 @@ and of b zero.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import Scalar
-from paramreduce_cli.lean.choices import Choice
-from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
-from paramreduce_cli.lean.tree import Tree
 from paramreduce_cli.records import Mechanism
 
 _STATES = 3
 """q, dq and ddq come before R and b among the inputs."""
 
 
-def projected_inverse(mechanism: Mechanism) -> Build:
-    """Torques in the independent coordinates."""
-
-    def build(
-        tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
-    ) -> list[int]:
-        d_q = [Scalar(graph, v) for v in inverse_outputs(tree, choices, graph, dropped)]
-        R, _ = _tangent(mechanism, graph)
-        return [_dot(column, d_q, graph).value for column in zip(*R, strict=True)]
-
-    return build
+def projected_inverse(mechanism: Mechanism, graph: Graph, outputs: Sequence[int]) -> list[int]:
+    """Torques in the independent coordinates, from those of the tree."""
+    d_q = [Scalar(graph, value) for value in outputs]
+    R, _ = _tangent(mechanism, graph)
+    return [_dot(column, d_q, graph).value for column in zip(*R, strict=True)]
 
 
-def projected_direct(mechanism: Mechanism) -> Build:
-    """The lower triangle of M_zz, row by row, then delta_z."""
-
-    def build(
-        tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
-    ) -> list[int]:
-        n = mechanism.n_q
-        flat = [Scalar(graph, v) for v in direct_outputs(tree, choices, graph, dropped)]
-        lower, delta = flat[:-n], flat[-n:]
-        M = [
-            [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(n)]
-            for i in range(n)
-        ]
-        R, b = _tangent(mechanism, graph)
-        columns = list(zip(*R, strict=True))
-        MR = [[_dot(row, column, graph) for row in M] for column in columns]
-        bias = [delta[i] + _dot(M[i], b, graph) for i in range(n)]
-        M_zz = [_dot(columns[i], MR[j], graph) for i in range(len(columns)) for j in range(i + 1)]
-        return [x.value for x in [*M_zz, *(_dot(column, bias, graph) for column in columns)]]
-
-    return build
+def projected_direct(mechanism: Mechanism, graph: Graph, outputs: Sequence[int]) -> list[int]:
+    """The lower triangle of M_zz, row by row, then delta_z, from those of the tree."""
+    n = mechanism.n_q
+    flat = [Scalar(graph, value) for value in outputs]
+    lower, delta = flat[:-n], flat[-n:]
+    M = [[lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(n)] for i in range(n)]
+    R, b = _tangent(mechanism, graph)
+    columns = list(zip(*R, strict=True))
+    MR = [[_dot(row, column, graph) for row in M] for column in columns]
+    bias = [delta[i] + _dot(M[i], b, graph) for i in range(n)]
+    M_zz = [_dot(columns[i], MR[j], graph) for i in range(len(columns)) for j in range(i + 1)]
+    return [x.value for x in [*M_zz, *(_dot(column, bias, graph) for column in columns)]]
 
 
 def _tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], list[Scalar]]:

@@ -169,14 +169,15 @@ class Dynamics:
             Counts of the IDM and of the DDM functions, zero for what is not counted.
         """
         dropped = np.setdiff1d(np.arange(self.n_parameters), kept)
-        programs = self._independent_programs if independent else self._programs
+        programs = self._independent_programs if independent else self.programs
         counts = [0, 0]
         for k, program in enumerate(programs if direct else programs[:1]):
             counts[k] = program.count(dropped.tolist(), same=same, signs_free=signs_free)
         return counts[0], counts[1]
 
     @cached_property
-    def _programs(self) -> tuple[Program, Program]:
+    def programs(self) -> tuple[Program, Program]:
+        """d_q and [M_qq | delta_q], M's lower triangle row by row; inputs are phi, q, dq and ddq."""
         return self._counted(self._tau_q, *self._direct_q)
 
     @cached_property

@@ -337,7 +337,7 @@ _FUNCTIONS = (("inverse", "d", "-"), ("direct", "[M | δ]", "--"))
 
 @figure("operations")
 def operations(data: ReportData) -> Figure:
-    """Operations of inverse and direct dynamics against the number of parameters."""
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: the full model."""
     drawn = Figure(figsize=_WIDE)
     axes = drawn.subplots()
     for name, result in data.validation.heuristics.items():

@@ -40,5 +40,9 @@ def render_page(
         for name, (caption, svg) in figures.items()
     }
     return environment.from_string(text).render(
-        title=data.title, s=summary, figures=images, tables=tables
+        title=data.title,
+        loops=data.model.mechanism.loops is not None,
+        s=summary,
+        figures=images,
+        tables=tables,
     )

@@ -332,7 +332,7 @@ def operations(data: ReportData) -> Table:
         ),
     ]
     header = (
-        "model", "n", "d", "d, plain", "d, plain, signs counted",
-        "[M, δ]", "[M, δ], plain", "[M, δ], plain, signs counted",
+        "model", "n", "d, lean", "d, plain recursion", "d, the paper's rule",
+        "[M, δ], lean", "[M, δ], plain recursion", "[M, δ], the paper's rule",
     )  # fmt: skip
     return Table("Operations", header, tuple(rows))

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from paramreduce_cli import __version__
-from paramreduce_cli.errors import ConfigError, FormulationError
+from paramreduce_cli.errors import ConfigError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.exported import ExportedModel, Parameter
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
@@ -33,6 +34,9 @@ _CASES = 16
 _CHECKED = 200
 """States on which the functions are checked before they are written."""
 _TOLERANCE = 1e-10
+_EXACT = 1e-10
+"""Torque error below which nothing but round-off is left of it."""
+_SINGULAR = 1e-10
 _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
 _LOOPS = {"z", "dz", "ddz", "guess", "q", "dq", "ddq", "R", "b"}
@@ -105,8 +109,8 @@ def chosen_model(
         np.linalg.pinv(reduction.expansion) @ model.values,
     )
     return Chosen(
-        f"{heuristic} with {size} parameters, torque error {100 * found.torque_error[row]:.3g} % on "
-        "the estimation set",
+        f"{heuristic} with {size} parameters, {_error_text(float(found.torque_error[row]))} on the "
+        "estimation set",
         tuple(reduction.names[k] for k in subset),
         found.parameters[row],
         tuple(expressions),
@@ -114,8 +118,19 @@ def chosen_model(
     )
 
 
+def _error_text(error: float) -> str:
+    return "exact" if error < _EXACT else f"torque error {100 * error:.3g} %"
+
+
 def export(
-    model: Model, chosen: Chosen, *, kind: str, what: str, constant: bool, single: bool
+    model: Model,
+    chosen: Chosen,
+    *,
+    kind: str,
+    what: str,
+    constant: bool,
+    single: bool,
+    origin: str = "",
 ) -> dict[str, bytes]:
     """Files of a model in some language.
 
@@ -126,6 +141,7 @@ def export(
         what: Of :data:`WHAT`.
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
+        origin: Of the model, for the comment that opens every file.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
@@ -133,7 +149,11 @@ def export(
     mechanism = model.mechanism
     functions = exported_functions(model, chosen, what, constant=constant)
     rng = np.random.default_rng(0)
-    check(functions, cases(model, chosen, _CHECKED, rng))
+    checked = cases(model, chosen, _CHECKED, rng)
+    check(functions, checked)
+    unsafe = _unsafe(checked["M"]) if "direct" in WHAT[what] else ""
+    if unsafe:
+        warnings.warn(f"{chosen.title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
@@ -142,9 +162,12 @@ def export(
         robot=mechanism.robot,
         heading=(
             f"{mechanism.robot}: {chosen.title}.",
-            f"Made by paramreduce {__version__}.",
+            *([f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []),
+            "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
+            f"Made by paramreduce {__version__} ({origin}).",
         ),
         coordinates=mechanism.generalised_names,
+        units=tuple("rad" if b.joint == "revolute" else "m" for b in mechanism.bodies),
         independent=np.array(mechanism.independent, dtype=np.int64),
         parameters=tuple(
             Parameter(name, float(value), _UNITS.get(name.split("_", 1)[0], "kg m^2"), expression)
@@ -162,6 +185,15 @@ def export(
     )
     files: dict[str, bytes] = exporter[kind](exported)
     return files
+
+
+def _unsafe(M: FloatArray) -> str:
+    """What is wrong with the mass matrices of random states; empty if nothing is."""
+    values = np.linalg.eigvalsh(M)
+    bad = int(np.sum(values[:, 0] <= _SINGULAR * np.abs(values).max()))
+    if not bad:
+        return ""
+    return f"M is singular or not positive definite on {bad} of {len(M)} random states"
 
 
 def exported_functions(
