@@ -1,5 +1,6 @@
 """Exported code is run by its own language against plain recursion."""
 
+import dataclasses
 import re
 import shutil
 import subprocess
@@ -11,6 +12,7 @@ import pytest
 from conftest import CONFIGS
 
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.exported import identifier, plain
 from paramreduce_cli.export.latex import mathematics, symbol
 from paramreduce_cli.registry import exporter
@@ -249,3 +251,89 @@ def test_what_cannot_be_exported(invoke, two_link_results, tmp_path, options, me
     assert code == 2
     assert message in err.replace("\n", " ")
     assert not (tmp_path / "x").exists()
+
+
+def test_stale_results_are_refused(invoke, two_link_copy, tmp_path):
+    code, _, err = invoke(
+        "export", CONFIGS / "two_link.yaml", "--results", two_link_copy,
+        "--set", "description.gravity=[0,0,-1]", "--output", tmp_path / "x",
+    )  # fmt: skip
+    assert code == 2
+    assert "was made with another description section" in err.replace("\n", " ")
+    assert not (tmp_path / "x").exists()
+
+
+def test_a_later_export_leaves_nothing_of_the_former(invoke, two_link_results, tmp_path):
+    folder = tmp_path / "code"
+    (tmp_path / "code").mkdir()
+    (folder / "mine.m").write_text("% mine")
+    for what in ("both", "idm"):
+        code, *_ = invoke(
+            "export", CONFIGS / "two_link.yaml", "--results", two_link_results,
+            "--format", "matlab", "--what", what, "--output", folder,
+        )  # fmt: skip
+        assert code == 0
+    names = {path.name for path in folder.iterdir()}
+    assert "two_link_inverse_dynamics.m" in names
+    assert "two_link_direct_dynamics.m" not in names
+    assert "mine.m" in names
+
+
+def test_models_that_are_unsafe_for_direct_dynamics_say_so(tmp_path):
+    model = build_model(load_config(CONFIGS / "two_link.yaml"))
+    chosen = chosen_model("base", model, None, None)
+    wrong = dataclasses.replace(chosen, values=-np.asarray(chosen.values))
+    with pytest.warns(ParamreduceWarning, match="not positive definite on 200 of 200"):
+        files = export(model, wrong, kind="c", what="ddm", constant=False, single=False)
+    assert b"NOT SAFE FOR DIRECT DYNAMICS" in files["two_link.h"]
+    assert (
+        b"NOT SAFE"
+        not in export(model, wrong, kind="c", what="idm", constant=False, single=False)[
+            "two_link.h"
+        ]
+    )
+
+
+def test_the_header_lists_orders_and_units(hexaglide):
+    chosen = chosen_model("full", hexaglide, None, None)
+    files = export(hexaglide, chosen, kind="c", what="idm", constant=False, single=False)
+    text = files["hexaglide.h"].decode()
+    independent = text[text.index("Independent coordinates") : text.index("Dependent coordinates")]
+    assert [f"{k}: s_{k + 1}, m" in independent for k in range(6)] == [True] * 6
+    assert "Gravity in the base frame, m/s^2: 0 0 -9.8" in text
+
+
+@needs_gcc
+def test_a_guess_survives_loops_that_cannot_be_closed(tmp_path):
+    model = build_model(load_config(CONFIGS / "five_bar.yaml"))
+    written(model, tmp_path, "c", "idm")
+    n, n_z = len(model.mechanism.generalised_names), model.mechanism.n_dof
+    assembly = ", ".join(repr(float(x)) for x in model.mechanism.loops.assembly)
+    (tmp_path / "far.c").write_text(
+        f"""#include "five_bar.h"
+int main(void) {{
+  const double guess[{n}] = {{{assembly}}};
+  double q[{n}] = {{{assembly}}}, z[{n_z}] = {{3.1, 0.1}};
+  if (five_bar_positions(z, q) != -1) return 1;
+  for (int i = 0; i < {n}; ++i) if (q[i] != guess[i]) return 2;
+  return 0;
+}}
+"""
+    )
+    built = run(["gcc", *STRICT, "-o", "f", "far.c", "five_bar.c", "-lm"], tmp_path)
+    assert built.returncode == 0, built.stderr
+    assert run(["./f"], tmp_path).returncode == 0
+
+
+def test_python_refuses_arrays_of_another_size(tmp_path):
+    model = build_model(load_config(CONFIGS / "two_link.yaml"))
+    written(model, tmp_path, "python", "idm")
+    script = (
+        "import two_link as m\n"
+        "try:\n    m.inverse_dynamics(m.PHI, [0, 0, 0], [0, 0], [0, 0])\n"
+        "except ValueError as error:\n    print(error)\n"
+        "print(m.inverse_dynamics(m.PHI, [0, 0], [[0, 0]] * 3, [0, 0]).shape)\n"
+    )
+    done = run([sys.executable, "-c", script], tmp_path)
+    assert "q has shape (3,); its last axes must be (2,)" in done.stdout
+    assert "(3, 2)" in done.stdout
