@@ -59,6 +59,10 @@ def direct_outputs(
     return M + [torque.value for torque in torques(kinematics)]
 
 
+_found: dict[tuple, list[Choice]] = {}
+"""What was searched in this process already: equal branches of one mechanism, or of several."""
+
+
 def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> Formulations:
     """Search the formulations of a mechanism.
 
@@ -114,14 +118,13 @@ def best_choices(
         dropped: Positions of parameters that are zero.
     """
     result = list(start)
-    known: dict[tuple, list[Choice]] = {}
     for branch in _branches(tree):
         part, some = _restricted(tree, branch, dropped)
         begin = [result[i] for i in branch]
-        key = (_signature(part), frozenset(some), tuple(begin))
-        if key not in known:
-            known[key] = _descended(part, build, begin, some)
-        for i, choice in zip(branch, known[key], strict=True):
+        key = (build, _signature(part), frozenset(some), tuple(begin))
+        if key not in _found:
+            _found[key] = _descended(part, build, begin, some)
+        for i, choice in zip(branch, _found[key], strict=True):
             result[i] = choice
     return result
 

@@ -12,7 +12,7 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean import checking
+from paramreduce_cli.lean import checking, search
 from paramreduce_cli.lean.choices import OPTIONS, Choice, alternatives, from_data, to_data
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.lean.search import direct_outputs, formulations, inverse_outputs
@@ -271,7 +271,8 @@ def test_equal_branches_get_equal_choices(hexaglide):
             assert some[names.index(str(leg))] == some[first]
 
 
-def test_the_search_repeats_itself(puma):
+def test_the_search_repeats_itself(puma, monkeypatch):
+    monkeypatch.setattr(search, "_found", {})
     again = formulations(puma.mechanism, puma.affecting, puma.base.columns)
     assert again == puma.formulations
 

@@ -51,13 +51,13 @@ def test_a_tolerance_that_no_model_keeps_is_not_accepted(invoke, two_link_copy):
 
 
 def test_operations_as_a_tolerance(invoke, two_link_copy):
-    code, *_ = validated(invoke, two_link_copy, "selected.operations=38", "validation.accept={}")
+    code, *_ = validated(invoke, two_link_copy, "selected.operations=32", "validation.accept={}")
     assert code == 0
     with h5py.File(two_link_copy / "validation.h5") as file:
         heuristic, n = file["selected/heuristic"][()].decode(), int(file["selected/n"][()])
-        assert file[f"{heuristic}/operations_inverse"][n - 1] <= 38
+        assert file[f"{heuristic}/operations_inverse"][n - 1] <= 32
         for name in ("qr", "swap", "best-subset"):
-            cheap = file[f"{name}/operations_inverse"][:] <= 38
+            cheap = file[f"{name}/operations_inverse"][:] <= 32
             error = file[f"{heuristic}/torque_error_estimation"][n - 1]
             assert error <= file[f"{name}/torque_error_estimation"][:][cheap].min() * (1 + 1e-9)
 
