@@ -271,10 +271,10 @@ def test_equal_branches_get_equal_choices(hexaglide):
             assert some[names.index(str(leg))] == some[first]
 
 
-def test_the_search_repeats_itself(puma, monkeypatch):
+def test_the_search_repeats_itself(hexaglide, monkeypatch):
     monkeypatch.setattr(search, "_found", {})
-    again = formulations(puma.mechanism, puma.affecting, puma.base.columns)
-    assert again == puma.formulations
+    again = formulations(hexaglide.mechanism, hexaglide.affecting, hexaglide.base.columns)
+    assert again == hexaglide.formulations
 
 
 def test_unknown_choices_are_refused():
