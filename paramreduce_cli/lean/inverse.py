@@ -83,7 +83,7 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
 
 def axial_part(body: Inertia, choice: Choice, state: JointState) -> tuple[Inertia, Inertia]:
     """What a hinge cannot tell from a part of the body before, as far as it is chosen, and the rest."""
-    nothing = _scaled_to_nothing(body)
+    nothing = _no_inertia(body)
     if not state.joint.revolute:
         return nothing, body
     s, rest = split_off(body, choice.gauge)
@@ -93,7 +93,7 @@ def axial_part(body: Inertia, choice: Choice, state: JointState) -> tuple[Inerti
     return axial, replace(rest, m=rest.m - m, d=(rest.d[0], rest.d[1], rest.d[2] - z))
 
 
-def _scaled_to_nothing(body: Inertia) -> Inertia:
+def _no_inertia(body: Inertia) -> Inertia:
     zero = body.m - body.m
     return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
