@@ -58,11 +58,10 @@ def _function(function: Function, *, private: bool) -> list[str]:
     lines += [f'    """{function.text} {function.program.n_operations} operations.', ""]
     lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
     lines += ['    """']
-    leaders = function.arguments
     lines += [f"    {a.name} = _array({a.name!r}, {a.name}, {a.shape})" for a in function.arguments]
     steps, outputs = _LANGUAGE.body(function)
     lines += [f"    {name} = {text}" for name, text in steps]
-    shapes = ", ".join(f"{a.name}.shape[:-{len(a.shape)}]" for a in leaders)
+    shapes = ", ".join(f"{a.name}.shape[:-{len(a.shape)}]" for a in function.arguments)
     lines.append(f"    many = np.broadcast_shapes({shapes})")
     start = 0
     for result in function.results:

@@ -10,7 +10,7 @@ from paramreduce_cli.expressions.factoring import least
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.model import LeanModels, ties
 from paramreduce_cli.multibody.closures import closure_equations
 from paramreduce_cli.records import Formulations, IntArray, Mechanism
 
@@ -41,7 +41,9 @@ class LeanFunctions:
     ) -> None:
         self._mechanism = mechanism
         self._models = LeanModels(mechanism, formulations, independent=True)
-        self._kept, self._owner = kept, owner
+        self._kept = kept
+        self._owner = dict(zip(kept.tolist(), owner.tolist(), strict=True))
+        self._ties = ties(kept, owner)
         self._values = values if constant else None
         self._n_values = len(values)
         loops = mechanism.loops is not None
@@ -87,9 +89,8 @@ class LeanFunctions:
     def regressor(self) -> Function:
         """Torques as a linear map of the parameters."""
         n, z = self._n_values, self._mechanism.n_dof
-        same, start = self._ties(), self._models.n_parameters
-        program = self._models.inverse(self._kept, same=same)
-        leaders = {int(p): int(o) for p, o in zip(self._kept, self._owner, strict=True)}
+        start = self._models.n_parameters
+        program = self._models.inverse(self._kept, same=self._ties)
         graph = Graph()
         columns = []
         for value in range(n):
@@ -97,7 +98,7 @@ class LeanFunctions:
             def substitute(position: int, value: int = value) -> int:
                 if position >= start:
                     return graph.input(position - start)
-                return graph.constant(1.0) if leaders[position] == value else ZERO
+                return graph.constant(1.0) if self._owner[position] == value else ZERO
 
             columns.append(program.rebuilt(graph, substitute))
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
@@ -122,14 +123,13 @@ class LeanFunctions:
     ) -> Function:
         constants = _NO_VALUES
         if self._values is not None:
-            constants = {leader: self._values[j] for j, leader in self._leaders().items()}
-        program = model(self._kept, same=self._ties(), constants=constants)
-        owner = dict(zip(self._kept.tolist(), self._owner.tolist(), strict=True))
+            constants = {p: self._values[value] for p, value in self._owner.items()}
+        program = model(self._kept, same=self._ties, constants=constants)
         start, n = self._models.n_parameters, self._n_values
         graph = Graph()
 
         def substitute(position: int) -> int:
-            return graph.input(owner[position] if position < start else position - start + n)
+            return graph.input(self._owner[position] if position < start else position - start + n)
 
         outputs = arranged(program.rebuilt(graph, substitute))
         return self._trimmed(
@@ -141,18 +141,6 @@ class LeanFunctions:
                 Program.of_graph(graph, outputs),
             )
         )
-
-    def _leaders(self) -> dict[int, int]:
-        """The first standard parameter of every value that has any."""
-        result: dict[int, int] = {}
-        for parameter, value in zip(self._kept.tolist(), self._owner.tolist(), strict=True):
-            result.setdefault(value, parameter)
-        return result
-
-    def _ties(self) -> dict[int, int]:
-        leaders = self._leaders()
-        pairs = zip(self._kept.tolist(), self._owner.tolist(), strict=True)
-        return {p: leaders[o] for p, o in pairs if p != leaders[o]}
 
     def _trimmed(self, function: Function) -> Function:
         """Without arguments that its kind never needs; the others stay, used or not."""

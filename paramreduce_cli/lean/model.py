@@ -29,6 +29,20 @@ _NEAR = 1.03
 """Estimates further apart than that are not the wrong way round."""
 
 
+def ties(kept: IntArray, owner: IntArray) -> dict[int, int]:
+    """For every parameter but the first of those with the same value, that first one.
+
+    Args:
+        kept: Indices of parameters.
+        owner: What value each of them has.
+    """
+    first: dict[int, int] = {}
+    pairs = list(zip(kept.tolist(), owner.tolist(), strict=True))
+    for parameter, value in pairs:
+        first.setdefault(value, parameter)
+    return {parameter: first[value] for parameter, value in pairs if first[value] != parameter}
+
+
 class _Variants:
     """The same model in all formulations.
 
@@ -51,8 +65,6 @@ class _Variants:
 
     def promising(self, zero: BoolArray) -> list[Program]:
         """Those that may turn out to be the leanest."""
-        if len(self._programs) == 1:
-            return self._programs
         estimates = self.estimates(zero)
         most = _NEAR * min(estimates)
         return [p for p, count in zip(self._programs, estimates, strict=True) if count <= most]

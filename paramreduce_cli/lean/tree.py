@@ -51,10 +51,6 @@ class Tree:
     inertial: tuple[int, ...]
     """Indices of the bodies that have parameters, in the order of these."""
 
-    def children(self, i: int) -> list[int]:
-        """Joints on a body."""
-        return [k for k, joint in enumerate(self.joints) if joint.parent == i]
-
 
 def lean_tree(mechanism: Mechanism) -> Tree:
     """Choose the frames of a mechanism's tree."""

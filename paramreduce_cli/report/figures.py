@@ -57,11 +57,13 @@ FORMATS: dict[str, dict] = {
 
 
 def render(
-    draw: Callable[[ReportData], Figure], data: ReportData, formats: list[str]
+    draw: Callable[[ReportData], Figure | None], data: ReportData, formats: list[str]
 ) -> dict[str, bytes]:
-    """Draw a figure and encode it in each format."""
+    """Draw a figure and encode it in each format; nothing where there is nothing to draw."""
     with mpl.rc_context(_STYLE):
         drawn = draw(data)
+        if drawn is None:
+            return {}
         result = {}
         for name in formats:
             buffer = io.BytesIO()
@@ -364,10 +366,11 @@ def operations(data: ReportData) -> Figure:
 
 
 @figure("tracking")
-def tracking(data: ReportData) -> Figure:
+def tracking(data: ReportData) -> Figure | None:
     """Computed-torque control on a path that is in neither set: how far each joint is off with the full and with the selected model in the controller, and what one evaluation of the exported model takes."""
     result = data.tracking
-    assert result is not None
+    if result is None:
+        return None
     drawn = Figure(figsize=(8.4, 4.6))
     top, *below = drawn.subplots(
         1 + len(result.errors), 1, sharex=True, height_ratios=[1.2] + [1] * len(result.errors)

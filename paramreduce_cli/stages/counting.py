@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paramreduce_cli.config import Config
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.model import LeanModels, ties
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, IntArray, Model
 
@@ -84,11 +84,7 @@ def kept_and_tied(model: Model, expansion: FloatArray) -> tuple[IntArray, Mappin
         expansion: Standard parameters from the values kept, ones and zeros, (n_standard, n).
     """
     kept, owner = kept_and_owner(model, expansion)
-    first: dict[int, int] = {}
-    for k, value in zip(kept.tolist(), owner.tolist(), strict=True):
-        first.setdefault(value, k)
-    pairs = zip(kept.tolist(), owner.tolist(), strict=True)
-    return kept, {k: first[value] for k, value in pairs if first[value] != k}
+    return kept, ties(kept, owner)
 
 
 def kept_and_owner(model: Model, expansion: FloatArray) -> tuple[IntArray, IntArray]:

@@ -148,9 +148,14 @@ def export(
     """
     mechanism = model.mechanism
     functions = exported_functions(model, chosen, what, constant=constant)
+    closures: tuple[Function, ...] = ()
+    if mechanism.loops is not None:
+        closures = tuple(_functions_of(model, chosen, constant=constant).closures())
     rng = np.random.default_rng(0)
     checked = cases(model, chosen, _CHECKED, rng)
     check(functions, checked)
+    if closures:
+        _check_closures(closures, checked)
     unsafe = _unsafe(checked["M"]) if "direct" in WHAT[what] else ""
     if unsafe:
         warnings.warn(f"{chosen.title}: {unsafe}", ParamreduceWarning, stacklevel=2)
@@ -177,9 +182,7 @@ def export(
         ),
         constant=constant,
         functions=functions,
-        closures=tuple(_functions_of(model, chosen, constant=constant).closures())
-        if mechanism.loops is not None
-        else (),
+        closures=closures,
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
     )
@@ -249,8 +252,7 @@ def cases(
     if mechanism.loops is None:
         return result
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)
-    R = Coordinates(mechanism, once=True).tangent(q)
-    R = R.reshape(count, mechanism.n_q, mechanism.n_dof)[:, dependent]
+    R = Coordinates(mechanism, once=True).tangent(q)[:, dependent]
     b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
     guess = q.copy()
     guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
@@ -275,21 +277,44 @@ def check(
         FormulationError: They are not the same.
     """
     for function in functions:
-        inputs = [
-            column
-            for argument in function.arguments
-            for column in stored[argument.name].reshape(-1, argument.size).T
-        ]
-        values = function.program.evaluated(inputs)
-        start = 0
-        for result in function.results:
-            wanted = stored[result.name].reshape(-1, result.size)
-            some = values[start : start + result.size]
-            start += result.size
-            got = np.column_stack([np.broadcast_to(value, wanted.shape[0]) for value in some])
-            error = np.max(np.abs(got - wanted)) / max(float(np.max(np.abs(wanted))), 1e-300)
-            if not error <= tolerance:
-                raise FormulationError(
-                    f"{function.name}: {result.name} is off by {error:.1e} of its largest value against "
-                    "plain recursion. This is a defect of paramreduce: please report it with the config."
-                )
+        for name, got in _evaluated(function, stored).items():
+            wanted = stored[name].reshape(got.shape)
+            _refuse_if_off(f"{function.name}: {name}", got - wanted, wanted, tolerance)
+
+
+def _check_closures(closures: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:
+    """The loops are closed, and their derivatives are those of R and b."""
+    values: dict[str, FloatArray] = {}
+    for function in closures:
+        values |= _evaluated(function, stored)
+    _refuse_if_off("closure", values["Phi"], stored["q"], _TOLERANCE)
+    along = values["Phi_d"] @ stored["R"]
+    _refuse_if_off("closure_jacobian", along + values["Phi_z"], along, _TOLERANCE)
+    drift = np.einsum("kij,kj->ki", values["Phi_d"], stored["b"])
+    _refuse_if_off("closure_bias", drift - values["gamma"], drift, _TOLERANCE)
+
+
+def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Results of a function for stored arguments, (n_states, ...) by name."""
+    inputs = [
+        column
+        for argument in function.arguments
+        for column in stored[argument.name].reshape(-1, argument.size).T
+    ]
+    values = function.program.evaluated(inputs)
+    count = len(stored["q"])
+    result = {}
+    for array in function.results:
+        own, values = values[: array.size], values[array.size :]
+        columns = [np.broadcast_to(value, count) for value in own]
+        result[array.name] = np.column_stack(columns).reshape(count, *array.shape)
+    return result
+
+
+def _refuse_if_off(what: str, off: FloatArray, against: FloatArray, tolerance: float) -> None:
+    error = float(np.max(np.abs(off))) / max(float(np.max(np.abs(against))), 1e-300)
+    if not error <= tolerance:
+        raise FormulationError(
+            f"{what} is off by {error:.1e} of its largest value against plain recursion. This is a defect "
+            "of paramreduce: please report it with the config."
+        )

@@ -58,9 +58,9 @@ def report(
     images = {}
     formats = [str(name) for name in config.report.formats]
     for name, draw in registry.figure.items():
-        if name == "tracking" and data.tracking is None:
-            continue
         encoded = render(draw, data, sorted({*formats, "svg"}))
+        if not encoded:
+            continue
         images[name] = ((draw.__doc__ or name).strip(), encoded["svg"])
         files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
     tables = {name: make(data) for name, make in registry.table.items()}

@@ -51,12 +51,8 @@ def torques(mechanism, q, dq, ddq, phi, gravity):
             extra = ddq[i] * z + ca.cross(own_w, spin)
             # The origin turns about the axis with the joint: what r does not say yet.
             own_a = own_a + ca.cross(extra, arm) + ca.cross(spin, ca.cross(spin, arm))
-            own_a = (
-                own_a
-                + ca.cross(own_w, ca.cross(spin, arm))
-                + ca.cross(spin, ca.cross(own_w, arm))
-                - ca.cross(ca.cross(own_w, spin), arm)
-            )
+            own_a = own_a + ca.cross(own_w, ca.cross(spin, arm))
+            own_a = own_a + ca.cross(spin, ca.cross(own_w, arm))
             own_w, own_dw = own_w + spin, own_dw + extra
         else:
             own_a = own_a + ddq[i] * z + 2 * ca.cross(own_w, dq[i] * z)
