@@ -7,13 +7,15 @@ import types
 import typing
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts.store import LAYOUTS
 from paramreduce_cli.config import Config
-from paramreduce_cli.records import Coefficients, Recordings, Report, Trajectories
-from paramreduce_cli.registry import stages
+from paramreduce_cli.config.sections import has_default, is_section
+from paramreduce_cli.records import Coefficients, Recordings, Report, Run, Samples, Trajectories
+from paramreduce_cli.stages import stages
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
 
@@ -37,6 +39,11 @@ class Stage:
     output: type
 
     @property
+    def sections(self) -> list[StageInput]:
+        """The sections of the config that its result depends on."""
+        return [entry for entry in self.inputs if is_section(entry.type)]
+
+    @property
     def artifacts(self) -> list[StageInput]:
         """The inputs that other stages make."""
         own = self.output
@@ -46,6 +53,18 @@ class Stage:
     def previous(self) -> StageInput | None:
         """Where the stage takes what it has made before, to go on from there."""
         return next((entry for entry in self.inputs if entry.type is self.output), None)
+
+    @property
+    def lends_run(self) -> StageInput | None:
+        """Where the stage takes workers and an audience."""
+        return next((entry for entry in self.inputs if entry.type is Run), None)
+
+    @property
+    def needs_config(self) -> bool:
+        """Whether it cannot run on brought samples alone."""
+        made = [entry for entry in self.artifacts if not entry.optional]
+        on_samples = [entry.type for entry in made] == [Samples]
+        return not on_samples or not all(has_default(entry.type) for entry in self.sections)
 
 
 def describe_stage(name: str, function: Callable[..., Any]) -> Stage:
@@ -61,9 +80,10 @@ def describe_stage(name: str, function: Callable[..., Any]) -> Stage:
     return Stage(name, function, tuple(inputs), output)
 
 
-def pipeline() -> list[Stage]:
+@cache
+def pipeline() -> tuple[Stage, ...]:
     """All stages, each after those whose artifacts it reads."""
-    waiting = [describe_stage(name, function) for name, function in stages().items()]
+    waiting = [describe_stage(name, function) for name, function in stages.items()]
     ordered: list[Stage] = []
     made: set[type] = set()
     while waiting:
@@ -75,7 +95,7 @@ def pipeline() -> list[Stage]:
         ordered.append(ready[0])
         made.add(ready[0].output)
         waiting.remove(ready[0])
-    return ordered
+    return tuple(ordered)
 
 
 def maker_of(record: type) -> str:

@@ -1,95 +1,68 @@
 """Names to functions: everything that is chosen by name in a config or at the shell.
 
-A registry knows the package its functions live in and imports that package's modules when it
-is first asked, so that a new file with a decorated function is all it takes to add one.
+What a room offers are the files in its folder: ``forward_selection.py`` holds the function
+``forward_selection`` and is called forward-selection. So a new file is all it takes to add one,
+and names can be listed without importing what they stand for.
 """
 
 from __future__ import annotations
 
 import importlib
-import pkgutil
 from collections.abc import Callable, Iterator
-from typing import Any, TypeVar
+from pathlib import Path
+from typing import Any
 
-F = TypeVar("F", bound=Callable[..., Any])
+_PACKAGE = Path(__file__).parent
+
+
+def offered(folder: str) -> tuple[str, ...]:
+    """Public names in a folder of the package, such as ``reduction/heuristics``; nothing is imported.
+
+    Raises:
+        ValueError: There is no such folder.
+    """
+    files = _files(_PACKAGE / folder)
+    if not files:
+        raise ValueError(f"{folder} offers nothing")
+    return tuple(files)
+
+
+def _files(folder: Path) -> dict[str, Path]:
+    """Files by the names they offer; folders inside belong to it."""
+    found = sorted(path for path in folder.rglob("*.py") if not path.stem.startswith("_"))
+    return {path.stem.replace("_", "-"): path for path in found}
 
 
 class Registry:
-    """Functions by their public names, in the order of registration.
+    """The functions that a room offers, by their public names.
+
+    A room makes it in its ``__init__``, so that it imports no files but its own.
 
     Args:
         kind: What its entries are, for messages.
-        package: Where they are defined.
+        room: Name of the package whose ``__init__`` makes it.
     """
 
-    def __init__(self, kind: str, package: str) -> None:
+    def __init__(self, kind: str, room: str) -> None:
         self.kind = kind
-        self._package = package
-        self._loaded = False
-        self._entries: dict[str, Callable[..., Any]] = {}
-
-    def __call__(self, name: str) -> Callable[[F], F]:
-        """Decorate a function to enter it under ``name``."""
-
-        def enter(function: F) -> F:
-            if name in self._entries:
-                raise ValueError(f"{self.kind} {name} is registered twice")
-            self._entries[name] = function
-            return function
-
-        return enter
-
-    def _all(self) -> dict[str, Callable[..., Any]]:
-        if not self._loaded:
-            package = importlib.import_module(self._package)
-            for module in pkgutil.iter_modules(package.__path__):
-                importlib.import_module(f"{self._package}.{module.name}")
-            self._loaded = True
-        return self._entries
+        self._files = _files(_PACKAGE.joinpath(*room.split(".")[1:]))
 
     def __getitem__(self, name: str) -> Callable[..., Any]:
-        return self._all()[name]
+        path = self._files[name].relative_to(_PACKAGE.parent).with_suffix("")
+        function: Callable[..., Any] = getattr(
+            importlib.import_module(".".join(path.parts)), path.stem
+        )
+        return function
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._all())
+        return iter(self._files)
 
     def __contains__(self, name: object) -> bool:
-        return name in self._all()
+        return name in self._files
 
     def __len__(self) -> int:
-        return len(self._all())
+        return len(self._files)
 
     def items(self) -> list[tuple[str, Callable[..., Any]]]:
         """Names with their functions."""
-        return list(self._all().items())
-
-
-heuristic = Registry("heuristic", "paramreduce_cli.reduction")
-criterion = Registry("criterion", "paramreduce_cli.excitation")
-selection_criterion = Registry("criterion", "paramreduce_cli.reduction")
-scaling = Registry("scaling", "paramreduce_cli.excitation")
-exporter = Registry("exporter", "paramreduce_cli.export")
-figure = Registry("figure", "paramreduce_cli.report")
-table = Registry("table", "paramreduce_cli.report")
-_stages = Registry("stage", "paramreduce_cli.stages")
-
-
-def torque_only(function: F) -> F:
-    """Declare a heuristic that makes sense for the torque error alone."""
-    function.torque_only = True  # type: ignore[attr-defined]
-    return function
-
-
-def selects_by_torque_only(function: Callable[..., Any]) -> bool:
-    """Whether a heuristic was declared so."""
-    return getattr(function, "torque_only", False)
-
-
-def stage(function: F) -> F:
-    """Declare a stage: its signature says what it reads and writes, its name what it is called."""
-    return _stages(function.__name__.replace("_", "-"))(function)
-
-
-def stages() -> dict[str, Callable[..., Any]]:
-    """The declared stages by command name."""
-    return dict(_stages.items())
+        return [(name, self[name]) for name in self]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import hashlib
 import json
 import time
-import types
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,15 +22,11 @@ from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.artifacts.parts import Parts
-from paramreduce_cli.artifacts.store import (
-    Store,
-    check_schema,
-    file_digest,
-    file_of,
-    load_file,
-)
-from paramreduce_cli.config import Config, section_text
-from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
+from paramreduce_cli.config import Config
+from paramreduce_cli.config.concerns import explained
+from paramreduce_cli.config.sections import digests, is_section, section, section_digest
+from paramreduce_cli.errors import ArtifactError, ConcernError
 from paramreduce_cli.pipeline import (
     Stage,
     StageInput,
@@ -51,32 +46,6 @@ from paramreduce_cli.records import (
     Samples,
     Trajectories,
 )
-
-
-class _Watched:
-    """A config that notes which of its sections are read."""
-
-    def __init__(self, config: Config) -> None:
-        self._config = config
-        self._seen: set[str] = set()
-
-    def __getattr__(self, name: str) -> Any:
-        if name in Config.model_fields:
-            self._seen.add(name)
-            return getattr(self._config, name)
-        attribute = getattr(Config, name)
-        if isinstance(attribute, property):
-            assert attribute.fget is not None
-            return attribute.fget(self)
-        return types.MethodType(attribute, self)
-
-    def digests(self) -> dict[str, str]:
-        """Of the sections that were read."""
-        return {name: _digest(section_text(self._config, name)) for name in sorted(self._seen)}
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
 
 
 def versions() -> dict[str, str]:
@@ -101,17 +70,11 @@ class Outcome:
 
 
 class _Inputs:
-    """What one stage has read so far: sections of the config, and files by their digests."""
+    """What one stage has read so far: files by their digests."""
 
     def __init__(self, config: Config | None) -> None:
         self.config = config
-        self.watched = _Watched(config) if config is not None else None
         self.digests: dict[str, str] = {}
-
-    def section(self, name: str) -> None:
-        """Note a section that was read on the stage's behalf."""
-        if self.watched is not None:
-            getattr(self.watched, name)
 
     def files(self, kind: type) -> dict[str, Path]:
         """Files of a kind that the config names, by name; noted as read."""
@@ -170,7 +133,10 @@ class Runner:
         if stage.previous is not None:
             arguments[stage.previous.name] = previous
         parts = self._lend_run(stage, arguments, inputs)
-        record = stage.function(**arguments)
+        try:
+            record = stage.function(**arguments)
+        except ConcernError as error:
+            raise explained(error) from error
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
             parts.clear()
@@ -203,7 +169,7 @@ class Runner:
         return [
             name
             for name, digest in stamp.sections.items()
-            if name not in Config.model_fields or _digest(section_text(self.config, name)) != digest
+            if section_digest(self.config, tuple(name.split("."))) != digest
         ]
 
     def _input_digests(self, stage: Stage) -> dict[str, str]:
@@ -218,12 +184,11 @@ class Runner:
         return inputs.digests
 
     def _argument(self, entry: StageInput, inputs: _Inputs) -> Any:
-        if entry.type is Config:
-            return inputs.watched
+        if is_section(entry.type):
+            return section(self.config, entry.type)
         if entry.type is Provenance:
             return self._provenance()
         if entry.type is Coefficients:
-            inputs.section("trajectories")
             paths = inputs.files(Coefficients)
             return load_coefficients(paths["coefficients"]) if paths else None
         if entry.type is Recordings:
@@ -286,7 +251,6 @@ class Runner:
 
     def _recordings(self, inputs: _Inputs) -> Recordings:
         assert self.config is not None
-        inputs.section("sampling")
         found: dict[str, Recording | None] = {"estimation": None, "validation": None}
         for name, path in inputs.files(Recordings).items():
             found[name] = load_recording(path, self.config.n_dof)
@@ -294,27 +258,26 @@ class Runner:
 
     def _lend_run(self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs) -> Parts | None:
         """Hand workers, finished parts and progress to a stage that asks for them."""
-        asked = next((entry.name for entry in stage.inputs if entry.type is Run), None)
-        if asked is None:
+        if stage.lends_run is None:
             return None
-        if stage.output is not Trajectories:
-            arguments[asked] = Run(self.jobs, {}, self.progress, self.interrupted)
-            return None
-        # A part may be used again only if nothing that could change it has changed.
-        inputs.section("trajectories")
-        path = self.store.path(stage.output)
-        stamp = self._stamp(stage, inputs, time.perf_counter())
-        parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
-        arguments[asked] = Run(self.jobs, parts, self.progress, self.interrupted)
+        parts = None
+        if stage.output is Trajectories:
+            # A part may be used again only if nothing that could change it has changed.
+            path = self.store.path(stage.output)
+            stamp = self._stamp(stage, inputs, time.perf_counter())
+            parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
+        arguments[stage.lends_run.name] = Run(
+            self.jobs, {} if parts is None else parts, self.progress, self.interrupted
+        )
         return parts
 
     def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:
-        sections = inputs.watched.digests() if inputs.watched is not None else {}
-        seeds = [
-            getattr(self.config, name).seed
-            for name in sections
-            if hasattr(getattr(self.config, name), "seed")
-        ]
+        sections: dict[str, str] = {}
+        seeds = []
+        if self.config is not None:
+            for entry in stage.sections:
+                sections |= digests(self.config, entry.type)
+                seeds += [getattr(section(self.config, entry.type), "seed", None)]
         return Stamp(
             schema=SCHEMA,
             robot=self._robot,
@@ -322,7 +285,7 @@ class Runner:
             versions=versions(),
             sections=sections,
             inputs=dict(inputs.digests),
-            seed=next(iter(seeds), 0),
+            seed=next((seed for seed in seeds if seed is not None), 0),
             seconds=time.perf_counter() - started,
         )
 
@@ -334,4 +297,6 @@ class Runner:
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
         text = json.dumps(self.config.model_dump(mode="json"), sort_keys=True)
-        return Provenance(self.config.robot, _digest(text), versions(), seconds)
+        return Provenance(
+            self.config.robot, hashlib.sha256(text.encode()).hexdigest(), versions(), seconds
+        )

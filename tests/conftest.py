@@ -11,8 +11,10 @@ from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
 from paramreduce_cli.config import load_config
 from paramreduce_cli.pipeline import stages_to_run
-from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh
+from paramreduce_cli.records import ReducedModel
+from paramreduce_cli.robots import Robot
 from paramreduce_cli.runner import Runner
+from paramreduce_cli.stages.build_model import build_model
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"
@@ -26,35 +28,73 @@ PUMA_ROWS = [
 ]  # fmt: skip
 
 
+def mechanism_of(description, gravity=(0, 0, -9.81), robot="arm"):
+    """The mechanism of a description, without parameters' values."""
+    description = {**description, "gravity": [float(g) for g in gravity]}
+    return Robot(robot=robot, description=description, parameter_sets={"none": {}}).mechanism()
+
+
+def dh(rows, convention="modified"):
+    """A Denavit-Hartenberg description of (name, parent, type, a, alpha, d, theta, gamma, b)."""
+    keys = ("name", "parent", "type", "a", "alpha", "d", "theta", "gamma", "b")
+    joints = [dict(zip(keys, row, strict=False)) for row in rows]
+    return {"dh": {"convention": convention, "joints": joints}}
+
+
 def puma_mechanism():
     rows = [
-        DHRow(str(k + 1), str(k) if k else None, "revolute", a, alpha, d, 0.0)
+        (str(k + 1), str(k) if k else None, "revolute", a, alpha, d)
         for k, (a, alpha, d) in enumerate(PUMA_ROWS)
     ]
-    return mechanism_from_dh("puma560", rows, "modified", [0, 0, -9.81])
+    return mechanism_of(dh(rows), robot="puma560")
 
 
 def standard_arm():
     """Standard DH with offsets, a prismatic joint and nothing at right angles."""
     rows = [
-        DHRow("one", None, "revolute", 0.1, 0.7, 0.3, 0.4),
-        DHRow("two", "one", "prismatic", 0.2, -0.4, 0.15, 0.9),
-        DHRow("three", "two", "revolute", 0.25, 1.1, -0.2, PI / 2),
-        DHRow("four", "three", "revolute", -0.1, 0.3, 0.05, 0.0),
+        ("one", None, "revolute", 0.1, 0.7, 0.3, 0.4),
+        ("two", "one", "prismatic", 0.2, -0.4, 0.15, 0.9),
+        ("three", "two", "revolute", 0.25, 1.1, -0.2, PI / 2),
+        ("four", "three", "revolute", -0.1, 0.3, 0.05, 0.0),
     ]
-    return mechanism_from_dh("standard_arm", rows, "standard", [1.0, -2.0, -9.0])
+    return mechanism_of(dh(rows, "standard"), [1.0, -2.0, -9.0])
 
 
 def branching_tree():
     """A prismatic-revolute tree with two branches on one body, gravity askew."""
     rows = [
-        DHRow("slide", None, "prismatic", 0.0, 0.3, 0.2, 0.5),
-        DHRow("left", "slide", "revolute", 0.4, -PI / 2, 0.1, 0.0, 0.6, 0.2),
-        DHRow("right", "slide", "revolute", 0.3, 0.8, -0.1, 0.2, -0.9, -0.1),
-        DHRow("tip", "right", "prismatic", 0.2, PI / 2, 0.0, 0.0),
-        DHRow("wrist", "tip", "revolute", 0.0, -1.0, 0.3, 0.0),
+        ("slide", None, "prismatic", 0.0, 0.3, 0.2, 0.5),
+        ("left", "slide", "revolute", 0.4, -PI / 2, 0.1, 0.0, 0.6, 0.2),
+        ("right", "slide", "revolute", 0.3, 0.8, -0.1, 0.2, -0.9, -0.1),
+        ("tip", "right", "prismatic", 0.2, PI / 2, 0.0, 0.0),
+        ("wrist", "tip", "revolute", 0.0, -1.0, 0.3, 0.0),
     ]
-    return mechanism_from_dh("tree", rows, "modified", [0.5, 1.5, -9.3])
+    return mechanism_of(dh(rows), [0.5, 1.5, -9.3])
+
+
+def config_of(robot, *overrides):
+    """One of the configs that ship."""
+    return load_config(CONFIGS / f"{robot}.yaml", overrides)
+
+
+def model_of(robot, *overrides):
+    """The model of one of the configs that ship."""
+    config = config_of(robot, *overrides)
+    return build_model(config, config.model)
+
+
+def constraints_of(config, mechanism):
+    return tuple(entry.constraint(mechanism) for entry in config.trajectories.constraints)
+
+
+def whole(mechanism, kept, values=None):
+    """The model that keeps some standard parameters, a value each."""
+    kept = np.asarray(kept, dtype=int)
+    position = np.full(mechanism.n_parameters, -1)
+    position[kept] = np.arange(kept.size)
+    names = tuple(mechanism.parameter_names[k] for k in kept)
+    values = np.ones(kept.size) if values is None else np.asarray(values)
+    return ReducedModel(names, values, position, names)
 
 
 MECHANISMS = {"puma": puma_mechanism, "standard": standard_arm, "tree": branching_tree}

@@ -2,14 +2,14 @@
 
 import numpy as np
 
-from paramreduce_cli import registry
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.problem import SelectionProblem
-from paramreduce_cli.reduction.task import Effort, Task
-from paramreduce_cli.reduction.torque import TorqueObjective
+from paramreduce_cli.reduction.task import Effort, SelectionTask
 
 
 def found(name, problem, **task):
-    return registry.heuristic[name](Task(TorqueObjective(problem), **task))
+    return heuristics[name](SelectionTask(TorqueObjective(problem), **task))
 
 
 def subsets(name, problem, **task):

@@ -1,6 +1,10 @@
 """Imports point down; the walk is over the source, nothing is run."""
 
 import ast
+import json
+import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -12,17 +16,23 @@ LAYERS = [
     {"cli", "__main__"},
     {"workflow", "runner"},
     {"pipeline"},
-    {"stages", "artifacts"},
-    {"config", "robots", "excitation", "reduction", "lean", "export", "report"},
+    {"stages"},
+    {"judgement", "artifacts", "tracking", "export", "report"},
+    {"excitation", "reduction", "lean"},
     {"multibody"},
     {"expressions"},
+    {"config"},
+    {"robots"},
+    {"fields"},
     {"records"},
-    {"registry"},
+    {"registry", "texts"},
     {"errors"},
 ]
 LEVEL = {name: k for k, names in enumerate(LAYERS) for name in names}
 SAME_LAYER = {("__main__", "cli")}
 FILES = sorted(p for p in PACKAGE.rglob("*.py") if p.parent != PACKAGE or p.stem != "__init__")
+LIGHT = ("casadi", "numba", "matplotlib", "scipy", "h5py")
+"""Libraries that reading a config does without."""
 
 
 def room(path):
@@ -30,6 +40,7 @@ def room(path):
 
 
 def imported_rooms(path):
+    """Rooms that a file names in imports, early or late, or in a text such as import_module takes."""
     for node in ast.walk(ast.parse(path.read_text())):
         names = []
         if isinstance(node, ast.ImportFrom) and node.module:
@@ -38,10 +49,15 @@ def imported_rooms(path):
                 names = [f"paramreduce_cli.{alias.name}" for alias in node.names]
         elif isinstance(node, ast.Import):
             names = [alias.name for alias in node.names]
+        elif isinstance(node, ast.Constant) and re.fullmatch(MODULE, str(node.value)):
+            names = [node.value]
         for name in names:
             parts = name.split(".")
             if parts[0] == "paramreduce_cli" and len(parts) > 1 and parts[1] != "__version__":
                 yield parts[1]
+
+
+MODULE = r"paramreduce_cli(\.\w+)+"
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
@@ -50,6 +66,34 @@ def test_imports_point_down(path):
     for other in imported_rooms(path):
         allowed = other == own or LEVEL[other] > LEVEL[own] or (own, other) in SAME_LAYER
         assert allowed, f"{own} imports {other}"
+
+
+def calls(path, name):
+    nodes = [n for n in ast.walk(ast.parse(path.read_text())) if isinstance(n, ast.Call)]
+    return [n for n in nodes if getattr(n.func, "id", getattr(n.func, "attr", "")) == name]
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: str(p.relative_to(PACKAGE)))
+def test_what_is_imported_by_name_is_of_the_own_room(path):
+    """Registries are made by their rooms alone, and nothing else imports by name."""
+    for call in calls(path, "Registry"):
+        assert path.name == "__init__.py"
+        assert getattr(call.args[1], "id", None) == "__name__"
+    assert not calls(path, "import_module") or path.name == "registry.py"
+    assert not calls(path, "__import__")
+
+
+def test_reading_a_config_loads_no_numerics():
+    """Names on offer are listed without importing what they stand for."""
+    script = (
+        "import json, sys; from paramreduce_cli.config import config_schema; config_schema(); "
+        "print(json.dumps(sorted(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    loaded = set(json.loads(done.stdout))
+    assert not loaded & set(LIGHT)
+    ours = {name.split(".")[1] for name in loaded if name.startswith("paramreduce_cli.")}
+    assert min(LEVEL[name] for name in ours) == LEVEL["config"]
 
 
 def modules_importing(name):

@@ -1,9 +1,8 @@
 """Trees of all kinds."""
 
 import numpy as np
+from conftest import mechanism_of
 from scipy.spatial.transform import Rotation
-
-from paramreduce_cli.robots.closed_loop import TreeBody, mechanism_from_bodies
 
 AXES = [(1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, -1), (1, 2, -1)]
 
@@ -14,19 +13,27 @@ def random_tree(seed, n_joints=6):
     rows = []
     for k in range(n_joints):
         parent = None if k == 0 else str(rng.integers(max(0, k - 2), k))
-        placement = np.eye(4)
+        rotation = Rotation.identity()
         if rng.random() < 0.3:
-            placement[:3, :3] = Rotation.random(random_state=rng).as_matrix()
+            rotation = Rotation.random(random_state=rng)
         elif rng.random() < 0.5:
-            placement[:3, :3] = Rotation.from_euler(
-                "x", rng.integers(4) * 90, degrees=True
-            ).as_matrix()
+            rotation = Rotation.from_euler("x", rng.integers(4) * 90, degrees=True)
         if rng.random() < 0.1:
             tilt = 10.0 ** rng.uniform(-9, -3)
-            placement[:3, :3] = Rotation.from_euler("xy", [tilt, -tilt]).as_matrix()
-        placement[:3, 3] = rng.normal(size=3) * (rng.random(3) < 0.6)
+            rotation = Rotation.from_euler("xy", [tilt, -tilt])
+        shift = rng.normal(size=3) * (rng.random(3) < 0.6)
         kind = "revolute" if rng.random() < 0.7 else "prismatic"
-        axis = tuple(float(x) for x in AXES[rng.integers(len(AXES))])
+        axis = [float(x) for x in AXES[rng.integers(len(AXES))]]
         massless = bool(rng.random() < 0.15)
-        rows.append(TreeBody(str(k), parent, kind, (axis,), placement, (f"q{k}",), massless))
-    return mechanism_from_bodies(f"tree {seed}", rows, rng.normal(size=3) * 5)
+        rows.append(
+            {"name": str(k), "parent": parent or "base", "joint": kind, "axes": [axis],
+             "at": [{"xyz": shift.tolist()}, *turns(rotation)], "coordinates": [f"q{k}"],
+             "massless": massless}
+        )  # fmt: skip
+    return mechanism_of({"tree": {"bodies": rows}}, rng.normal(size=3) * 5, f"tree_{seed}")
+
+
+def turns(rotation):
+    """A rotation as steps about z, y and x, one after the other."""
+    angles = rotation.as_euler("ZYX")
+    return [{f"r{axis}": float(a)} for axis, a in zip("zyx", angles, strict=True)]

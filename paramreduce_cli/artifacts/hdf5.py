@@ -18,7 +18,7 @@ import numpy as np
 from paramreduce_cli.artifacts.atomic import PatientFile, atomically
 from paramreduce_cli.errors import ArtifactError
 
-SCHEMA = 4
+SCHEMA = 5
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
 _CHUNK = 16384

@@ -1,370 +1,212 @@
-"""What stands where in each artifact: how every record is written and read.
+"""What stands where in each artifact: every record is written and read field by field.
 
-docs/artifacts.md describes the same for people, with shapes and units.
+A field is a dataset of its name, a record in a field a group. What is called otherwise in a file
+is listed here; docs/artifacts.md describes the same for people, with shapes and units.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import json
+import types
+import typing
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer
+from paramreduce_cli.artifacts.plain import dtype_of, from_plain, to_plain
 from paramreduce_cli.records import (
-    BaseParameters,
-    Body,
-    Closure,
-    Constraint,
-    Formulations,
-    HeuristicValidation,
-    Loops,
-    Mechanism,
+    Columns,
     Model,
     Proofs,
+    ReducedModel,
     Reduction,
     Selected,
     Stability,
     Subsets,
     Trajectories,
     Trajectory,
-    Validation,
 )
 
-
-def mechanism_to_json(mechanism: Mechanism) -> str:
-    """A mechanism as text."""
-
-    def plain(value: Any) -> Any:
-        return value.tolist() if isinstance(value, np.ndarray) else dict(value)
-
-    return json.dumps(dataclasses.asdict(mechanism), default=plain)
-
-
-def mechanism_from_json(text: str) -> Mechanism:
-    """The inverse of :func:`mechanism_to_json`."""
-    data = json.loads(text)
-    bodies = tuple(
-        Body(**{**b, "before": np.array(b["before"]), "after": np.array(b["after"])})
-        for b in data.pop("bodies")
-    )
-    data["gravity"] = np.array(data["gravity"])
-    data["table"] = tuple(tuple(row) for row in data["table"])
-    loops = data.pop("loops")
-    return Mechanism(bodies=bodies, loops=loops and _loops_from_json(loops), **data)
-
-
-def _loops_from_json(data: dict[str, Any]) -> Loops:
-    closures = tuple(
-        Closure(
-            **{
-                **entry,
-                "bodies": tuple(entry["bodies"]),
-                "frames": tuple(np.array(frame) for frame in entry["frames"]),
-            }
-        )
-        for entry in data["closures"]
-    )
-    return Loops(closures, tuple(data["independent"]), np.array(data["assembly"]))
-
-
-def _constraints_to_json(constraints: tuple[Constraint, ...]) -> str:
-    def plain(constraint: Constraint) -> dict[str, Any]:
-        bounds = {
-            key: value if np.isfinite(value) else None
-            for key, value in (("lower", constraint.lower), ("upper", constraint.upper))
-        }
-        vectors = [vector.tolist() for vector in constraint.vectors]
-        return {**dataclasses.asdict(constraint), "vectors": vectors, **bounds}
-
-    return json.dumps([plain(constraint) for constraint in constraints], allow_nan=False)
+_NAMES: dict[tuple[type, str], str] = {
+    (Model, "values"): "parameters/values",
+    (Model, "affecting"): "parameters/affecting",
+    (Trajectory, "kappa"): "condition_number",
+    (Trajectory, "kappa_variants"): "condition_number_variants",
+    (Reduction, "columns"): "parameters",
+    (Selected, "model"): "",
+    (Stability, "variants"): "",
+    (ReducedModel, "names"): "parameters",
+}
+"""Fields whose datasets have another name; a group without one is that of the record itself."""
+_ATTRIBUTES = {
+    (Trajectories, name)
+    for name in ("period", "points", "criterion", "scaling", "use_full_range", "source")
+}
+"""Fields that are attributes of the file."""
+_TEXTS = {(Model, "mechanism"), (Model, "formulations"), (Trajectories, "constraints")}
+"""Fields that are one JSON text."""
+_BY_SIZE = {
+    *((Subsets, name) for name in ("subsets", "parameters", "beta")),
+    *((Proofs, name) for name in ("subsets", "logs")),
+}
+"""Arrays, one for each subset: datasets named by its size."""
+_TIMINGS = {"seconds", "cpu_seconds"}
+"""How long something took, which is no part of what a file holds."""
+_KEYS: dict[tuple[type, str], str] = {(Trajectory, "kappa_variants"): "scalings"}
+"""What the list of the names in a mapping is called."""
+_DERIVED: dict[type, Callable[[Any], dict[str, Any]]] = {
+    Model: lambda model: {
+        "parameters/names": model.mechanism.parameter_names,
+        "coordinates/names": model.mechanism.coordinate_names,
+        "coordinates/generalised": model.mechanism.generalised_names,
+    },
+    Selected: lambda selected: {"n": selected.n},
+    Stability: lambda found: {"variants": [str(variant) for variant in found.variants]},
+    Columns: lambda columns: {"expansion": columns.expansion},
+    Subsets: lambda found: {} if found.order is None else {"order": found.order},
+}
+"""Datasets that follow from a record, for readers of the file."""
 
 
-def _constraints_from_json(text: str) -> tuple[Constraint, ...]:
-    return tuple(
-        Constraint(
-            **{
-                **entry,
-                "bodies": tuple(entry["bodies"]),
-                "vectors": tuple(np.array(vector) for vector in entry["vectors"]),
-                "lower": -np.inf if entry["lower"] is None else entry["lower"],
-                "upper": np.inf if entry["upper"] is None else entry["upper"],
-            }
-        )
-        for entry in json.loads(text)
-    )
+def _fields(record: type, prefix: str) -> Iterator[tuple[str, Any, str]]:
+    """Name, type and path of every field."""
+    hints = typing.get_type_hints(record)
+    for field in dataclasses.fields(record):
+        path = _joined(prefix, _NAMES.get((record, field.name), field.name))
+        yield field.name, hints[field.name], path
 
 
-def save_model(writer: Writer, model: Model) -> None:
-    """model.h5"""
-    mechanism, base = model.mechanism, model.base
-    names = mechanism.parameter_names
-    writer.dataset("parameters/names", names)
-    writer.dataset("parameters/values", model.values)
-    writer.dataset("parameters/affecting", model.affecting)
-    writer.dataset("base/columns", base.columns)
-    writer.dataset("base/beta", base.beta)
-    writer.dataset("base/singular_values", base.singular_values)
-    writer.dataset("base/rank_gap", base.rank_gap)
-    writer.dataset("base/expressions", list(base.expressions))
-    writer.dataset("coordinates/names", mechanism.coordinate_names)
-    writer.dataset("coordinates/generalised", mechanism.generalised_names)
-    writer.dataset("nominal_torque", model.nominal_torque)
-    writer.dataset("nominal_torque_given", model.nominal_torque_given)
-    writer.dataset("mechanism", mechanism_to_json(mechanism))
-    writer.dataset("formulations", json.dumps(dataclasses.asdict(model.formulations)))
+def _joined(prefix: str, name: str) -> str:
+    return "/".join(part for part in (prefix, name) if part)
 
 
-def load_model(reader: Reader) -> Model:
-    """model.h5"""
-    return Model(
-        mechanism=mechanism_from_json(reader.text("mechanism")),
-        values=reader.array("parameters/values", 1),
-        affecting=reader.array("parameters/affecting", 1).astype(bool),
-        base=BaseParameters(
-            columns=reader.array("base/columns", 1),
-            beta=reader.array("base/beta", 2),
-            singular_values=reader.array("base/singular_values", 1),
-            rank_gap=float(reader.array("base/rank_gap")),
-            expressions=reader.texts("base/expressions"),
-        ),
-        nominal_torque=reader.array("nominal_torque", 1),
-        nominal_torque_given=bool(reader.array("nominal_torque_given")),
-        formulations=Formulations(
-            **{
-                name: tuple(tuple(choices) for choices in some)
-                for name, some in json.loads(reader.text("formulations")).items()
-            }
-        ),
-    )
+def save(writer: Writer, record: Any, prefix: str = "") -> None:
+    """Write a record."""
+    kind = type(record)
+    for name, hint, path in _fields(kind, prefix):
+        value = getattr(record, name)
+        if (kind, name) in _TEXTS:
+            writer.dataset(path, json.dumps(to_plain(value), allow_nan=False))
+        elif (kind, name) in _ATTRIBUTES:
+            writer.attribute(name, value)
+        elif (kind, name) in _BY_SIZE:
+            for n, array in zip(record.n, value, strict=True):
+                writer.dataset(f"{path}/{n}", array)
+        elif name in _TIMINGS:
+            writer.timing(path, value)
+        elif value is not None:
+            _save_value(writer, hint, value, path)
+    if kind in _DERIVED:
+        for name, value in _DERIVED[kind](record).items():
+            writer.dataset(_joined(prefix, name), value)
 
 
-_ARRAYS = ("peak_position", "peak_velocity", "reach", "extremes")
-_SCALARS = ("kappa_start", "cpu_seconds", "iterations")
-
-
-def save_trajectories(writer: Writer, trajectories: Trajectories) -> None:
-    """trajectories.h5"""
-    writer.attribute("period", trajectories.period)
-    writer.attribute("criterion", trajectories.criterion)
-    writer.attribute("scaling", trajectories.scaling)
-    writer.dataset("constraints", _constraints_to_json(trajectories.constraints))
-    save_trajectory_set(writer, "estimation", trajectories.estimation)
-    save_trajectory_set(writer, "validation", trajectories.validation)
-
-
-def save_trajectory_set(writer: Writer, name: str, items: tuple[Trajectory, ...]) -> None:
-    """One group of trajectories."""
-    writer.dataset(f"{name}/coefficients", np.array([t.coefficients for t in items]))
-    writer.dataset(f"{name}/condition_number", [t.kappa for t in items])
-    writer.dataset(f"{name}/scalings", list(items[0].kappa_variants))
-    for variant in items[0].kappa_variants:
-        values = [t.kappa_variants[variant] for t in items]
-        writer.dataset(f"{name}/condition_number_variants/{variant}", values)
-    for key in (*_ARRAYS, "kappa_start", "iterations"):
-        writer.dataset(f"{name}/{key}", np.array([getattr(t, key) for t in items]))
-    writer.timing(f"{name}/cpu_seconds", [t.cpu_seconds for t in items])
-    writer.dataset(f"{name}/status", [t.status for t in items])
-
-
-def load_trajectories(reader: Reader) -> Trajectories:
-    """trajectories.h5"""
-    return Trajectories(
-        period=float(reader.attribute("period")),
-        criterion=str(reader.attribute("criterion")),
-        scaling=str(reader.attribute("scaling")),
-        constraints=_constraints_from_json(reader.text("constraints")),
-        estimation=load_trajectory_set(reader, "estimation"),
-        validation=load_trajectory_set(reader, "validation"),
-    )
-
-
-def load_trajectory_set(reader: Reader, name: str) -> tuple[Trajectory, ...]:
-    """One group of trajectories."""
-    coefficients = reader.array(f"{name}/coefficients", 3)
-    kappa = reader.array(f"{name}/condition_number", 1)
-    variants = {
-        key: reader.array(f"{name}/condition_number_variants/{key}", 1)
-        for key in reader.texts(f"{name}/scalings")
-    }
-    columns = {key: reader.array(f"{name}/{key}") for key in _ARRAYS + _SCALARS}
-    status = reader.texts(f"{name}/status")
-    return tuple(
-        Trajectory(
-            coefficients=coefficients[k],
-            kappa=float(kappa[k]),
-            kappa_variants={key: float(values[k]) for key, values in variants.items()},
-            **{key: columns[key][k] for key in _ARRAYS},
-            kappa_start=float(columns["kappa_start"][k]),
-            cpu_seconds=float(columns["cpu_seconds"][k]),
-            iterations=int(columns["iterations"][k]),
-            status=status[k],
-        )
-        for k in range(coefficients.shape[0])
-    )
-
-
-_ERRORS = ("torque_error", "torque_error_1", "torque_error_inf", "minimum_norm")
-
-
-def save_reduction(writer: Writer, reduction: Reduction) -> None:
-    """reduction.h5"""
-    writer.dataset("parameters/names", reduction.names)
-    writer.dataset("parameters/expansion", reduction.expansion)
-    writer.dataset("nominal_torque", reduction.nominal_torque)
-    writer.dataset("rank", reduction.rank)
-    writer.dataset("factor", reduction.factor)
-    writer.dataset("heuristics", list(reduction.heuristics))
-    for name, found in reduction.heuristics.items():
-        if found.order is not None:
-            writer.dataset(f"{name}/order", found.order)
-        writer.dataset(f"{name}/n", found.n)
-        for key in _ERRORS:
-            writer.dataset(f"{name}/{key}", getattr(found, key))
-        for k, n in enumerate(found.n):
-            if found.order is None:
-                writer.dataset(f"{name}/subsets/{n}", found.subsets[k])
-            writer.dataset(f"{name}/parameters/{n}", found.parameters[k])
-            writer.dataset(f"{name}/beta/{n}", found.beta[k])
-        writer.timing(f"{name}/seconds", found.seconds)
-    if reduction.proofs is not None:
-        _save_proofs(writer, reduction.proofs)
-
-
-def _save_proofs(writer: Writer, proofs: Proofs) -> None:
-    for key in ("n", "torque_error", "lower_bound", "nodes"):
-        writer.dataset(f"proofs/{key}", getattr(proofs, key))
-    writer.dataset("proofs/status", list(proofs.status))
-    writer.dataset("proofs/units/columns", np.concatenate(proofs.units))
-    writer.dataset("proofs/units/sizes", np.array([unit.size for unit in proofs.units]))
-    for n, subset, log in zip(proofs.n, proofs.subsets, proofs.logs, strict=True):
-        writer.dataset(f"proofs/subsets/{n}", subset)
-        writer.dataset(f"proofs/logs/{n}", log)
-    writer.timing("proofs/seconds", proofs.seconds)
-
-
-def load_reduction(reader: Reader) -> Reduction:
-    """reduction.h5"""
-    return Reduction(
-        names=reader.texts("parameters/names"),
-        expansion=reader.array("parameters/expansion", 2),
-        nominal_torque=reader.array("nominal_torque", 1),
-        rank=int(reader.array("rank")),
-        factor=reader.array("factor", 2),
-        heuristics={name: _load_subsets(reader, name) for name in reader.texts("heuristics")},
-        proofs=_load_proofs(reader) if "proofs/n" in reader else None,
-    )
-
-
-def _load_subsets(reader: Reader, name: str) -> Subsets:
-    sizes = reader.array(f"{name}/n", 1)
-    if f"{name}/order" in reader:
-        order = reader.array(f"{name}/order", 1)
-        subsets = tuple(order[:n] for n in sizes)
+def _save_value(writer: Writer, hint: Any, value: Any, path: str) -> None:
+    entry = _entry(hint)
+    if dataclasses.is_dataclass(value):
+        save(writer, value, path)
+    elif isinstance(value, Mapping) and dataclasses.is_dataclass(entry):
+        writer.dataset(path, np.array(list(value), dtype=str))
+        for name, record in value.items():
+            save(writer, record, name)
+    elif isinstance(value, Mapping):
+        writer.dataset(f"{path}/names", np.array(list(value), dtype=str))
+        writer.dataset(f"{path}/values", np.array(list(value.values()), dtype=float))
+    elif dataclasses.is_dataclass(entry):
+        save_table(writer, typing.cast(type, entry), value, path)
+    elif isinstance(value, tuple) and typing.get_origin(entry) is np.ndarray:
+        writer.dataset(f"{path}/columns", np.concatenate([np.zeros(0, dtype_of(entry)), *value]))
+        writer.dataset(f"{path}/sizes", np.array([array.size for array in value], dtype=np.int64))
+    elif isinstance(value, tuple):
+        writer.dataset(path, np.array(value, dtype=str))
     else:
-        subsets = tuple(reader.array(f"{name}/subsets/{n}", 1) for n in sizes)
-    return Subsets(
-        heuristic=name,
-        subsets=subsets,
-        n=sizes,
-        torque_error=reader.array(f"{name}/torque_error", 1),
-        torque_error_1=reader.array(f"{name}/torque_error_1", 1),
-        torque_error_inf=reader.array(f"{name}/torque_error_inf", 1),
-        parameters=tuple(reader.array(f"{name}/parameters/{n}", 1) for n in sizes),
-        beta=tuple(reader.array(f"{name}/beta/{n}", 2) for n in sizes),
-        minimum_norm=reader.array(f"{name}/minimum_norm", 1).astype(bool),
-        seconds=float(reader.array(f"{name}/seconds")),
-    )
+        writer.dataset(path, value)
 
 
-def _load_proofs(reader: Reader) -> Proofs:
-    sizes = reader.array("proofs/n", 1)
-    ends = np.cumsum(reader.array("proofs/units/sizes", 1))[:-1]
-    return Proofs(
-        units=tuple(np.split(reader.array("proofs/units/columns", 1), ends)),
-        n=sizes,
-        subsets=tuple(reader.array(f"proofs/subsets/{n}", 1) for n in sizes),
-        torque_error=reader.array("proofs/torque_error", 1),
-        lower_bound=reader.array("proofs/lower_bound", 1),
-        status=reader.texts("proofs/status"),
-        seconds=reader.array("proofs/seconds", 1),
-        nodes=reader.array("proofs/nodes", 1),
-        logs=tuple(reader.array(f"proofs/logs/{n}", 1) for n in sizes),
-    )
+def save_table(writer: Writer, record: type, rows: tuple[Any, ...], path: str) -> None:
+    """Write records of one kind, a field of all of them together."""
+    for name, hint, where in _fields(record, path):
+        values = [getattr(row, name) for row in rows]
+        if typing.get_origin(hint) is Mapping:
+            keys = list(values[0]) if values else []
+            listed = _joined(path, _KEYS[record, name])
+            writer.dataset(listed, np.array(keys, dtype=str))
+            for key in keys:
+                writer.dataset(f"{where}/{key}", np.array([value[key] for value in values]))
+        elif name in _TIMINGS:
+            writer.timing(where, values)
+        else:
+            kind = str if isinstance(hint, type) and issubclass(hint, str) else None
+            writer.dataset(where, np.array(values, dtype=kind))
 
 
-_STABILITY = ("chosen", "values", "torque_error")
+def load(reader: Reader, record: type, prefix: str = "") -> Any:
+    """Read what :func:`save` wrote."""
+    values: dict[str, Any] = {}
+    for name, hint, path in _fields(record, prefix):
+        if (record, name) in _TEXTS:
+            values[name] = from_plain(hint, json.loads(reader.text(path)))
+        elif (record, name) in _ATTRIBUTES:
+            values[name] = hint(reader.attribute(name))
+        elif (record, name) in _BY_SIZE:
+            arrays = (reader.array(f"{path}/{n}") for n in values["n"])
+            values[name] = tuple(arrays)
+        else:
+            values[name] = _load_value(reader, hint, path)
+    return record(**values)
 
 
-def save_validation(writer: Writer, validation: Validation) -> None:
-    """validation.h5"""
-    writer.dataset("heuristics", list(validation.heuristics))
-    for name, result in validation.heuristics.items():
-        for field in dataclasses.fields(result):
-            writer.dataset(f"{name}/{field.name}", getattr(result, field.name))
-    writer.dataset("full/names", list(validation.full))
-    writer.dataset("full/values", np.array(list(validation.full.values()), dtype=float))
-    writer.dataset("nominal_acceleration", validation.nominal_acceleration)
-    selected = validation.selected
-    writer.dataset("selected/heuristic", selected.heuristic)
-    writer.dataset("selected/n", selected.n)
-    writer.dataset("selected/parameters", selected.parameters)
-    writer.dataset("selected/values", selected.values)
-    writer.dataset("selected/expressions", selected.expressions)
-    writer.dataset("selected/reason", selected.reason)
-    writer.dataset("selected/missed", selected.missed)
-    writer.dataset("pareto/heuristic", np.array([name for name, _ in validation.pareto], dtype=str))
-    writer.dataset("pareto/n", np.array([n for _, n in validation.pareto], dtype=np.int64))
-    if validation.stability is not None:
-        writer.dataset("stability/variants", list(validation.stability.variants))
-        for key in _STABILITY:
-            writer.dataset(f"stability/{key}", getattr(validation.stability, key))
-    writer.dataset("accepted", validation.accepted)
-    writer.dataset("verdict", validation.verdict)
-    writer.dataset("remarks", np.array(validation.remarks, dtype=str))
+def _load_value(reader: Reader, hint: Any, path: str) -> Any:
+    origin, entry = typing.get_origin(hint), _entry(hint)
+    if origin in (typing.Union, types.UnionType):
+        (inner,) = (a for a in typing.get_args(hint) if a is not type(None))
+        return _load_value(reader, inner, path) if path in reader else None
+    if dataclasses.is_dataclass(hint):
+        return load(reader, typing.cast(type, hint), path)
+    if origin is np.ndarray:
+        return reader.array(path).astype(dtype_of(hint), copy=False)
+    if origin is Mapping and dataclasses.is_dataclass(entry):
+        record = typing.cast(type, entry)
+        return {name: load(reader, record, name) for name in reader.texts(path)}
+    if origin is Mapping:
+        numbers = reader.array(f"{path}/values", 1).tolist()
+        return dict(zip(reader.texts(f"{path}/names"), numbers, strict=True))
+    if dataclasses.is_dataclass(entry):
+        return load_table(reader, typing.cast(type, entry), path)
+    if typing.get_origin(entry) is np.ndarray:
+        ends = np.cumsum(reader.array(f"{path}/sizes", 1))[:-1]
+        return tuple(np.split(reader.array(f"{path}/columns", 1), ends))
+    if origin is tuple:
+        return tuple(entry(text) for text in reader.texts(path))
+    if issubclass(hint, str):
+        return hint(reader.text(path))
+    return hint(reader.array(path).item())
 
 
-def _load_stability(reader: Reader) -> Stability:
-    arrays = {key: reader.array(f"stability/{key}") for key in _STABILITY}
-    arrays["chosen"] = arrays["chosen"].astype(bool)
-    return Stability(variants=reader.texts("stability/variants"), **arrays)
+def load_table(reader: Reader, record: type, path: str) -> tuple[Any, ...]:
+    """Read what :func:`save_table` wrote."""
+    columns: dict[str, list[Any]] = {}
+    for name, hint, where in _fields(record, path):
+        if typing.get_origin(hint) is Mapping:
+            keys = reader.texts(_joined(path, _KEYS[record, name]))
+            series = (reader.array(f"{where}/{key}", 1).tolist() for key in keys)
+            columns[name] = [dict(zip(keys, row, strict=True)) for row in zip(*series, strict=True)]
+        elif typing.get_origin(hint) is np.ndarray:
+            columns[name] = list(reader.array(where))
+        elif issubclass(hint, str):
+            columns[name] = [hint(text) for text in reader.texts(where)]
+        else:
+            columns[name] = [hint(value) for value in reader.array(where, 1)]
+    rows = zip(*columns.values(), strict=True)
+    return tuple(record(**dict(zip(columns, row, strict=True))) for row in rows)
 
 
-def load_validation(reader: Reader) -> Validation:
-    """validation.h5"""
-    heuristics = {
-        name: HeuristicValidation(
-            **{
-                field.name: reader.array(f"{name}/{field.name}")
-                for field in dataclasses.fields(HeuristicValidation)
-            }
-        )
-        for name in reader.texts("heuristics")
-    }
-    values = reader.array("full/values", 1)
-    names = reader.texts("full/names")
-    return Validation(
-        heuristics=heuristics,
-        full={name: float(value) for name, value in zip(names, values, strict=True)},
-        nominal_acceleration=reader.array("nominal_acceleration", 1),
-        selected=Selected(
-            heuristic=reader.text("selected/heuristic"),
-            n=int(reader.array("selected/n")),
-            parameters=reader.texts("selected/parameters"),
-            values=reader.array("selected/values", 1),
-            expressions=reader.texts("selected/expressions"),
-            reason=reader.text("selected/reason"),
-            missed=reader.text("selected/missed"),
-        ),
-        pareto=tuple(
-            (name, int(n))
-            for name, n in zip(
-                reader.texts("pareto/heuristic"), reader.array("pareto/n", 1), strict=True
-            )
-        ),
-        stability=_load_stability(reader) if "stability/variants" in reader else None,
-        accepted=bool(reader.array("accepted")),
-        verdict=reader.text("verdict"),
-        remarks=reader.texts("remarks"),
-    )
+def _entry(hint: Any) -> Any:
+    """What a tuple of any length, or a mapping, holds."""
+    origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin is Mapping:
+        return arguments[1]
+    return arguments[0] if origin is tuple else None

@@ -40,7 +40,8 @@ class Parts(MutableMapping[str, Trajectory]):
             if stamp is None or _origin(stamp) != _origin(self._stamp):
                 raise KeyError(key)
             with reading(path) as reader:
-                return layouts.load_trajectory_set(reader, "part")[0]
+                found: Trajectory = layouts.load_table(reader, Trajectory, "part")[0]
+                return found
         except ArtifactError as error:
             raise KeyError(key) from error
 
@@ -48,7 +49,7 @@ class Parts(MutableMapping[str, Trajectory]):
         write(
             self._path(key),
             self._stamp,
-            lambda w: layouts.save_trajectory_set(w, "part", (value,)),
+            lambda w: layouts.save_table(w, Trajectory, (value,), "part"),
         )
 
     def __delitem__(self, key: str) -> None:

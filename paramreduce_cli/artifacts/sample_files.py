@@ -12,12 +12,13 @@ import numpy as np
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, reading
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
-from paramreduce_cli.records import Block, FloatArray, Samples, SampleSet
+from paramreduce_cli.records import LAST, Block, FloatArray, Samples, SampleSet
 
 
 def save_samples(writer: Writer, samples: Samples) -> None:
     """samples.h5, block by block."""
     writer.dataset("parameters/names", samples.names)
+    writer.dataset("parameters/preference", samples.preference)
     for name in ("values", "nominal_torque", "nominal_acceleration"):
         value = getattr(samples, name)
         if value is not None:
@@ -117,16 +118,7 @@ class StoredSet:
                     whole = self._states(reader, start, stop, _GENERALISED)
                 (z, dz, ddz), (q, dq, ddq) = states, whole
                 yield Block(
-                    int(owner[start]),
-                    time[start:stop],
-                    z,
-                    dz,
-                    ddz,
-                    tau_block,
-                    q,
-                    dq,
-                    ddq,
-                    W_block,
+                    int(owner[start]), time[start:stop], z, dz, ddz, tau_block, q, dq, ddq, W_block
                 )
 
     def _states(
@@ -187,8 +179,10 @@ def load_samples(reader: Reader) -> Samples:
     ]
     estimation, validation = sets
     assert estimation is not None
+    ranks = _optional(reader, "parameters/preference", n)
     return Samples(
         names=names,
+        preference=np.full(n, LAST) if ranks is None else ranks.astype(np.int64),
         values=_optional(reader, "parameters/values", n),
         nominal_torque=_optional(reader, "nominal_torque", estimation.n_dof),
         nominal_acceleration=_optional(reader, "nominal_acceleration", estimation.n_dof),

@@ -7,37 +7,18 @@ import hashlib
 import os
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import filelock
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.hdf5 import (
-    SCHEMA,
-    Reader,
-    Stamp,
-    Writer,
-    read_stamp,
-    reading,
-    write,
-)
-from paramreduce_cli.artifacts.report_files import (
-    SUMMARY,
-    load_json,
-    save_report,
-    summary_stamp,
-)
+from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.report_files import SUMMARY, load_json, save_report, summary_stamp
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import (
-    Model,
-    Reduction,
-    Report,
-    Samples,
-    Trajectories,
-    Validation,
-)
+from paramreduce_cli.records import Model, Reduction, Report, Samples, Trajectories, Validation
 
 
 @dataclass(frozen=True)
@@ -50,11 +31,16 @@ class Layout:
 
 
 LAYOUTS: dict[type, Layout] = {
-    Model: Layout("model.h5", layouts.save_model, layouts.load_model),
-    Trajectories: Layout("trajectories.h5", layouts.save_trajectories, layouts.load_trajectories),
     Samples: Layout("samples.h5", save_samples, load_samples),
-    Reduction: Layout("reduction.h5", layouts.save_reduction, layouts.load_reduction),
-    Validation: Layout("validation.h5", layouts.save_validation, layouts.load_validation),
+    **{
+        record: Layout(file, layouts.save, partial(layouts.load, record=record))
+        for record, file in (
+            (Model, "model.h5"),
+            (Trajectories, "trajectories.h5"),
+            (Reduction, "reduction.h5"),
+            (Validation, "validation.h5"),
+        )
+    },
 }
 
 

@@ -13,12 +13,13 @@ from paramreduce_cli.cli.stages import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.export.choice import BASE, FULL, chosen_model
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import Exported
+from paramreduce_cli.export.writing import export as exported
 from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import Model, Reduction, Validation
-from paramreduce_cli.registry import exporter
 from paramreduce_cli.runner import Runner
-from paramreduce_cli.stages.export import WHAT, chosen_model
-from paramreduce_cli.stages.export import export as exported
 
 
 @click.command()
@@ -26,11 +27,11 @@ from paramreduce_cli.stages.export import export as exported
 @RESULTS
 @SET
 @click.option(
-    "--format", "kind", type=click.Choice(sorted(exporter)), default="c", show_default=True,
+    "--format", "kind", type=click.Choice(sorted(languages)), default="c", show_default=True,
     help="Language of the code.",
 )  # fmt: skip
 @click.option(
-    "--what", type=click.Choice(list(WHAT)), default="both", show_default=True,
+    "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
     help="Inverse dynamics, direct dynamics [M | delta], both, or the regressor.",
 )  # fmt: skip
 @click.option(
@@ -53,7 +54,7 @@ def export(
     single: bool,
     output: Path | None,
 ) -> None:
-    """Write a model as code with the fewest operations known.
+    """Write a model as code with few operations.
 
     The code is checked against plain recursion on random states before it is written. For
     mechanisms with loops it also solves positions, velocities and accelerations.
@@ -65,23 +66,26 @@ def export(
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
     records: list[type] = [Model]
-    if text not in ("full", "base"):
+    if text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
     loading = {record: _loaded(loaded, store, record) for record in records}
-    chosen = chosen_model(text, loading[Model], loading.get(Reduction), loading.get(Validation))
+    chosen, title = chosen_model(
+        text, loading[Model], loading.get(Reduction), loading.get(Validation)
+    )
     stamp = store.stamp(records[-1])
     files = exported(
         loading[Model],
         chosen,
-        kind=kind,
-        what=what,
+        title=title,
+        language=kind,
+        what=Exported(what),
         constant=constants,
         single=single,
         origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
     )
     folder = output or store.folder / "export" / kind
     save_files(folder, files)
-    say(f"{chosen.title}: {', '.join(files)} in {folder}")
+    say(f"{title}: {', '.join(files)} in {folder}")
 
 
 def _loaded(config: Config, store: Store, record: type) -> Any:

@@ -17,18 +17,12 @@ from paramreduce_cli.artifacts.report_files import load_json
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.cli.terminal import out, say
 from paramreduce_cli.config import config_schema
-from paramreduce_cli.config.schema import NAME
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.multibody.relations import approximate_expressions
-from paramreduce_cli.records import Reduction, Report, Subsets
-from paramreduce_cli.report.comparison import (
-    QUANTITIES,
-    TOLERANCES,
-    Difference,
-    Tolerance,
-    compare,
-)
+from paramreduce_cli.fields.section import NAME
+from paramreduce_cli.records import ModelChoice, Reduction, Report
+from paramreduce_cli.reduction.models import known_choices, reduced_model
+from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Difference, Tolerance, compare
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.workflow import FORMATS
 
@@ -98,25 +92,16 @@ def inspect(file: Path, chosen: str | None) -> None:
 
 def _say_model(file: Path, chosen: str) -> None:
     reduction, _ = load_file(file, Reduction, None, "reduce")
-    name, _, number = chosen.partition(":")
-    found = reduction.heuristics.get(name)
-    row = found.row(int(number)) if found is not None and number.isdigit() else None
-    if found is None or row is None:
-        known = ", ".join(f"{k}:{_sizes(s)}" for k, s in reduction.heuristics.items())
-        raise ConfigError(f"--model {chosen}: there is {known}.")
-    n = int(number)
-    kept = found.subset(n)
-    texts = approximate_expressions(reduction.names, kept, found.beta[row])
+    choice = ModelChoice.parse(chosen)
+    row = choice.row(reduction)
+    if row is None:
+        raise ConfigError(f"--model {chosen}: there is {known_choices(reduction)}.")
+    found = reduction.heuristics[choice.heuristic]
+    model = reduced_model(reduction, choice.heuristic, row)
     flag = ", minimum-norm fit beyond the rank" if found.minimum_norm[row] else ""
-    say(f"{name}, n = {n}, torque error {found.torque_error[row]:.6g}{flag}")
-    for value, text in zip(found.parameters[row], texts, strict=True):
+    say(f"{choice.heuristic}, n = {model.n}, torque error {found.torque_error[row]:.6g}{flag}")
+    for value, text in zip(model.values, model.expressions, strict=True):
         say(f"{value: .9e}  =  {text}")
-
-
-def _sizes(found: Subsets) -> str:
-    if found.n[-1] == found.n.size:
-        return f"1...{found.n[-1]}"
-    return "|".join(map(str, found.n))
 
 
 @click.command(name="compare")

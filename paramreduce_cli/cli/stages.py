@@ -18,8 +18,9 @@ from paramreduce_cli.cli.terminal import err, interruption, out, progress_bars, 
 from paramreduce_cli.config import Config, load_config, placed_errors
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import Stage, stages_to_run
-from paramreduce_cli.records import Report, Run, Validation
+from paramreduce_cli.records import Report, Validation
 from paramreduce_cli.runner import Outcome, Runner
+from paramreduce_cli.texts import share
 
 NOT_ACCEPTED = 1
 _TABLE_WIDTH = 110
@@ -55,9 +56,7 @@ def _store(config: Config | None, results: Path | None) -> Store:
 
 
 def stage_command(stage: Stage) -> click.Command:
-    takes_config = any(entry.type is Config for entry in stage.inputs)
-    config_optional = any(entry.type is Config and entry.optional for entry in stage.inputs)
-    takes_jobs = any(entry.type is Run for entry in stage.inputs)
+    config_optional = not stage.needs_config
 
     def command(
         config: Path | None,
@@ -85,7 +84,7 @@ def stage_command(stage: Stage) -> click.Command:
         return _exit_code(stage, outcome, quiet)
 
     params: list[Any] = [RESULTS, SET, FORCE, QUIET]
-    if takes_jobs:
+    if stage.lends_run is not None:
         params.append(JOBS)
     if config_optional:
         params.append(
@@ -94,14 +93,11 @@ def stage_command(stage: Stage) -> click.Command:
                 help="A samples.h5 of your own; then no CONFIG is needed.",
             )
         )  # fmt: skip
-    if takes_config:
-        params.append(
-            click.argument(
-                "config",
-                type=click.Path(path_type=Path, dir_okay=False),
-                required=not config_optional,
-            )
+    params.append(
+        click.argument(
+            "config", type=click.Path(path_type=Path, dir_okay=False), required=not config_optional
         )
+    )
     decorated: Callable[..., Any] = command
     for parameter in params:
         decorated = parameter(decorated)
@@ -129,8 +125,8 @@ def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
         return 0
     record = outcome.record or load_file(outcome.path, Validation, None, stage.name)[0]
     if not quiet:
-        for text in record.remarks:
-            remark(text.rstrip("."))
+        for entry in record.remarks:
+            remark(entry.text.rstrip("."))
     return _say_verdict(record.accepted, record.verdict, quiet)
 
 
@@ -183,9 +179,8 @@ def run(
     selected = summary["selected"]
     if not quiet:
         say(f"Selected: {selected['reason']}")
-        for text in summary["remarks"]:
-            if text.startswith("The selected model"):
-                remark(text.rstrip("."))
+        for text in selected["remarks"]:
+            remark(text.rstrip("."))
     return _say_verdict(selected["accepted"], selected["verdict"], quiet)
 
 
@@ -221,15 +216,5 @@ def _summary_cells(row: dict[str, Any]) -> list[str]:
     for part in ("torque_error", "acceleration_error"):
         for which in ("estimation", "validation"):
             value = row[part][which]
-            cells.append(_percent(value))
+            cells.append(share(value))
     return [*cells, str(row["operations"]["inverse"]), str(row["operations"]["direct"])]
-
-
-def _percent(share: float | None) -> str:
-    if share is None:
-        return "infinite"
-    if share < 1e-6:
-        return "0 %"
-    if share < 1e-4:
-        return "< 0.01 %"
-    return f"{100 * share:.3g} %" if share < 10 else "> 1000 %"

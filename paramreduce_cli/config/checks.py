@@ -7,13 +7,12 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from paramreduce_cli.config.names import unknown
-from paramreduce_cli.config.reading import Path
 from paramreduce_cli.config.schema import Config
-from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.records import PARAMETER_KINDS
+from paramreduce_cli.errors import Key, ParamreduceWarning
+from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.robots.inertia import pseudo_inertia
 
-Problem = tuple[Path, str]
+Problem = tuple[Key, str]
 Check = Callable[[Config], Iterator[Problem]]
 
 
@@ -29,17 +28,11 @@ def check(config: Config) -> list[Problem]:
 
 
 def _bodies(config: Config) -> Iterator[Problem]:
-    dh, tree = config.description.dh, config.description.tree
-    path: Path = ("description", "tree", "bodies")
-    rows: list[tuple[str, str | None]] = []
-    if dh is not None:
-        path = ("description", "dh", "joints")
-        rows = list(zip(config.body_names(), (j.parent for j in dh.joints), strict=True))
-    elif tree is not None:
-        rows = [(body.name, body.parent) for body in tree.bodies]
-    names = [name for name, _ in rows]
+    bodies = config.description.bodies
+    path: Key = ("description", config.description.way, bodies.ROWS)
+    names = bodies.body_names()
     seen: set[str] = set()
-    for k, (name, parent) in enumerate(rows):
+    for k, (name, parent) in enumerate(zip(names, bodies.parents(), strict=True)):
         if name in seen or name == "base":
             yield (*path, k, "name"), f"{name!r} is taken; every body needs a name of its own"
         if parent is not None and parent not in {"base", *seen}:
@@ -52,52 +45,25 @@ def _bodies(config: Config) -> Iterator[Problem]:
 
 
 def _tracking(config: Config) -> Iterator[Problem]:
-    tree = config.description.tree
-    if config.report.tracking is not None and tree is not None and tree.closures:
+    if config.report.tracking is not None and config.description.bodies.closed:
         yield (
             ("report", "tracking"),
             "is for open trees, and this mechanism has loops; leave it out",
         )
 
 
-def _loops(config: Config) -> Iterator[Problem]:
-    tree = config.description.tree
-    if tree is None:
-        return
-    path: Path = ("description", "tree")
-    bodies = ["base", *(body.name for body in tree.bodies)]
-    coordinates = tree.coordinate_names()
-    for k, body in enumerate(tree.bodies):
-        for name in body.coordinate_names():
-            if coordinates.count(name) > 1:
-                yield (*path, "bodies", k), f"coordinate {name!r} belongs to several joints"
-    for k, closure in enumerate(tree.closures):
-        for j, name in enumerate(closure.bodies):
-            if name not in bodies:
-                yield (*path, "closures", k, "bodies", j), unknown("body", name, bodies)
-        if closure.name is not None and closure.name in {c.name for c in tree.closures[:k]}:
-            yield (*path, "closures", k, "name"), f"{closure.name!r} is taken"
-        if closure.bodies[0] == closure.bodies[1]:
-            yield (*path, "closures", k, "bodies"), f"ties {closure.bodies[0]!r} to itself"
-    for k, name in enumerate(tree.independent):
-        if name not in coordinates:
-            yield (*path, "independent", k), unknown("coordinate", name, coordinates)
-        elif name in tree.independent[:k]:
-            yield (*path, "independent", k), f"{name} stands there twice"
-    for name in tree.guess:
-        if name not in coordinates:
-            yield (*path, "guess", name), unknown("coordinate", name, coordinates)
+def _description(config: Config) -> Iterator[Problem]:
+    for key, message in config.description.bodies.problems():
+        yield ("description", config.description.way, *key), message
 
 
 def _constraints(config: Config) -> Iterator[Problem]:
     description = config.description
-    bodies = ["base", *config.body_names()]
-    if description.tree is not None:
-        bodies = ["base", *(body.name for body in description.tree.bodies)]
-    coordinates = description.generalised_names()
+    bodies = ["base", *description.bodies.body_names()]
+    coordinates = description.bodies.generalised_names()
     seen: set[str] = set()
     for k, entry in enumerate(config.trajectories.constraints):
-        path: Path = ("trajectories", "constraints", k)
+        path: Key = ("trajectories", "constraints", k)
         if entry.name in seen:
             yield (*path, "name"), f"{entry.name!r} is taken; every constraint needs its own name"
         seen.add(entry.name)
@@ -110,22 +76,25 @@ def _constraints(config: Config) -> Iterator[Problem]:
         for j, name in enumerate(entry.bodies or []):
             if name not in bodies:
                 yield (*path, "bodies", j), unknown("body", name, bodies)
-        if entry.quantity == "singularity" and not (description.tree and description.tree.closures):
+        if entry.quantity == "singularity" and not description.bodies.closed:
             yield (*path, "quantity"), "singularity is of loops, but there is no closure"
 
 
 def _known_parameters(config: Config) -> list[str]:
-    return [f"{kind}_{body}" for body in config.body_names() for kind in PARAMETER_KINDS]
+    return [parameter.name for parameter in config.description.parameters()]
 
 
 def _groups(config: Config) -> Iterator[Problem]:
     known = _known_parameters(config)
     owner: dict[str, str] = {}
     for k, entry in enumerate(config.reduction.groups):
-        path: Path = ("reduction", "groups", k)
+        path: Key = ("reduction", "groups", k)
         for j, body in enumerate(entry.bodies or []):
-            if body not in config.body_names():
-                yield (*path, "bodies", j), unknown("body", body, config.body_names())
+            if body not in config.description.bodies.inertial_names():
+                yield (
+                    (*path, "bodies", j),
+                    unknown("body", body, config.description.bodies.inertial_names()),
+                )
         for j, name in enumerate(entry.parameters or []):
             if name not in known:
                 yield (*path, "parameters", j), unknown("parameter", name, known)
@@ -141,7 +110,7 @@ def _groups(config: Config) -> Iterator[Problem]:
 
 
 def _symmetries(config: Config) -> Iterator[Problem]:
-    names = config.description.coordinate_names()
+    names = config.description.bodies.independent_names()
     for k, images in enumerate(config.sampling.symmetries):
         if sorted(name.removeprefix("-") for name in images) != sorted(names):
             yield (
@@ -153,12 +122,12 @@ def _symmetries(config: Config) -> Iterator[Problem]:
 
 
 def _massless(config: Config) -> Iterator[Problem]:
-    if not config.body_names():
+    if not config.description.bodies.inertial_names():
         yield ("description", "tree", "bodies"), "are all massless, so that there is no parameter"
 
 
 def _parameter_sets(config: Config) -> Iterator[Problem]:
-    names = config.body_names()
+    names = config.description.bodies.inertial_names()
     for label, bodies in config.parameter_sets.items():
         for body in bodies:
             if body not in names:
@@ -176,7 +145,7 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
 def _per_joint(config: Config) -> Iterator[Problem]:
     n = config.n_dof
     trajectories = config.trajectories
-    counted: list[tuple[Path, object, str]] = [
+    counted: list[tuple[Key, object, str]] = [
         (("nominal_torque",), config.nominal_torque, "N m (N for a prismatic joint)"),
         (
             ("trajectories", "position_limits"),
@@ -212,13 +181,12 @@ def _per_joint(config: Config) -> Iterator[Problem]:
 
 
 def _what_moves(config: Config) -> str:
-    tree = config.description.tree
-    return "independent coordinates" if tree is not None and tree.closures else "joints"
+    return "independent coordinates" if config.description.bodies.closed else "joints"
 
 
 def _limits(config: Config) -> Iterator[Problem]:
     for k, (lower, upper) in enumerate(config.trajectories.position_limits):
-        path: Path = ("trajectories", "position_limits")
+        path: Key = ("trajectories", "position_limits")
         if len(config.trajectories.position_limits) > 1:
             path = (*path, k)
         if not np.isfinite([lower, upper]).all():
@@ -248,7 +216,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
 
 
 def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
-    total = len(config.body_names()) * len(PARAMETER_KINDS)
+    total = len(config.description.parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:
             yield ("reduction", "heuristics", k), f"{name} stands there twice"
@@ -273,7 +241,7 @@ def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
 
 
 _CHECKS: tuple[Check, ...] = (
-    _loops,
+    _description,
     _tracking,
     _constraints,
     _groups,
@@ -289,22 +257,11 @@ _CHECKS: tuple[Check, ...] = (
 
 def _remark_on_physics(config: Config) -> None:
     """Warn of bodies that cannot exist; reduced sets are not physical either, so go on."""
-    values = config.standard_parameters().reshape(-1, len(PARAMETER_KINDS))
-    for name, (m, mx, my, mz, xx, xy, xz, yy, yz, zz) in zip(
-        config.body_names(), values, strict=True
-    ):
-        if m < 0:
-            _remark(f"body {name} has the negative mass {m:g} kg")
+    for name, body in config.body_parameters().items():
+        if body.m < 0:
+            _remark(f"body {name} has the negative mass {body.m:g} kg")
             continue
-        moment = np.array([mx, my, mz])
-        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-        pseudo = np.block(
-            [
-                [np.trace(tensor) / 2 * np.eye(3) - tensor, moment[:, None]],
-                [moment[None, :], np.array([[m]])],
-            ]
-        )
-        eigenvalues = np.linalg.eigvalsh(pseudo)
+        eigenvalues = np.linalg.eigvalsh(pseudo_inertia(body.values()))
         if eigenvalues[0] < -1e-9 * max(abs(eigenvalues[-1]), 1e-300):
             _remark(
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "

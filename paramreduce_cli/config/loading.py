@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import json
-import re
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,15 +14,13 @@ from pydantic import BaseModel, ValidationError
 
 from paramreduce_cli.config import reading
 from paramreduce_cli.config.checks import check
-from paramreduce_cli.config.names import unknown
-from paramreduce_cli.config.numbers import read_constants
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.errors import ConfigError, Key, keyed
+from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.numbers import read_constants
 
-Problem = tuple[reading.Path, str]
-
-_LEADING_KEY = re.compile(r"[a-z_]+(\.\w+)+|nominal_torque")
+Problem = tuple[Key, str]
 
 
 def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
@@ -56,7 +52,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
 
 @contextmanager
 def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[None]:
-    """Add file and line to errors of later work that begin with a key of the config.
+    """Add file and line to errors of later work that are about a key of the config.
 
     Args:
         path: The config's file; without one errors stay as they are.
@@ -65,25 +61,17 @@ def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
     try:
         yield
     except ConfigError as error:
-        key = _LEADING_KEY.match(str(error))
-        if path is None or key is None:
+        if path is None or not error.key:
             raise
         document = _read(path)
         for text in overrides:
             reading.apply_override(document, text)
-        steps = tuple(int(s) if s.isdigit() else s for s in key.group().split("."))
-        raise ConfigError(f"{document.place(steps)}: {error}") from error
+        raise ConfigError(f"{document.place(error.key)}: {error}") from error
 
 
 def config_schema() -> dict[str, Any]:
     """The JSON Schema of a config, for editors."""
     return Config.model_json_schema()
-
-
-def section_text(config: Config, section: str) -> str:
-    """Canonical text of one section, to tell whether it changed."""
-    value = config.model_dump(mode="json")[section]
-    return json.dumps(value, sort_keys=True)
 
 
 def _read(path: Path) -> Document:
@@ -137,7 +125,7 @@ def _parse(data: dict[str, Any], constants: dict[str, float]) -> Config:
 
 def _one_per_key(problems: list[Problem]) -> list[Problem]:
     """A value that fits no member of a union is one problem, not one per member."""
-    found: dict[reading.Path, list[str]] = {}
+    found: dict[Key, list[str]] = {}
     for path, message in problems:
         found.setdefault(path, []).append(message)
     return [
@@ -146,12 +134,12 @@ def _one_per_key(problems: list[Problem]) -> list[Problem]:
     ]
 
 
-def _touches(a: reading.Path, b: reading.Path) -> bool:
+def _touches(a: Key, b: Key) -> bool:
     short = min(len(a), len(b))
     return a[:short] == b[:short]
 
 
-def _cut(data: Any, path: reading.Path) -> None:
+def _cut(data: Any, path: Key) -> None:
     for step in path[:-1]:
         try:
             data = data[step]
@@ -182,7 +170,7 @@ def _describe(entry: Any, data: Any) -> Problem:
     return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
-def _real_path(location: Iterable[str | int], data: Any) -> reading.Path:
+def _real_path(location: Iterable[str | int], data: Any) -> Key:
     """Pydantic's location without the steps that name a member of a union."""
     path: list[str | int] = []
     steps = list(location)
@@ -199,7 +187,7 @@ def _real_path(location: Iterable[str | int], data: Any) -> reading.Path:
     return tuple(path)
 
 
-def _model_at(path: reading.Path) -> type[BaseModel] | None:
+def _model_at(path: Key) -> type[BaseModel] | None:
     """The section of the schema that a path leads to."""
     annotation: Any = Config
     for step in path:
@@ -229,11 +217,8 @@ def _unwrap(annotation: Any) -> Any:
 
 def _line(document: Document, problem: Problem) -> str:
     path, message = problem
-    key = ".".join(str(step) for step in path)
     end = "" if message.rstrip().endswith((".", "?")) else "."
-    separator = " " if message.startswith(("is ", "has ")) else ": "
-    start = f"{key}{separator}" if key else ""
-    return f"{document.place(path)}: {start}{message}{end}"
+    return f"{document.place(path)}: {keyed(path, message)}{end}"
 
 
 def _with_paths(config: Config, folder: Path) -> Config:

@@ -7,7 +7,8 @@ from typing import Any
 
 import yaml
 
-Path = tuple[str | int, ...]
+from paramreduce_cli.errors import Key
+
 _DEEPEST = 50
 
 
@@ -17,13 +18,13 @@ class Document:
 
     source: str
     data: Any
-    lines: dict[Path, int] = field(default_factory=dict)
+    lines: dict[Key, int] = field(default_factory=dict)
     problems: list[tuple[int, str]] = field(default_factory=list)
     """(line, message) of what YAML allows but a config must not hold."""
-    overrides: dict[Path, str] = field(default_factory=dict)
+    overrides: dict[Key, str] = field(default_factory=dict)
     """Keys set on the command line, with the text given there."""
 
-    def place(self, path: Path) -> str:
+    def place(self, path: Key) -> str:
         """Where a key stands, or its nearest ancestor that is written down."""
         for end in range(len(path), -1, -1):
             if path[:end] in self.overrides:
@@ -54,7 +55,7 @@ def read_yaml(text: str, source: str) -> Document:
         loader.dispose()
 
 
-def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Path, document: Document) -> Any:
+def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Document) -> Any:
     if len(path) > _DEEPEST:
         raise yaml.YAMLError("it refers to itself, or is nested too deep")
     document.lines.setdefault(path, node.start_mark.line + 1)

@@ -8,12 +8,10 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
-from paramreduce_cli import registry
-from paramreduce_cli.config.description import Description, Direction, Vector
-from paramreduce_cli.config.names import HeuristicsByCriterion, registered
-from paramreduce_cli.config.numbers import Number, Whole
-from paramreduce_cli.config.section import (
-    NAME,
+from paramreduce_cli.config.constraints import ConstraintSection
+from paramreduce_cli.fields.names import OneMethod, OneOf
+from paramreduce_cli.fields.numbers import Number, Whole
+from paramreduce_cli.fields.section import (
     Count,
     LimitPerJoint,
     Name,
@@ -24,65 +22,15 @@ from paramreduce_cli.config.section import (
     Section,
     Seed,
     Span,
+    per_joint,
 )
-from paramreduce_cli.records import PARAMETER_KINDS
+from paramreduce_cli.records import CountedDynamics, JointLimits, Kind, Parameter
+from paramreduce_cli.robots import Robot
 
-Heuristic = Annotated[str, registered(HeuristicsByCriterion())]
-Criterion = Annotated[str, registered(registry.criterion)]
-Scaling = Annotated[str, registered(registry.scaling)]
+Method = Annotated[str, OneMethod()]
+Criterion = Annotated[str, OneOf("criterion", "excitation/criteria")]
+Scaling = Annotated[str, OneOf("scaling", "excitation/scalings")]
 ParameterKind = Literal["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz"]
-
-
-class BodyParameters(Section):
-    """Standard parameters of one body about its frame's origin; what is left out is zero."""
-
-    m: Number = 0.0
-    """Mass, kg."""
-    mx: Number = 0.0
-    """First moment m x, kg m."""
-    my: Number = 0.0
-    """First moment m y, kg m."""
-    mz: Number = 0.0
-    """First moment m z, kg m."""
-    Ixx: Number = 0.0
-    """Inertia about the frame's origin, kg m^2."""
-    Ixy: Number = 0.0
-    """Tensor element (not the product of inertia with the other sign), kg m^2."""
-    Ixz: Number = 0.0
-    """Tensor element, kg m^2."""
-    Iyy: Number = 0.0
-    """Inertia about the frame's origin, kg m^2."""
-    Iyz: Number = 0.0
-    """Tensor element, kg m^2."""
-    Izz: Number = 0.0
-    """Inertia about the frame's origin, kg m^2."""
-    com: Annotated[list[Number], Field(min_length=3, max_length=3)] | None = None
-    """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
-    inertia_com: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
-    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
-
-    @model_validator(mode="after")
-    def _one_way_only(self) -> BodyParameters:
-        given = self.model_fields_set
-        if self.com is not None and given & {"mx", "my", "mz"}:
-            raise ValueError("give com or mx, my, mz, not both")
-        if self.inertia_com is not None and self.com is None:
-            raise ValueError("inertia_com needs com")
-        if self.inertia_com is not None and given & set(PARAMETER_KINDS[4:]):
-            raise ValueError("give inertia_com or Ixx ... Izz, not both")
-        return self
-
-    def standard(self) -> list[float]:
-        """The ten standard parameters in the order of PARAMETER_KINDS."""
-        values = [float(getattr(self, kind)) for kind in PARAMETER_KINDS]
-        if self.com is not None:
-            c = np.array(self.com)
-            values[1:4] = (self.m * c).tolist()
-            if not self.model_fields_set & set(PARAMETER_KINDS[4:]):
-                shift = self.m * (c @ c * np.eye(3) - np.outer(c, c))
-                upper = shift[np.triu_indices(3)]
-                values[4:] = (np.array(self.inertia_com or [0.0] * 6) + upper).tolist()
-        return values
 
 
 class ModelSection(Section):
@@ -96,69 +44,7 @@ class ModelSection(Section):
     """Of the random states on which the rank is decided."""
 
 
-_QUANTITY_KEYS = {
-    "coordinate": ({"coordinate"}, set()),
-    "angle": ({"bodies"}, {"axes"}),
-    "distance": ({"bodies"}, {"points"}),
-    "distance-from-axis": ({"body"}, {"point", "axis_body", "axis_point", "axis"}),
-    "singularity": (set(), set()),
-}
-"""Keys that each quantity needs, and those it may have besides."""
-
-
-class ConstraintSection(Section):
-    """Bounds on a quantity of the mechanism."""
-
-    name: Name
-    """Name for messages and tables."""
-    quantity: Literal["coordinate", "angle", "distance", "distance-from-axis", "singularity"]
-    """`coordinate`: any coordinate, rad or m; `angle` between two axes, rad; `distance` between two points, m; `distance-from-axis` of a point, m; `singularity`: distance of the loops to singularity, 0 to 1."""
-    min: Number | None = None
-    """Smallest value."""
-    max: Number | None = None
-    """Largest value."""
-    coordinate: Name | None = None
-    """Name of a coordinate, dependent ones too."""
-    bodies: Annotated[list[Name], Field(min_length=2, max_length=2)] | None = None
-    """The two bodies of an angle or a distance, `base` for the base."""
-    axes: Annotated[list[Direction], Field(min_length=2, max_length=2)] = [[0, 0, 1], [0, 0, 1]]
-    """Axes of an angle, each in its body's frame."""
-    points: Annotated[list[Vector], Field(min_length=2, max_length=2)] = [[0, 0, 0], [0, 0, 0]]
-    """Points of a distance, each in its body's frame, m."""
-    body: Name | None = None
-    """Body whose distance from an axis is meant."""
-    point: Vector = [0, 0, 0]
-    """Point in its frame, m."""
-    axis_body: Name = "base"
-    """Body that carries the axis."""
-    axis_point: Vector = [0, 0, 0]
-    """Point of the axis in that body's frame, m."""
-    axis: Direction = [0, 0, 1]
-    """Direction of the axis in that body's frame."""
-
-    @model_validator(mode="after")
-    def _complete(self) -> ConstraintSection:
-        needed, possible = _QUANTITY_KEYS[self.quantity]
-        given = self.model_fields_set - {"name", "quantity", "min", "max"}
-        if missing := needed - given:
-            raise ValueError(f"{self.quantity} needs {', '.join(sorted(missing))}")
-        if surplus := given - needed - possible:
-            raise ValueError(f"{self.quantity} takes no {', '.join(sorted(surplus))}")
-        if self.min is None and self.max is None:
-            raise ValueError("give min or max, or both")
-        if self.min is not None and self.max is not None and self.min >= self.max:
-            raise ValueError(f"the bounds cross: {self.min:g} is not below {self.max:g}")
-        given_bounds = [bound for bound in (self.min, self.max) if bound is not None]
-        if self.quantity.startswith("distance") and min(given_bounds) <= 0:
-            raise ValueError("bounds of a distance are above zero")
-        if self.quantity == "angle" and not all(0 < bound < np.pi for bound in given_bounds):
-            raise ValueError("bounds of an angle between axes are between 0 and pi")
-        if self.quantity == "singularity" and (self.max is not None or not 0 < (self.min or 0) < 1):
-            raise ValueError("distance to singularity takes a min between 0 and 1 and no max")
-        return self
-
-
-class Trajectories(Section):
+class TrajectoriesSection(Section):
     """How exciting trajectories are made."""
 
     count: Count = 10
@@ -196,8 +82,18 @@ class Trajectories(Section):
     file: Path | None = None
     """Fourier coefficients to use instead of optimising: a trajectories.h5, or a summary.json; relative to this file."""
 
+    def limits(self, n_dof: int) -> JointLimits:
+        """The limits of every joint."""
+        pairs = np.broadcast_to(np.array(self.position_limits, dtype=float), (n_dof, 2))
+        return JointLimits(
+            lower=pairs[:, 0],
+            upper=pairs[:, 1],
+            velocity=per_joint(self.velocity_limits, n_dof),
+            acceleration=per_joint(self.acceleration_limits or [np.inf], n_dof),
+        )
 
-class Sampling(Section):
+
+class SamplingSection(Section):
     """The estimation and validation sets."""
 
     points: Annotated[Whole, Field(ge=2, le=10_000_000)] | None = None
@@ -239,8 +135,10 @@ class GroupSection(Section):
         if self.parameters is not None:
             return {self.name: list(self.parameters)}
         return {
-            f"{kind}_{self.name}": [f"{kind}_{body}" for body in self.bodies or []]
-            for kind in self.kinds
+            Parameter(kind, self.name).name: [
+                Parameter(kind, body).name for body in self.bodies or []
+            ]
+            for kind in map(Kind.of, self.kinds)
         }
 
 
@@ -290,7 +188,7 @@ class OperationsCriterion(Section):
 class ReductionSection(Section):
     """How parameters are selected."""
 
-    heuristics: Annotated[list[Heuristic], Field(min_length=1)] = [
+    heuristics: Annotated[list[Method], Field(min_length=1)] = [
         "qr",
         "forward-selection",
         "forward-selection-2",
@@ -319,7 +217,7 @@ class ReductionSection(Section):
 class SelectedSection(Section):
     """The reduced model that validate judges and report shows: by its size, or the smallest that keeps to tolerances on both sets."""
 
-    heuristic: Heuristic | None = None
+    heuristic: Method | None = None
     """Whose subset; of all heuristics the best one if left out."""
     n: Count | None = None
     """Number of parameters."""
@@ -364,7 +262,7 @@ class ValidationSection(Section):
 
     accept: Acceptance = Acceptance()
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
-    operations: Literal["generalised", "independent"] = "generalised"
+    operations: CountedDynamics = CountedDynamics.GENERALISED
     """Of closed loops: count d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b handed in."""
     stability: bool = True
     """Whether the selection is repeated with each trajectory left out and with fewer samples."""
@@ -383,6 +281,10 @@ class TrackingSection(Section):
     """Time between two torques, s."""
     moves: Annotated[int, Field(ge=1, le=20)] = 4
     """How many moves from rest to rest the arm makes."""
+    paths: Annotated[int, Field(ge=1, le=100)] = 10
+    """How many paths of random poses it follows; errors are given as a range over them."""
+    seed: Seed = 0
+    """Of the first path; each further one has the next."""
 
 
 class ReportSection(Section):
@@ -402,26 +304,14 @@ class ReportSection(Section):
     """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
 
 
-class Config(Section):
+class Config(Robot):
     """A robot and everything that is done with it."""
 
-    robot: Annotated[str, Field(pattern=NAME)]
-    """Name of the robot; results go to results/ROBOT."""
-    constants: dict[str, Number] = {}
-    """Named numbers, such as lengths in m, that all other numbers may be written with; each may use those above it."""
-    description: Description
-    """The mechanism."""
-    parameter_sets: Annotated[dict[str, dict[str, BodyParameters]], Field(min_length=1)]
-    """Named sets of standard parameters: for each set, for each body."""
-    parameters: str | None = None
-    """Name of the set that is used; the first one if left out."""
-    nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
-    """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
     model: ModelSection = ModelSection()
     """Base parameters."""
-    trajectories: Trajectories
+    trajectories: TrajectoriesSection
     """Exciting trajectories."""
-    sampling: Sampling = Sampling()
+    sampling: SamplingSection = SamplingSection()
     """Estimation and validation sets."""
     reduction: ReductionSection = ReductionSection()
     """Selection of parameters."""
@@ -431,25 +321,3 @@ class Config(Section):
     """Judgement."""
     report: ReportSection = ReportSection()
     """Report."""
-
-    @property
-    def n_dof(self) -> int:
-        """Number of independent coordinates."""
-        return len(self.description.coordinate_names())
-
-    def per_joint(self, values: object) -> np.ndarray:
-        """An entry that is one number for all joints or one for each, (n_dof,)."""
-        result = np.array(values, dtype=float)
-        return np.full(self.n_dof, result[0]) if result.size == 1 else result
-
-    def body_names(self) -> list[str]:
-        """Names of the bodies that have parameters, in order."""
-        return self.description.body_names()
-
-    def standard_parameters(self) -> np.ndarray:
-        """Values of the chosen set, (n_parameters,), kg, kg m, kg m^2."""
-        chosen = self.parameter_sets[self.parameters or next(iter(self.parameter_sets))]
-        empty = BodyParameters()
-        return np.array(
-            [value for name in self.body_names() for value in chosen.get(name, empty).standard()]
-        )

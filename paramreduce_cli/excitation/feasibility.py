@@ -9,12 +9,11 @@ from __future__ import annotations
 import numpy as np
 import scipy.optimize
 
-from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.errors import Concern, ConcernError, DataError
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
-from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
-from paramreduce_cli.multibody.follower import Follower
-from paramreduce_cli.records import FloatArray
+from paramreduce_cli.multibody.loops.follower import Follower
+from paramreduce_cli.records import FloatArray, JointLimits
 
 FINER = 4
 """How much finer the grid is on which bounds are checked in the end."""
@@ -41,7 +40,7 @@ def resting_position(
         margin: Share of the limits that may be used.
 
     Raises:
-        ConfigError: There is none to be found; says which bound stands in the way.
+        ConcernError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * margin * limits.reach
@@ -69,11 +68,11 @@ def resting_position(
         tried.append(found.x)
     nearest = min((worst(z) for z in tried), key=lambda bound: bound.excess)
     if np.isinf(nearest.excess):
-        raise ConfigError(f"trajectories.position_limits: {nearest.name}")
-    raise ConfigError(
-        "trajectories.constraints: no position of the mechanism was found that keeps all of them "
-        f"within the position limits: {nearest.name} stands in the way. Loosen it or the position "
-        "limits."
+        raise ConcernError(nearest.name, Concern.REACH)
+    raise ConcernError(
+        "no position of the mechanism was found that keeps all of them within the position limits: "
+        f"{nearest.name} stands in the way. Loosen it or the position limits.",
+        Concern.BOUNDS,
     )
 
 
@@ -92,7 +91,7 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         objective: Not a number outside the bounds.
 
     Raises:
-        ConfigError: Even the smallest motion does not keep them.
+        ConcernError: Even the smallest motion does not keep them.
     """
     share = 1.0
     while share > _SMALLEST_SHARE:
@@ -102,24 +101,18 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         share *= _SHRINKS
     nearest = objective.worst_bound(drawn.ravel())
     if np.isinf(nearest.excess):
-        raise ConfigError(
-            "trajectories.position_limits: no motion was found that keeps the loops closed; "
-            f"{nearest.name} If trajectories.use_full_range is true every motion reaches the limits: "
-            "narrow them, or set it to false."
+        raise ConcernError(
+            f"no motion was found that keeps the loops closed; {nearest.name}", Concern.FULL_RANGE
         )
-    raise ConfigError(
-        "trajectories.constraints: no motion was found that keeps them; even the smallest about a "
-        f"position that does is stopped by {nearest.name}. Loosen it, or set "
-        "trajectories.use_full_range to false if it is true."
+    raise ConcernError(
+        "no motion was found that keeps them; even the smallest about a position that does is stopped "
+        f"by {nearest.name}.",
+        Concern.BOUNDED_MOTION,
     )
 
 
 def drawn_inside(
-    excitation: Excitation,
-    coefficients: FloatArray,
-    rest: FloatArray,
-    period: float,
-    points: int,
+    excitation: Excitation, coefficients: FloatArray, rest: FloatArray, period: float, points: int
 ) -> FloatArray:
     """Draw a series together towards a resting position until it keeps the bounds on a fine grid.
 
@@ -131,7 +124,7 @@ def drawn_inside(
         points: Of the grid that was optimised on.
 
     Raises:
-        ConfigError: Hardly any motion keeps them there.
+        ConcernError: Hardly any motion keeps them there.
     """
     basis = fine_basis(period, (coefficients.shape[1] - 1) // 2, points)
     still = np.zeros_like(coefficients)
@@ -158,9 +151,9 @@ def drawn_inside(
         middle = (low + high) / 2
         low, high = (middle, high) if inside(middle) else (low, middle)
     if low == 0.0:
-        raise ConfigError(
-            "trajectories.points: the grid is too coarse to keep the constraints between its points. "
-            "Use more."
+        raise ConcernError(
+            "the grid is too coarse to keep the constraints between its points. Use more.",
+            Concern.GRID,
         )
     return drawn(low)
 

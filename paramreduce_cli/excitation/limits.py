@@ -11,43 +11,18 @@ Limits are tightened by the grid's margin, so that they hold between its points 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
 
 from paramreduce_cli.excitation.fourier import FourierBasis, grid_margin
-from paramreduce_cli.records import FloatArray
+from paramreduce_cli.excitation.scalings import Pullback
+from paramreduce_cli.records import FloatArray, JointLimits
 
 Mapping = Literal["gauge", "ball"]
-Pullback = Callable[[FloatArray], FloatArray]
 _BALL_POWER = 20
 _FURTHEST = 0.999
 """Share of the position range at which a joint may rest; at the limit itself nothing could move."""
-
-
-@dataclass(frozen=True)
-class JointLimits:
-    """Limits of every joint; infinite where there is none."""
-
-    lower: FloatArray
-    """Positions, (n_dof,), rad or m."""
-    upper: FloatArray
-    velocity: FloatArray
-    """Magnitudes, (n_dof,), rad/s or m/s."""
-    acceleration: FloatArray
-    """Magnitudes, (n_dof,), rad/s^2 or m/s^2."""
-
-    @property
-    def middle(self) -> FloatArray:
-        """Of the position range, (n_dof,)."""
-        return (self.lower + self.upper) / 2
-
-    @property
-    def reach(self) -> FloatArray:
-        """Half the position range, (n_dof,)."""
-        return (self.upper - self.lower) / 2
 
 
 class LimitMap:

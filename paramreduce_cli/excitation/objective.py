@@ -7,25 +7,21 @@ series' transposed basis to the coefficients.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.excitation.criteria import condition_from_matrix
+from paramreduce_cli.excitation.criteria import Criterion
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.scaling import Pullback, Scaling
-from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.excitation.scalings import Pullback, Scaling, scalings
 from paramreduce_cli.multibody.dynamics import ObservationFunction
-from paramreduce_cli.multibody.follower import Follower
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.registry import scaling as scalings
-
-Criterion = Callable[[FloatArray, float], tuple[float, FloatArray]]
 
 
 @dataclass(frozen=True)
@@ -90,11 +86,7 @@ class Excitation:
         }
 
     def value_and_gradient(
-        self,
-        basis: FourierBasis,
-        coefficients: FloatArray,
-        level: Level,
-        positions: Follower,
+        self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
         """The criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics)."""
         states = basis.states(coefficients)
@@ -114,11 +106,7 @@ class Excitation:
         return value, gradient
 
     def barrier(
-        self,
-        basis: FourierBasis,
-        coefficients: FloatArray,
-        level: Level,
-        positions: Follower,
+        self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
         """Logarithmic barrier of the bounds and its derivative by the coefficients.
 
@@ -213,3 +201,9 @@ class FreeObjective:
         free = self._mixing @ x.reshape(self._shape)
         coefficients, pull = self._limits.admissible(free, self._level.limits)
         return coefficients, lambda bar: (self._mixing.T @ pull(bar)).ravel()
+
+
+def condition_from_matrix(W: FloatArray) -> float:
+    """Condition number by singular values, infinite where the columns are dependent."""
+    singular = np.linalg.svd(W, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf

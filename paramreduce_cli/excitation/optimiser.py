@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.errors import ConfigError, DataError, ParamreduceError
+from paramreduce_cli.errors import Concern, ConcernError, DataError, ParamreduceError
 from paramreduce_cli.excitation.feasibility import (
     FINER,
     drawn_inside,
@@ -27,10 +27,10 @@ from paramreduce_cli.excitation.feasibility import (
 )
 from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
-from paramreduce_cli.excitation.limits import JointLimits, LimitMap, Mapping
+from paramreduce_cli.excitation.limits import LimitMap, Mapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
-from paramreduce_cli.multibody.follower import Follower
-from paramreduce_cli.records import FloatArray, Trajectory
+from paramreduce_cli.multibody.loops.follower import Follower
+from paramreduce_cli.records import FloatArray, JointLimits, Trajectory
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def optimise_trajectory(
         progress: Told the share of the work done, 0 to 1.
 
     Raises:
-        ConfigError: No motion keeps the bounds; says which one stops it.
+        ConcernError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
     search = _Search(excitation, settings)
@@ -129,9 +129,9 @@ def optimise_trajectory(
         except ParamreduceError as error:  # one of several may fail
             failures.append(error)
     if not results:
-        if isinstance(failures[0], ConfigError):
+        if isinstance(failures[0], ConcernError):
             raise failures[0]
-        raise ConfigError(f"trajectories.position_limits: {failures[0]}") from failures[0]
+        raise ConcernError(str(failures[0]), Concern.REACH) from failures[0]
     best, series, _ = min(results, key=lambda result: result[2])
     return describe(
         excitation,

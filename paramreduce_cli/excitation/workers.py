@@ -23,12 +23,13 @@ from multiprocessing.queues import Queue
 
 import threadpoolctl
 
-from paramreduce_cli import registry
 from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.objective import Excitation
 from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
-from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.excitation.scalings import scalings
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import (
     BaseParameters,
@@ -42,7 +43,7 @@ from paramreduce_cli.records import (
 
 
 @dataclass(frozen=True)
-class Task:
+class ExcitationTask:
     """What is asked of all trajectories."""
 
     mechanism: Mechanism
@@ -69,12 +70,12 @@ def excitation_of(
         quantities=Quantities(mechanism, constraints),
         beta=base.beta,
         nominal_torque=nominal_torque,
-        criterion=registry.criterion[criterion],
-        scaling=registry.scaling[scaling],
+        criterion=criteria[criterion],
+        scaling=scalings[scaling],
     )
 
 
-def optimise_all(task: Task, keys: list[str], run: Run) -> dict[str, Trajectory]:
+def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, Trajectory]:
     """Optimise the trajectories that are not among the finished parts yet.
 
     Args:
@@ -103,13 +104,13 @@ def optimise_all(task: Task, keys: list[str], run: Run) -> dict[str, Trajectory]
         except BrokenProcessPool as error:
             raise DataError(
                 "a worker process died, perhaps for want of memory. Finished trajectories are "
-                "kept; run the same command again, with fewer --jobs."
+                "kept; run the same command again, with fewer jobs."
             ) from error
     return found
 
 
 @contextlib.contextmanager
-def _pool(task: Task, jobs: int, run: Run) -> Iterator[ProcessPoolExecutor]:
+def _pool(task: ExcitationTask, jobs: int, run: Run) -> Iterator[ProcessPoolExecutor]:
     context = multiprocessing.get_context("spawn")
     news: Queue[Progress | None] = context.Queue()
     listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
@@ -152,12 +153,12 @@ def _listen(news: Queue[Progress | None], run: Run) -> None:
 class _Worker:
     """What a worker process knows; set once when it starts."""
 
-    task: Task
+    task: ExcitationTask
     excitation: Excitation
     news: Queue[Progress | None]
 
 
-def _start_worker(task: Task, news: Queue[Progress | None]) -> None:
+def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
@@ -174,7 +175,7 @@ def _end_with(parent: int) -> None:
     os._exit(1)
 
 
-def _excitation(task: Task) -> Excitation:
+def _excitation(task: ExcitationTask) -> Excitation:
     return excitation_of(
         task.mechanism,
         task.base,

@@ -1,1 +1,1 @@
-"""Reduced models as code: one exporter a file."""
+"""Models as code: which one, in which language, and whether it computes what it should."""

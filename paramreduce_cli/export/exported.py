@@ -13,8 +13,8 @@ from paramreduce_cli.records import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
-class Parameter:
-    """A parameter of the model."""
+class ParameterValue:
+    """A value that the model keeps."""
 
     name: str
     value: float
@@ -35,7 +35,9 @@ class ExportedModel:
     """Of these, rad or m."""
     independent: IntArray
     """Positions of the independent coordinates, (n_dof,)."""
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[ParameterValue, ...]
+    symbols: Mapping[str, str]
+    """Formulas of names in the expressions, for LaTeX."""
     constant: bool
     """Whether the values of the parameters are in the code."""
     functions: tuple[Function, ...]
@@ -52,6 +54,13 @@ class ExportedModel:
         """Positions of the dependent coordinates."""
         known = set(self.independent.tolist())
         return tuple(k for k in range(len(self.coordinates)) if k not in known)
+
+    def sides(self, first: int = 0) -> dict[str, object]:
+        """Dependent and independent coordinates, for templates: positions counted from ``first``."""
+        sides = {"dependent": list(self.dependent), "independent": self.independent.tolist()}
+        numbers = {"n_d": len(self.dependent), "n_z": self.independent.size}
+        shifted = {key: [k + first for k in some] for key, some in sides.items()}
+        return {**shifted, **numbers, "n_q": len(self.coordinates)}
 
     @property
     def name(self) -> str:

@@ -74,6 +74,9 @@ class Graph:
             return a ^ 1
         if node.operation == "neg":
             return node.operands[0]
+        if node.operation == "+" and sum(value & 1 for value in node.operands) == 1:
+            x, y = node.operands  # of a difference it is the other difference
+            return self.add(x ^ 1, y ^ 1)
         return self._value("neg", (a,))
 
     def subtract(self, a: int, b: int) -> int:

@@ -128,7 +128,7 @@ class Program:
             if operation == "*":
                 value = graph.multiply(*arguments)
             elif operation == "+":
-                value = graph.add(*arguments)
+                value = _sum(graph, [values[a >> 1] for a in operands], [a & 1 for a in operands])
             elif operation == "input":
                 value = substitute(int(number))
             elif operation == "constant":
@@ -184,6 +184,15 @@ class Program:
                 value = _EVALUATED[operation](*arguments)
             values.append(value)
         return [-values[a >> 1] if a & 1 else values[a >> 1] for a in self.outputs]
+
+
+def _sum(graph: Graph, values: list[int], negated: list[int]) -> int:
+    """A sum of two signed values; a difference is one operation, with or without free signs."""
+    a, b = values
+    if negated[0] == negated[1]:
+        total = graph.add(a, b)
+        return graph.negate(total) if negated[0] else total
+    return graph.subtract(b, a) if negated[0] else graph.subtract(a, b)
 
 
 def _operation(op: int, operands: tuple[int, ...]) -> Node:

@@ -1,4 +1,4 @@
-"""Scalars of an expression graph with the usual operators, and 3-vectors of them."""
+"""Scalars of an expression graph with the usual operators."""
 
 from __future__ import annotations
 
@@ -42,36 +42,9 @@ class Scalar:
         return other.value if isinstance(other, Scalar) else self.graph.constant(other)
 
     def sine(self) -> Scalar:
-        """Sin"""
+        """The sine of an angle."""
         return Scalar(self.graph, self.graph.call("sin", self.value))
 
     def cosine(self) -> Scalar:
-        """Cos"""
+        """The cosine of an angle."""
         return Scalar(self.graph, self.graph.call("cos", self.value))
-
-
-Vector = tuple[Scalar, Scalar, Scalar]
-
-
-def add(a: Vector, b: Vector) -> Vector:
-    """A + b"""
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-def scale(factor: Scalar, a: Vector) -> Vector:
-    """Factor * a"""
-    return (factor * a[0], factor * a[1], factor * a[2])
-
-
-def dot(a: Vector, b: Vector) -> Scalar:
-    """A . b"""
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """A x b"""
-    return (
-        a[1] * b[2] - a[2] * b[1],
-        a[2] * b[0] - a[0] * b[2],
-        a[0] * b[1] - a[1] * b[0],
-    )

@@ -16,7 +16,7 @@ from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism
 
-_TOLERANCE = 1e-10
+TOLERANCE = 1e-10
 """Of the largest value of each output; rounding leaves 1e-14."""
 
 
@@ -40,7 +40,7 @@ def check_formulations(
         FormulationError: A formulation computes something else.
     """
     q, dq, ddq = states
-    phi = np.zeros(len(mechanism.parameter_names))
+    phi = np.zeros(mechanism.n_parameters)
     phi[kept] = rng.normal(size=kept.size)
     plain = Dynamics(dataclasses.replace(mechanism, loops=None), once=True)
     A, B = plain.direct_regressor(q, dq)
@@ -60,12 +60,26 @@ def check_formulations(
             program = Program.of_graph(*least(graph, outputs))
             values = program.evaluated(inputs)
             got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
-            error = np.max(np.abs(got - wanted), initial=0.0) / np.max(
-                np.abs(wanted), initial=1e-300
-            )
-            if not error <= _TOLERANCE:
-                raise FormulationError(
-                    f"a lean formulation of the {kind} dynamics is off by {error:.1e} of the largest "
-                    "value against plain recursion. This is a defect of paramreduce: please report it "
-                    "with the config."
-                )
+            refuse_if_off(f"a lean formulation of the {kind} dynamics", got - wanted, wanted)
+
+
+def refuse_if_off(
+    what: str, off: FloatArray, against: FloatArray, tolerance: float = TOLERANCE
+) -> None:
+    """Refuse results that are too far from those of plain recursion.
+
+    Args:
+        what: What computed the results, for the message.
+        off: Their differences.
+        against: What the largest difference is compared with.
+        tolerance: Share of the largest value that is allowed.
+
+    Raises:
+        FormulationError: They are too far off.
+    """
+    error = np.max(np.abs(off), initial=0.0) / np.max(np.abs(against), initial=1e-300)
+    if not error <= tolerance:
+        raise FormulationError(
+            f"{what} is off by {error:.1e} of the largest value against plain recursion. This is a "
+            "defect of paramreduce: please report it with the config."
+        )

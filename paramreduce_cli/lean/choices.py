@@ -25,7 +25,7 @@ class Place(StrEnum):
 
 
 @dataclass(frozen=True)
-class Choice:
+class JointFormulation:
     """Of one joint."""
 
     aligned: bool = False
@@ -66,8 +66,8 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
 """All values of every choice."""
 
 
-def alternatives(choice: Choice, joint: Joint) -> list[Choice]:
-    """Choices at a joint that differ in one thing, or have several parts in one other place."""
+def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
+    """What else may be chosen at a joint: one thing differs, or several parts are in one other place."""
     names = _effective(choice, joint)
     places = tuple(Place) if joint.revolute else (Place.OWN, Place.BEFORE)
     single = [
@@ -83,7 +83,7 @@ def alternatives(choice: Choice, joint: Joint) -> list[Choice]:
     return [c for c in dict.fromkeys(single + together) if c != choice]
 
 
-def _effective(choice: Choice, joint: Joint) -> list[str]:
+def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
     """What makes a difference at a joint."""
     names = list(_PLACED)
     if joint.revolute:
@@ -95,7 +95,7 @@ def _effective(choice: Choice, joint: Joint) -> list[str]:
     return names
 
 
-def to_data(choice: Choice) -> dict[str, str | bool]:
+def to_data(choice: JointFormulation) -> dict[str, str | bool]:
     """As plain values."""
     return {
         f.name: value if isinstance(value := getattr(choice, f.name), bool) else str(value)
@@ -103,9 +103,9 @@ def to_data(choice: Choice) -> dict[str, str | bool]:
     }
 
 
-def from_data(data: Mapping[str, str | bool]) -> Choice:
+def from_data(data: Mapping[str, str | bool]) -> JointFormulation:
     """From plain values."""
     kinds = {"gauge": Gauge, "diagonal": Diagonal, "rates": Rates, **dict.fromkeys(_PLACED, Place)}
-    return Choice(
+    return JointFormulation(
         **{name: kinds[name](value) if name in kinds else value for name, value in data.items()}  # type: ignore[arg-type]
     )

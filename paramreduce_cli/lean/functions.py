@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 
 import casadi as ca
 
@@ -10,46 +10,30 @@ from paramreduce_cli.expressions.factoring import least
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.model import LeanModels, ties
-from paramreduce_cli.multibody.closures import closure_equations
-from paramreduce_cli.records import Formulations, IntArray, Mechanism
-
-_NO_VALUES: Mapping[int, float] = {}
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.records import Model, ReducedModel
 
 
 class LeanFunctions:
     """Functions of a reduced model.
 
     Args:
-        mechanism: The mechanism.
-        formulations: Of its dynamics.
-        kept: Standard parameters that are not zero, ascending.
-        owner: For each of them the position of its value in ``phi``.
-        values: The values in ``phi``.
-        constant: Whether they are part of the functions.
+        model: Of the robot.
+        reduced: Which parameters are kept, and their values.
+        constant: Whether the values are part of the functions.
     """
 
-    def __init__(
-        self,
-        mechanism: Mechanism,
-        formulations: Formulations,
-        kept: IntArray,
-        owner: IntArray,
-        values: tuple[float, ...],
-        *,
-        constant: bool = False,
-    ) -> None:
+    def __init__(self, model: Model, reduced: ReducedModel, *, constant: bool = False) -> None:
+        mechanism = model.mechanism
         self._mechanism = mechanism
-        self._models = LeanModels(mechanism, formulations, independent=True)
-        self._kept = kept
-        self._owner = dict(zip(kept.tolist(), owner.tolist(), strict=True))
-        self._ties = ties(kept, owner)
-        self._values = values if constant else None
-        self._n_values = len(values)
+        self._models = LeanModels(mechanism, model.formulations, independent=True)
+        self._reduced = reduced.restricted(model.affecting)
+        self._constant = constant
         loops = mechanism.loops is not None
         q, z = mechanism.n_q, mechanism.n_dof
         d = q - z
-        self._phi = Argument("phi", (self._n_values,), "parameters")
+        self._phi = Argument("phi", (reduced.n,), "parameters")
         unit = "rad or m"
         self._states = (
             Argument("q", (q,), f"coordinates, {unit}"),
@@ -88,9 +72,9 @@ class LeanFunctions:
 
     def regressor(self) -> Function:
         """Torques as a linear map of the parameters."""
-        n, z = self._n_values, self._mechanism.n_dof
-        start = self._models.n_parameters
-        program = self._models.inverse(self._kept, same=self._ties)
+        n, z = self._reduced.n, self._mechanism.n_dof
+        start, place = self._models.n_parameters, self._reduced.position
+        program = self._models.inverse(self._reduced)
         graph = Graph()
         columns = []
         for value in range(n):
@@ -98,7 +82,7 @@ class LeanFunctions:
             def substitute(position: int, value: int = value) -> int:
                 if position >= start:
                     return graph.input(position - start)
-                return graph.constant(1.0) if self._owner[position] == value else ZERO
+                return graph.constant(1.0) if place[position] == value else ZERO
 
             columns.append(program.rebuilt(graph, substitute))
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
@@ -121,15 +105,14 @@ class LeanFunctions:
         results: tuple[Argument, ...],
         arranged: Callable[[list[int]], list[int]],
     ) -> Function:
-        constants = _NO_VALUES
-        if self._values is not None:
-            constants = {p: self._values[value] for p, value in self._owner.items()}
-        program = model(self._kept, same=self._ties, constants=constants)
-        start, n = self._models.n_parameters, self._n_values
+        program = model(self._reduced, constant=self._constant)
+        start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
         graph = Graph()
 
         def substitute(position: int) -> int:
-            return graph.input(self._owner[position] if position < start else position - start + n)
+            if position >= start:
+                return graph.input(position - start + n)
+            return graph.input(int(place[position]))
 
         outputs = arranged(program.rebuilt(graph, substitute))
         return self._trimmed(
@@ -149,7 +132,7 @@ class LeanFunctions:
             "direct_dynamics": {"phi", "q", "dq", "R", "b"},
             "regressor": {"q", "dq", "ddq", "R"},
         }[function.name]
-        if self._values is not None:
+        if self._constant:
             needed = needed - {"phi"}
         for argument in function.arguments:
             if argument.name not in needed:

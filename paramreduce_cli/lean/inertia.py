@@ -7,7 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from paramreduce_cli.lean.algebra import Scalar, Vector, add, scale
+from paramreduce_cli.expressions.vectors import Vector, add, scale
+from paramreduce_cli.lean.algebra import Scalar
 
 
 @dataclass(frozen=True)

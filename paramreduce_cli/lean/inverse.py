@@ -13,8 +13,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from paramreduce_cli.lean.algebra import Scalar, dot
-from paramreduce_cli.lean.choices import Choice, Place
+from paramreduce_cli.expressions.vectors import dot
+from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.choices import JointFormulation, Place
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.kinematics import JointState, Kinematics
 from paramreduce_cli.lean.wrench import (
@@ -45,31 +46,35 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
         wrench = wrench_own[i]
         if kept := part(rest, choice, Place.OWN):
             wrench = wrench + inertial_wrench(
-                kept, state.own, state.a_own, form(state, choice, Place.OWN)
+                kept, state.body_motion, state.body_acceleration, form(state, choice, Place.OWN)
             )
         wrench = turned_out(wrench, state) + wrench_rest[i]
         if kept := part(rest, choice, Place.REST):
             wrench = wrench + inertial_wrench(
                 state.turn.inertia(kept),
-                kinematics.spun(i),
-                state.a_rest,
+                kinematics.rest_components(i),
+                state.rest_acceleration,
                 form(state, choice, Place.REST),
             )
         handed = part(rest, choice, Place.BEFORE)
         if handed:
             handed = state.turn.inertia(handed)
-            wrench = wrench + turning_wrench(handed, state.adds)
+            wrench = wrench + turning_wrench(handed, state.joint_turning)
         handed = handed + at_rest[i]
         if state.joint.revolute:
-            along = wrench.moment[2] + spin_about_z(handed, state.rest, state.a_rest)
+            along = wrench.moment[2] + spin_about_z(
+                handed, state.rest_motion, state.rest_acceleration
+            )
         else:
-            along = wrench.force[2] + force_along_z(handed, state.rest, state.a_rest)
+            along = wrench.force[2] + force_along_z(
+                handed, state.rest_motion, state.rest_acceleration
+            )
         result[i] = result[i] + state.joint.sign * along
         parent = state.joint.parent
         if parent == BASE:
             continue
         if handed:
-            wrench = wrench + pushed(handed, state.extra)
+            wrench = wrench + pushed(handed, state.relative_acceleration)
         if choice.projected:
             for j, along in projections(kinematics, i, wrench).items():
                 result[j] = result[j] + kinematics.states[j].joint.sign * along
@@ -81,7 +86,9 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
     return result
 
 
-def axial_part(body: Inertia, choice: Choice, state: JointState) -> tuple[Inertia, Inertia]:
+def axial_part(
+    body: Inertia, choice: JointFormulation, state: JointState
+) -> tuple[Inertia, Inertia]:
     """What a hinge cannot tell from a part of the body before, as far as it is chosen, and the rest."""
     nothing = _no_inertia(body)
     if not state.joint.revolute:
@@ -98,7 +105,7 @@ def _no_inertia(body: Inertia) -> Inertia:
     return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
 
-def part(body: Inertia, choice: Choice, place: Place) -> Inertia:
+def part(body: Inertia, choice: JointFormulation, place: Place) -> Inertia:
     """The part of an inertia that is met at a place."""
     zero = body.m - body.m
 
@@ -118,7 +125,7 @@ def part(body: Inertia, choice: Choice, place: Place) -> Inertia:
     )
 
 
-def form(state: JointState, choice: Choice, place: Place) -> Gauge:
+def form(state: JointState, choice: JointFormulation, place: Place) -> Gauge:
     """What is known of the moments of inertia at a place."""
     if not (state.joint.revolute and choice.polar is choice.plane is place):
         return Gauge.NONE
@@ -134,7 +141,7 @@ def turned_out(wrench: Wrench, state: JointState) -> Wrench:
 
 def on_body_before(wrench: Wrench, state: JointState) -> Wrench:
     """From the frame at rest to that of the body before, about its origin; not where aligned."""
-    turned = Wrench(state.fixed.out(wrench.force), state.fixed.out(wrench.moment))
+    turned = Wrench(state.rest_to_parent.out(wrench.force), state.rest_to_parent.out(wrench.moment))
     return turned.moved(state.reach)
 
 
@@ -171,5 +178,5 @@ def hand_on(
         own[parent] = own[parent] + axial.shifted(place)
         at_rest[parent] = at_rest[parent] + handed.shifted(state.reach)
     else:
-        both = state.fixed.inertia(handed + axial)
+        both = state.rest_to_parent.inertia(handed + axial)
         own[parent] = own[parent] + both.shifted(state.reach)

@@ -6,11 +6,12 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.lean.algebra import Scalar, Vector, add, cross
-from paramreduce_cli.lean.choices import Choice
+from paramreduce_cli.expressions.vectors import Vector, add, cross
+from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.choices import JointFormulation
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.motion import (
-    Motion,
+    FrameMotion,
     Turning,
     motion,
     seen_through,
@@ -20,9 +21,7 @@ from paramreduce_cli.lean.motion import (
 )
 from paramreduce_cli.lean.tree import Joint, Tree
 from paramreduce_cli.lean.turns import ConstantTurn, Turn, turn_by
-from paramreduce_cli.records import BASE, PARAMETER_KINDS, FloatArray
-
-_WIDTH = len(PARAMETER_KINDS)
+from paramreduce_cli.records import BASE, INERTIAL, FloatArray, Kind
 
 
 class Symbols:
@@ -37,12 +36,11 @@ class Symbols:
     def __init__(self, graph: Graph, tree: Tree, dropped: Collection[int] = ()) -> None:
         self.graph = graph
         self._dropped = frozenset(dropped)
-        self._start = _WIDTH * len(tree.inertial)
-        self._n = len(tree.joints)
-        self._order = {body: k for k, body in enumerate(tree.inertial)}
+        self._start = tree.n_parameters
+        self._joints = tree.joints
 
     def number(self, value: float) -> Scalar:
-        """A constant."""
+        """A number that is known when the code is written."""
         return Scalar(self.graph, self.graph.constant(value))
 
     def vector(self, values: Sequence[float] | FloatArray) -> Vector:
@@ -52,24 +50,23 @@ class Symbols:
 
     def coordinate(self, i: int, derivative: int) -> Scalar:
         """Of joint i as described: the coordinate, its speed or its acceleration."""
-        position = self._start + derivative * self._n + i
+        position = self._start + derivative * len(self._joints) + i
         return Scalar(self.graph, self.graph.input(position))
 
     def inertia(self, body: int) -> Inertia:
         """The parameters of a body, in its frame as described."""
-        if body not in self._order:
-            return self.no_inertia()
-        first = _WIDTH * self._order[body]
-        m, x, y, z, *tensor = (self._parameter(first + k) for k in range(_WIDTH))
+        m, x, y, z, *tensor = (self.parameter(body, kind) for kind in INERTIAL)
         return Inertia(m, (x, y, z), *tensor)
 
-    def _parameter(self, position: int) -> Scalar:
-        if position in self._dropped:
+    def parameter(self, body: int, kind: Kind) -> Scalar:
+        """A parameter of a body, zero where it has none of the kind or is dropped."""
+        position = self._joints[body].columns.get(kind)
+        if position is None or position in self._dropped:
             return self.number(0.0)
         return Scalar(self.graph, self.graph.input(position))
 
     def no_inertia(self) -> Inertia:
-        """Of nothing."""
+        """The inertia of a body without mass."""
         zero = self.number(0.0)
         return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
@@ -94,24 +91,24 @@ class JointState:
 
     joint: Joint
     aligned: bool
-    fixed: ConstantTurn
+    rest_to_parent: ConstantTurn
     """From the frame at rest to that of the body before; of no use where aligned."""
     angle: Angle
     turn: Turn
     """Of the body against the frame at rest."""
-    rest: Motion
+    rest_motion: FrameMotion
     """Of the frame at rest, in its components."""
-    own: Motion
+    body_motion: FrameMotion
     """Of the body's frame, in its own."""
-    adds: Turning
+    joint_turning: Turning
     """What U of the body has on top of U of the frame at rest."""
-    a_rest: Vector
+    rest_acceleration: Vector
     """Acceleration of the origin less gravity, in the frame at rest."""
-    a_own: Vector
+    body_acceleration: Vector
     """The same in the body's frame."""
     reach: Vector
     """From the origin before: in the frame of the body before, or aligned, in that at rest."""
-    extra: Vector
+    relative_acceleration: Vector
     """Acceleration of the origin against the frame before that ``reach`` is given in; at rest."""
 
 
@@ -129,7 +126,7 @@ class Kinematics:
     def __init__(
         self,
         tree: Tree,
-        choices: Sequence[Choice],
+        choices: Sequence[JointFormulation],
         graph: Graph,
         *,
         moving: bool = True,
@@ -148,7 +145,7 @@ class Kinematics:
     def body(self, i: int) -> Inertia:
         """The parameters of a body in the frame on its joint."""
         described = self.symbols.inertia(i)
-        frame = self.tree.joints[i].described
+        frame = self.tree.joints[i].described_to_axis
         turned_body = ConstantTurn(self.graph, frame[:3, :3]).inertia(described)
         return turned_body.shifted(self.symbols.vector(frame[:3, 3]))
 
@@ -162,14 +159,14 @@ class Kinematics:
             rest, reach, extra = motion(self._none, self._none), self._none, self._none
             a = fixed.back(self.symbols.vector(-self.tree.gravity))
         elif aligned:
-            rest, reach = before.rest, before.turn.out(place)
-            extra = before.adds.moved(reach)
-            a = add(before.a_rest, before.turn.out(before.own.moved(place)))
+            rest, reach = before.rest_motion, before.turn.out(place)
+            extra = before.joint_turning.moved(reach)
+            a = add(before.rest_acceleration, before.turn.out(before.body_motion.moved(place)))
             if choice.reach_turned:
-                a = add(add(before.a_rest, before.rest.moved(reach)), extra)
+                a = add(add(before.rest_acceleration, before.rest_motion.moved(reach)), extra)
         else:
-            rest, reach, extra = seen_through(fixed, before.own), place, self._none
-            a = fixed.back(add(before.a_own, before.own.moved(place)))
+            rest, reach, extra = seen_through(fixed, before.body_motion), place, self._none
+            a = fixed.back(add(before.body_acceleration, before.body_motion.moved(place)))
         q, dq, ddq = (joint.sign * self.symbols.coordinate(i, k) for k in range(3))
         if not self._moving:
             ddq = self._zero
@@ -191,16 +188,18 @@ class Kinematics:
         return JointState(
             joint=joint,
             aligned=aligned,
-            fixed=fixed,
+            rest_to_parent=fixed,
             angle=angle,
             turn=turn,
-            rest=rest,
-            own=turned(rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.rates),
-            adds=turning(rest, angle.speed, angle.acceleration),
-            a_rest=a,
-            a_own=turn.back(a),
+            rest_motion=rest,
+            body_motion=turned(
+                rest, turn, angle.speed, angle.acceleration, choice.diagonal, choice.rates
+            ),
+            joint_turning=turning(rest, angle.speed, angle.acceleration),
+            rest_acceleration=a,
+            body_acceleration=turn.back(a),
             reach=reach,
-            extra=extra,
+            relative_acceleration=extra,
         )
 
     def _no_angle(self) -> Angle:
@@ -235,13 +234,16 @@ class Kinematics:
             j: (w, add(v, cross(w, state.reach)))
             for j, (w, v) in {**turned_in, parent: own}.items()
         }
-        return {j: (state.fixed.back(w), state.fixed.back(v)) for j, (w, v) in moved.items()}
+        return {
+            j: (state.rest_to_parent.back(w), state.rest_to_parent.back(v))
+            for j, (w, v) in moved.items()
+        }
 
-    def spun(self, i: int) -> Motion:
-        """Motion of a body in the components of its frame at rest."""
+    def rest_components(self, i: int) -> FrameMotion:
+        """FrameMotion of a body in the components of its frame at rest."""
         state, choice = self.states[i], self.choices[i]
         still = Turn(self.symbols.number(1.0), self._zero)
         angle = state.angle
         return turned(
-            state.rest, still, angle.speed, angle.acceleration, choice.diagonal, choice.rates
+            state.rest_motion, still, angle.speed, angle.acceleration, choice.diagonal, choice.rates
         )

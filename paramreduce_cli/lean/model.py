@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from functools import cached_property
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,30 +15,13 @@ from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
-from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import BoolArray, Formulations, IntArray, Mechanism
+from paramreduce_cli.records import BoolArray, Formulations, IntArray, Mechanism, ReducedModel
 
 if TYPE_CHECKING:
     from paramreduce_cli.expressions.live import LiveCount
 
-_NOTHING: Mapping[int, int] = MappingProxyType({})
-_NO_VALUES: Mapping[int, float] = MappingProxyType({})
 _NEAR = 1.03
 """Estimates further apart than that are not the wrong way round."""
-
-
-def ties(kept: IntArray, owner: IntArray) -> dict[int, int]:
-    """For every parameter but the first of those with the same value, that first one.
-
-    Args:
-        kept: Indices of parameters.
-        owner: What value each of them has.
-    """
-    first: dict[int, int] = {}
-    pairs = list(zip(kept.tolist(), owner.tolist(), strict=True))
-    for parameter, value in pairs:
-        first.setdefault(value, parameter)
-    return {parameter: first[value] for parameter, value in pairs if first[value] != parameter}
 
 
 class _Variants:
@@ -78,7 +59,7 @@ class LeanModels:
 
     Args:
         mechanism: The mechanism.
-        formulations: To choose from, beside plain recursion, which may be the leanest of a few parameters.
+        formulations: To choose from.
         independent: Whether d_z and [M_zz | delta_z] are meant, with R and b handed in, instead of
             d_q and [M_qq | delta_q]; on an open tree they are the same.
     """
@@ -90,21 +71,17 @@ class LeanModels:
         self._formulations = formulations
         self._tree = lean_tree(mechanism)
         self._projected = independent and mechanism.loops is not None
-        self.n_parameters = len(mechanism.parameter_names)
-
-    @cached_property
-    def _plain(self) -> tuple[Program, Program]:
-        return Dynamics(replace(self._mechanism, loops=None)).programs
+        self.n_parameters = mechanism.n_parameters
 
     @cached_property
     def _inverse(self) -> _Variants:
-        lean = self._programs(inverse_outputs, self._formulations.inverse)
-        return self._variants([*lean, self._plain[0]], projected_inverse)
+        programs = self._programs(inverse_outputs, self._formulations.inverse)
+        return self._variants(programs, projected_inverse)
 
     @cached_property
     def _direct(self) -> _Variants:
-        lean = self._programs(direct_outputs, self._formulations.direct)
-        return self._variants([*lean, self._plain[1]], projected_direct)
+        programs = self._programs(direct_outputs, self._formulations.direct)
+        return self._variants(programs, projected_direct)
 
     def _programs(
         self, build: Build, choices: tuple[tuple[Mapping[str, str | bool], ...], ...]
@@ -130,37 +107,23 @@ class LeanModels:
             result.append(Program.of_graph(graph, outputs))
         return _Variants(result)
 
-    def inverse(
-        self,
-        kept: IntArray,
-        *,
-        same: Mapping[int, int] = _NOTHING,
-        constants: Mapping[int, float] = _NO_VALUES,
-    ) -> Program:
-        """The inverse dynamics with some parameters; the torques, (n_q,) or (n_dof,).
+    def inverse(self, model: ReducedModel, *, constant: bool = False) -> Program:
+        """The inverse dynamics of a model; the torques, (n_q,) or (n_dof,).
 
         Args:
-            kept: Indices of the parameters that are not zero.
-            same: Parameters that have the same value as another one.
-            constants: Values of the parameters that are known.
+            model: Which parameters are kept, and which have one value.
+            constant: Whether their values are known, and so part of the program.
         """
-        return self._leanest(self._inverse, kept, same, constants)
+        return self._leanest(self._inverse, model, constant)
 
-    def direct(
-        self,
-        kept: IntArray,
-        *,
-        same: Mapping[int, int] = _NOTHING,
-        constants: Mapping[int, float] = _NO_VALUES,
-    ) -> Program:
-        """[M | delta] with some parameters: the lower triangle of M, row by row, then delta.
+    def direct(self, model: ReducedModel, *, constant: bool = False) -> Program:
+        """[M | delta] of a model: the lower triangle of M, row by row, then delta.
 
         Args:
-            kept: Indices of the parameters that are not zero.
-            same: Parameters that have the same value as another one.
-            constants: Values of the parameters that are known.
+            model: Which parameters are kept, and which have one value.
+            constant: Whether their values are known, and so part of the program.
         """
-        return self._leanest(self._direct, kept, same, constants)
+        return self._leanest(self._direct, model, constant)
 
     def estimate(self, kept: IntArray) -> int:
         """Operations of the inverse dynamics, nearly: quick enough to compare thousands of subsets.
@@ -175,25 +138,22 @@ class LeanModels:
         zero[kept] = False
         return zero
 
-    def _leanest(
-        self,
-        variants: _Variants,
-        kept: IntArray,
-        same: Mapping[int, int],
-        constants: Mapping[int, float],
-    ) -> Program:
+    def _leanest(self, variants: _Variants, model: ReducedModel, constant: bool) -> Program:
         """The formulation with the fewest operations, its sums and products rearranged."""
-        left = frozenset(kept.tolist())
+        ties, values = model.ties, model.standard
+        kept = frozenset(model.kept.tolist())
         candidates = []
-        for program in variants.promising(self._dropped(kept)):
+        for program in variants.promising(self._dropped(model.kept)):
             graph = Graph()
 
             def substitute(position: int, graph: Graph = graph) -> int:
-                if position < self.n_parameters and position not in left:
+                if position >= self.n_parameters:
+                    return graph.input(position)
+                if position not in kept:
                     return ZERO
-                owner = same.get(position, position)
-                known = constants.get(owner)
-                return graph.input(owner) if known is None else graph.constant(known)
+                if constant:
+                    return graph.constant(float(values[position]))
+                return graph.input(ties.get(position, position))
 
             outputs = program.rebuilt(graph, substitute)
             candidates.append((graph.count(outputs), graph, outputs))

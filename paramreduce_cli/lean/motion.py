@@ -9,7 +9,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import StrEnum
 
-from paramreduce_cli.lean.algebra import Scalar, Vector, dot
+from paramreduce_cli.expressions.vectors import Vector, dot
+from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.turns import ConstantTurn, Turn
 
 
@@ -36,7 +37,7 @@ class Diagonal(StrEnum):
 
 
 @dataclass(frozen=True)
-class Motion:
+class FrameMotion:
     """Rates of a frame in its own components.
 
     Attributes:
@@ -62,31 +63,27 @@ class Motion:
         return (dot(self.U[0], r), dot(self.U[1], r), dot(self.U[2], r))
 
 
-def motion(omega: Vector, rate: Vector) -> Motion:
+def motion(omega: Vector, rate: Vector) -> FrameMotion:
     """From the rates alone."""
     products = (omega[1] * omega[2], omega[0] * omega[2], omega[0] * omega[1])
     xx, yy, zz = (component * component for component in omega)
     (yz, xz, xy), (x, y, z) = products, rate
-    U = (
-        (-(yy + zz), xy - z, xz + y),
-        (xy + z, -(xx + zz), yz - x),
-        (xz - y, yz + x, -(xx + yy)),
-    )
-    return Motion(omega, rate, products, U, (yy - zz, zz - xx, xx - yy))
+    U = ((-(yy + zz), xy - z, xz + y), (xy + z, -(xx + zz), yz - x), (xz - y, yz + x, -(xx + yy)))
+    return FrameMotion(omega, rate, products, U, (yy - zz, zz - xx, xx - yy))
 
 
 def turned(
-    frame: Motion,
+    frame: FrameMotion,
     turn: Turn,
     speed: Scalar,
     acceleration: Scalar,
     diagonal: Diagonal,
     rates: Rates,
-) -> Motion:
+) -> FrameMotion:
     """The motion of a frame that turns about z against another.
 
     Args:
-        frame: Motion of the other, in its own components.
+        frame: FrameMotion of the other, in its own components.
         turn: By what it is turned already.
         speed: Of the turning, rad/s.
         acceleration: Of the turning, rad/s^2.
@@ -123,15 +120,11 @@ def turned(
         step = yy - zz
         u_xx, u_yy = -(yy + zz), u_zz + step
         steps = (step, u_zz - u_xx, u_xx - u_yy)
-    U = (
-        (u_xx, xy - rate_z, u_xz),
-        (xy + rate_z, u_yy, u_yz),
-        (u_zx, u_zy, u_zz),
-    )
-    return Motion((x, y, z), (rate_x, rate_y, rate_z), (yz, xz, xy), U, steps)
+    U = ((u_xx, xy - rate_z, u_xz), (xy + rate_z, u_yy, u_yz), (u_zx, u_zy, u_zz))
+    return FrameMotion((x, y, z), (rate_x, rate_y, rate_z), (yz, xz, xy), U, steps)
 
 
-def seen_through(turn: ConstantTurn, frame: Motion) -> Motion:
+def seen_through(turn: ConstantTurn, frame: FrameMotion) -> FrameMotion:
     """The same motion in the components of a frame fixed in it."""
     if not turn.is_permutation:
         return motion(turn.back(frame.omega), turn.back(frame.rate))
@@ -151,7 +144,7 @@ def seen_through(turn: ConstantTurn, frame: Motion) -> Motion:
         return value if (k + 1) % 3 == m else -value
 
     rows = [(component(i, 0), component(i, 1), component(i, 2)) for i in range(3)]
-    return Motion(
+    return FrameMotion(
         turn.back(frame.omega),
         turn.back(frame.rate),
         (product(1, 2), product(0, 2), product(0, 1)),
@@ -164,36 +157,36 @@ def seen_through(turn: ConstantTurn, frame: Motion) -> Motion:
 class Turning:
     """What turning about z at a speed and an acceleration adds to U, C = U_after - U_before.
 
-    Only three of its entries differ: ``-kappa`` in xx and yy, the acceleration off the diagonal,
+    Only three of its entries differ: ``-loss`` in xx and yy, the acceleration off the diagonal,
     and twice ``half`` in the row of z.
 
     Attributes:
         acceleration: rad/s^2.
-        kappa: Loss of the diagonal.
+        loss: Of the diagonal.
         half: speed * w_x and speed * w_y.
     """
 
     acceleration: Scalar
-    kappa: Scalar
+    loss: Scalar
     half: tuple[Scalar, Scalar]
 
     def moved(self, r: Vector) -> Vector:
         """C r"""
         x, y, _ = r
         return (
-            -(self.kappa * x) - self.acceleration * y,
-            self.acceleration * x - self.kappa * y,
+            -(self.loss * x) - self.acceleration * y,
+            self.acceleration * x - self.loss * y,
             2 * (self.half[0] * x + self.half[1] * y),
         )
 
 
-def turning(frame: Motion, speed: Scalar, acceleration: Scalar) -> Turning:
+def turning(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> Turning:
     """Of a frame that turns about z of another, whose motion is given."""
     x, y, z = frame.omega
     return Turning(acceleration, speed * (z + (z + speed)), (speed * x, speed * y))
 
 
-def slide(frame: Motion, speed: Scalar, acceleration: Scalar) -> Vector:
+def slide(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> Vector:
     """Acceleration that sliding along z of a moving frame adds."""
     twice = 2 * speed
     return (twice * frame.omega[1], -(twice * frame.omega[0]), acceleration)

@@ -1,7 +1,7 @@
 """From the dynamics of an open tree to that of its loops, with R and b as inputs.
 
 d_z = R' d_q, M_zz = R' M_qq R and delta_z = R' (delta_q + M_qq b) as in
-:mod:`paramreduce_cli.multibody.projection`; the independent rows of R are those of the identity
+:mod:`paramreduce_cli.multibody.loops.projection`; the independent rows of R are those of the identity
 and of b zero.
 """
 
@@ -46,7 +46,7 @@ def _tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], li
     b = [zero] * mechanism.n_q
     for j, i in enumerate(mechanism.independent):
         R[i][j] = one
-    start = len(mechanism.parameter_names) + _STATES * mechanism.n_q
+    start = mechanism.n_parameters + _STATES * mechanism.n_q
     for k, i in enumerate(dependent):
         R[i] = [Scalar(graph, graph.input(start + k * n_z + j)) for j in range(n_z)]
         b[i] = Scalar(graph, graph.input(start + len(dependent) * n_z + k))

@@ -15,35 +15,40 @@ from dataclasses import replace
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.lean.choices import Choice, Place, alternatives, to_data
+from paramreduce_cli.lean.choices import JointFormulation, Place, alternatives, to_data
 from paramreduce_cli.lean.direct import mass_matrix
 from paramreduce_cli.lean.inverse import torques
 from paramreduce_cli.lean.kinematics import Kinematics
+from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.tree import Joint, Tree, lean_tree
-from paramreduce_cli.records import (
-    BASE,
-    PARAMETER_KINDS,
-    BoolArray,
-    Formulations,
-    IntArray,
-    Mechanism,
-)
+from paramreduce_cli.records import BASE, BoolArray, Formulations, IntArray, Kind, Mechanism
 
-Build = Callable[[Tree, Sequence[Choice], Graph, Collection[int]], list[int]]
+Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], list[int]]
 """Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
 
-_WIDTH = len(PARAMETER_KINDS)
-_FIRST_MOMENTS = ("m", "mx", "my", "mz")
-_MOMENTS = ("Ixx", "Iyy", "Izz")
-_INVERSE_START = Choice()
-_DIRECT_START = Choice(
+_FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
+_MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)
+_INVERSE_STARTS = (
+    JointFormulation(),
+    JointFormulation(aligned=True),
+    JointFormulation(mass=Place.REST, axial=Place.REST),
+    JointFormulation(aligned=True, radial=Place.REST, rates=Rates.DIRECT),
+)
+_AT_REST = JointFormulation(
+    aligned=True, rates=Rates.DIRECT, radial=Place.REST, polar=Place.REST, tilt=Place.REST,
+    plane=Place.REST,
+)  # fmt: skip
+_COMPOSITE = JointFormulation(
     radial=Place.BEFORE, polar=Place.BEFORE, tilt=Place.BEFORE, plane=Place.BEFORE
 )
 """The bias from the composite bodies that the mass matrix is made of."""
+_DIRECT_STARTS = (_COMPOSITE, replace(_COMPOSITE, aligned=True), _AT_REST, *_INVERSE_STARTS)
+"""The same at all joints: the search starts from the first, and all stay beside what it finds, as
+they suit odd sets of few parameters."""
 
 
 def inverse_outputs(
-    tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+    tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
 ) -> list[int]:
     """Torques, (n_q,)."""
     kinematics = Kinematics(tree, choices, graph, dropped=dropped)
@@ -51,7 +56,7 @@ def inverse_outputs(
 
 
 def direct_outputs(
-    tree: Tree, choices: Sequence[Choice], graph: Graph, dropped: Collection[int] = ()
+    tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
 ) -> list[int]:
     """The lower triangle of M, row by row, then delta."""
     kinematics = Kinematics(tree, choices, graph, moving=False, dropped=dropped)
@@ -59,7 +64,7 @@ def direct_outputs(
     return M + [torque.value for torque in torques(kinematics)]
 
 
-_found: dict[tuple, list[Choice]] = {}
+_found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
 
 
@@ -78,37 +83,41 @@ def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> 
     everything = set(affecting.nonzero()[0].tolist())
     few = everything & _main_parameters(tree)
 
-    def searched(build: Build, start: Choice) -> tuple[tuple[dict[str, str | bool], ...], ...]:
+    def searched(
+        build: Build, starts: tuple[JointFormulation, ...]
+    ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
         def dropping(kept: Collection[int]) -> set[int]:
             return set(range(affecting.size)) - set(kept)
 
-        same = [start] * len(tree.joints)
+        same, *others = ([start] * len(tree.joints) for start in starts)
         full = best_choices(tree, build, same, dropping(everything))
         found = [
             full,
             best_choices(tree, build, full, dropping(base.tolist())),
             best_choices(tree, build, same, dropping(few)),
+            same,
+            *others,
         ]
         return tuple(tuple(map(to_data, one)) for one in dict.fromkeys(map(tuple, found)))
 
     return Formulations(
-        searched(inverse_outputs, _INVERSE_START), searched(direct_outputs, _DIRECT_START)
+        searched(inverse_outputs, _INVERSE_STARTS), searched(direct_outputs, _DIRECT_STARTS)
     )
 
 
 def _main_parameters(tree: Tree) -> set[int]:
     """Positions of masses, first moments and the moments of inertia about the joints' axes."""
     result = set()
-    for order, body in enumerate(tree.inertial):
-        axis = np.abs(tree.joints[body].described[2, :3])
+    for joint in tree.joints:
+        axis = np.abs(joint.described_to_axis[2, :3])
         kinds = (*_FIRST_MOMENTS, _MOMENTS[int(np.argmax(axis))])
-        result |= {_WIDTH * order + PARAMETER_KINDS.index(kind) for kind in kinds}
+        result |= {joint.columns[kind] for kind in kinds if kind in joint.columns}
     return result
 
 
 def best_choices(
-    tree: Tree, build: Build, start: Sequence[Choice], dropped: Collection[int]
-) -> list[Choice]:
+    tree: Tree, build: Build, start: Sequence[JointFormulation], dropped: Collection[int]
+) -> list[JointFormulation]:
     """Choices from which no single change saves an operation.
 
     Args:
@@ -130,11 +139,11 @@ def best_choices(
 
 
 def _descended(
-    tree: Tree, build: Build, start: Sequence[Choice], dropped: Collection[int]
-) -> list[Choice]:
+    tree: Tree, build: Build, start: Sequence[JointFormulation], dropped: Collection[int]
+) -> list[JointFormulation]:
     choices, graph = list(start), Graph()
 
-    def count(candidate: Sequence[Choice]) -> int:
+    def count(candidate: Sequence[JointFormulation]) -> int:
         return graph.count(build(tree, candidate, graph, dropped))
 
     best = count(choices)
@@ -168,19 +177,18 @@ def _restricted(
 ) -> tuple[Tree, frozenset[int]]:
     """A subtree as a tree of its own, in the base turned as its first joint is."""
     place = {i: k for k, i in enumerate(branch)}
-    order = {body: k for k, body in enumerate(tree.inertial)}
+    positions = [p for i in branch for p in tree.joints[i].columns.values()]
+    renumbered = {position: k for k, position in enumerate(positions)}
     joints = [
-        replace(tree.joints[i], parent=place.get(tree.joints[i].parent, BASE)) for i in branch
+        replace(
+            joint,
+            parent=place.get(joint.parent, BASE),
+            columns={kind: renumbered[position] for kind, position in joint.columns.items()},
+        )
+        for joint in (tree.joints[i] for i in branch)
     ]
-    inertial = [i for i in branch if i in order]
-    some = {
-        _WIDTH * k + kind
-        for k, body in enumerate(inertial)
-        for kind in range(_WIDTH)
-        if _WIDTH * order[body] + kind in dropped
-    }
-    part = Tree(tuple(joints), tree.gravity, tuple(place[i] for i in inertial))
-    return part, frozenset(some)
+    some = frozenset(renumbered[position] for position in positions if position in dropped)
+    return Tree(tuple(joints), tree.gravity, len(positions)), some
 
 
 def _signature(tree: Tree) -> tuple:
@@ -191,6 +199,6 @@ def _signature(tree: Tree) -> tuple:
         if joint.parent == BASE:
             placed = ((joint.turn.T @ tree.gravity).round(12).tobytes(), b"")
         moving = (joint.parent, joint.revolute, joint.sign, joint.offset, joint.parallel)
-        return (*moving, placed, joint.described.tobytes())
+        return (*moving, placed, joint.described_to_axis.tobytes(), tuple(joint.columns.items()))
 
-    return (tuple(map(of, tree.joints)), tree.inertial)
+    return tuple(map(of, tree.joints))

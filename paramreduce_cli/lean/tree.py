@@ -8,14 +8,13 @@ parallel to the one before gets no turn at all: its angle just adds to that one'
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import BASE, FloatArray, Mechanism
-
-_EXACT = 1e-13
-"""Entries of rotation matrices nearer to 0 or 1 than this are meant to be that."""
+from paramreduce_cli.records import BASE, FloatArray, Kind, Mechanism
+from paramreduce_cli.robots.frames import unrounded
 
 _FLIP = np.diag([1.0, -1.0, -1.0])
 
@@ -37,8 +36,10 @@ class Joint:
     """Components in the joint's frame at rest to those in the frame of the body before, (3, 3)."""
     parallel: bool
     """Whether the axis is parallel to that of the joint before, on which its angle can be added."""
-    described: FloatArray
+    described_to_axis: FloatArray
     """Homogeneous transform from the body's frame as described to this one, (4, 4), m."""
+    columns: Mapping[Kind, int]
+    """Positions of the body's parameters among the inputs of all models, by kind."""
 
 
 @dataclass(frozen=True)
@@ -48,17 +49,21 @@ class Tree:
     joints: tuple[Joint, ...]
     gravity: FloatArray
     """In the base frame, m/s^2, (3,)."""
-    inertial: tuple[int, ...]
-    """Indices of the bodies that have parameters, in the order of these."""
+    n_parameters: int
+    """Number of parameters of all bodies."""
 
 
 def lean_tree(mechanism: Mechanism) -> Tree:
     """Choose the frames of a mechanism's tree."""
     joints: list[Joint] = []
-    for body in mechanism.bodies:
+    for i, body in enumerate(mechanism.bodies):
         before = None if body.parent == BASE else joints[body.parent]
-        placed = body.before if before is None else before.described @ body.before
-        turn, after, sign = _exact(placed[:3, :3]), body.after.copy(), 1
+        placed = (
+            body.parent_to_joint
+            if before is None
+            else before.described_to_axis @ body.parent_to_joint
+        )
+        turn, after, sign = unrounded(placed[:3, :3]), body.joint_to_body.copy(), 1
         parallel = before is not None and not _tilts(turn)
         if parallel and turn[2, 2] < 0:
             turn, sign = turn @ _FLIP, -1
@@ -70,7 +75,7 @@ def lean_tree(mechanism: Mechanism) -> Tree:
         elif parallel:
             after[:3] = turn @ after[:3]
             turn = np.eye(3)
-        after[:3, :3] = _exact(after[:3, :3])
+        after[:3, :3] = unrounded(after[:3, :3])
         joints.append(
             Joint(
                 parent=body.parent,
@@ -80,16 +85,11 @@ def lean_tree(mechanism: Mechanism) -> Tree:
                 place=placed[:3, 3],
                 turn=turn,
                 parallel=parallel,
-                described=after,
+                described_to_axis=after,
+                columns=mechanism.columns(i),
             )
         )
-    return Tree(tuple(joints), mechanism.gravity, mechanism.inertial)
-
-
-def _exact(rotation: FloatArray) -> FloatArray:
-    """Without the rounding of quarter turns."""
-    nearest = np.round(rotation)
-    return np.where(np.abs(rotation - nearest) < _EXACT, nearest, rotation)
+    return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters)
 
 
 def _tilts(rotation: FloatArray) -> bool:
@@ -110,4 +110,4 @@ def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
     else:
         angle = float(np.arctan2(turn[2, 0], turn[2, 1]))
     c, s = np.cos(angle), np.sin(angle)
-    return _exact(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle
+    return unrounded(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle

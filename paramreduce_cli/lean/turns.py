@@ -7,11 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.lean.algebra import Scalar, Vector
+from paramreduce_cli.expressions.vectors import Vector
+from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.records import FloatArray
+from paramreduce_cli.robots.frames import whole_quarters
 
-_QUARTER_TOLERANCE = 1e-14
 _SLIGHT = 1e-3
 """Sine of a tilt below which rounding would show in the angles of the turns before and after it."""
 
@@ -54,8 +55,8 @@ class Turn:
 
 def turn_by(angle: Scalar, offset: float) -> Turn:
     """The turn by angle + offset; whole quarter turns cost nothing and are exact."""
-    quarters = round(offset / (np.pi / 2))
-    if abs(offset - quarters * np.pi / 2) > _QUARTER_TOLERANCE:
+    quarters = whole_quarters(offset)
+    if quarters is None:
         angle, quarters = angle + offset, 0
     c, s = angle.cosine(), angle.sine()
     for _ in range(quarters % 4):

@@ -5,9 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
-from paramreduce_cli.lean.algebra import Scalar, Vector, add, cross, scale
+from paramreduce_cli.expressions.vectors import Vector, add, cross, scale
+from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.inertia import Inertia
-from paramreduce_cli.lean.motion import Motion, Turning
+from paramreduce_cli.lean.motion import FrameMotion, Turning
 
 
 class Gauge(StrEnum):
@@ -63,7 +64,7 @@ class Wrench:
         return Wrench(self.force, add(self.moment, cross(r, self.force)))
 
 
-def inertial_wrench(body: Inertia, frame: Motion, a: Vector, gauge: Gauge) -> Wrench:
+def inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge: Gauge) -> Wrench:
     """What a body that moves with a frame needs.
 
     Args:
@@ -76,7 +77,7 @@ def inertial_wrench(body: Inertia, frame: Motion, a: Vector, gauge: Gauge) -> Wr
     return Wrench(force, add(_spin(body, frame, gauge), cross(body.d, a)))
 
 
-def _spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
+def _spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
     """I w' + w x (I w), with the products of w taken from U."""
     U, step = frame.U, frame.steps
     x, y, z = _diagonal_spin(body, frame, gauge)
@@ -87,7 +88,7 @@ def _spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
     )
 
 
-def _diagonal_spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
+def _diagonal_spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
     U, (rx, ry, rz), (yz, xz, xy) = frame.U, frame.rate, frame.products
     xx, yy, zz = body.xx, body.yy, body.zz
     if gauge is Gauge.FLAT:
@@ -96,14 +97,10 @@ def _diagonal_spin(body: Inertia, frame: Motion, gauge: Gauge) -> Vector:
         return (zz * U[2][1] - yy * yz, yy * ry, yy * xy - zz * U[0][1])
     if gauge is Gauge.YY_ZZ:
         return (xx * rx, xx * xz - zz * U[2][0], zz * U[1][0] - xx * xy)
-    return (
-        xx * rx + (zz - yy) * yz,
-        yy * ry + (xx - zz) * xz,
-        zz * rz + (yy - xx) * xy,
-    )
+    return (xx * rx + (zz - yy) * yz, yy * ry + (xx - zz) * xz, zz * rz + (yy - xx) * xy)
 
 
-def spin_about_z(body: Inertia, frame: Motion, a: Vector) -> Scalar:
+def spin_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
     """The moment about z that a body needs to move with a frame."""
     U, d = frame.U, body.d
     return (
@@ -116,7 +113,7 @@ def spin_about_z(body: Inertia, frame: Motion, a: Vector) -> Scalar:
     )
 
 
-def force_along_z(body: Inertia, frame: Motion, a: Vector) -> Scalar:
+def force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
     """The force along z that a body needs to move with a frame."""
     return frame.moved(body.d)[2] + body.m * a[2]
 
@@ -128,11 +125,11 @@ def turning_wrench(body: Inertia, turning: Turning) -> Wrench:
     which C leaves little: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and
     the moment about z has nothing but the angular acceleration.
     """
-    (h, k), acceleration, kappa = turning.half, turning.acceleration, turning.kappa
+    (h, k), acceleration, loss = turning.half, turning.acceleration, turning.loss
     difference, twice = body.xx - body.yy, 2 * body.xy
     moment = (
-        acceleration * body.xz - kappa * body.yz + (k * (body.zz + difference) - h * twice),
-        acceleration * body.yz + kappa * body.xz + (k * twice - h * (body.zz - difference)),
+        acceleration * body.xz - loss * body.yz + (k * (body.zz + difference) - h * twice),
+        acceleration * body.yz + loss * body.xz + (k * twice - h * (body.zz - difference)),
         acceleration * body.zz,
     )
     return Wrench(turning.moved(body.d), moment)

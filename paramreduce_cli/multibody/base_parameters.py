@@ -9,34 +9,14 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg
 
-from paramreduce_cli.errors import RankError
+from paramreduce_cli.errors import Concern, ConcernError
+from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import BaseParameters, BoolArray, FloatArray, IntArray
-
-PREFERENCE = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "mx", "my", "Iyy", "mz", "m")
-"""Kinds of parameters in the order in which they are preferred as base parameters.
-
-For revolute arms it yields Khalil's set [Khalil1987]: Izz of the first body and seven
-parameters of every other one, with Iyy, mz and m regrouped.
-"""
 
 _AFFECTING_TOLERANCE = 1e-11
 """Against the largest column: round-off leaves 1e-15 in columns that cancel exactly."""
 
 _NUMERICALLY_ZERO = 1e-10
-
-DEPENDENT = 1e-9
-"""A column is dependent on others when no more than this share of its length is left of it."""
-
-
-def preference_order(names: tuple[str, ...]) -> IntArray:
-    """Parameter indices from the most to the least preferred.
-
-    By kind as in :data:`PREFERENCE`; within a kind by position. Names of another form come
-    after all others. This order breaks every tie in the project.
-    """
-    rank = {kind: k for k, kind in enumerate(PREFERENCE)}
-    kinds = np.array([rank.get(name.split("_", 1)[0], len(PREFERENCE)) for name in names])
-    return np.lexsort((np.arange(len(names)), kinds)).astype(np.int64)
 
 
 def affecting_columns(W: FloatArray) -> BoolArray:
@@ -59,7 +39,7 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
         Columns in the order of preference in which they were taken, and beta.
 
     Raises:
-        RankError: The greedy choice and the singular values disagree, so that no rank can
+        ConcernError: The greedy choice and the singular values disagree, so that no rank can
             be told.
     """
     affecting = np.flatnonzero(affecting_columns(W))
@@ -73,9 +53,10 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
     wanted = preference[np.isin(preference, affecting)]
     taken = independent_columns(compressed, wanted, tolerance)
     if len(taken) != rank:
-        raise RankError(
-            f"the rank is not clear: {rank} by singular values, {len(taken)} by columns; the gap "
-            f"at {rank} is {gap:.3g}. Raise or lower model.rank_tolerance (now {tolerance:g})."
+        raise ConcernError(
+            f"at {tolerance:g} the rank is not clear: {rank} by singular values, {len(taken)} by "
+            f"columns; the gap at {rank} is {gap:.3g}.",
+            Concern.RANK,
         )
     columns = np.array(taken, dtype=np.int64)
     return BaseParameters(columns, regrouping(W, columns), singular, gap)
@@ -103,26 +84,3 @@ def regrouping(W: FloatArray, columns: IntArray) -> FloatArray:
     solution[np.abs(solution) < _NUMERICALLY_ZERO] = 0.0
     beta[:, live] = solution * lengths / own[:, None]
     return beta
-
-
-def independent_columns(W: FloatArray, wanted: IntArray, tolerance: float = DEPENDENT) -> list[int]:
-    """Take columns in the order wanted, leaving out those that depend on columns taken before.
-
-    Args:
-        W: (k, n)
-        wanted: Column indices.
-        tolerance: A column depends on others when no more than this share of its length is
-            left of it.
-    """
-    basis = np.empty((W.shape[0], 0))
-    taken: list[int] = []
-    for column in wanted:
-        vector = W[:, column]
-        length = np.linalg.norm(vector)
-        for _ in range(2):
-            vector = vector - basis @ (basis.T @ vector)
-        rest = np.linalg.norm(vector)
-        if rest > tolerance * length and length > 0:
-            taken.append(int(column))
-            basis = np.column_stack([basis, vector / rest])
-    return taken

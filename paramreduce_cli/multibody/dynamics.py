@@ -5,25 +5,27 @@ CasADi, projected on the independent coordinates where there are loops, and comp
 is the only place that knows which formulation a mechanism needs.
 
 States are generalised coordinates q, dq, ddq that satisfy the loops
-(:class:`paramreduce_cli.multibody.coordinates.Coordinates` finds them); those of an open
+(:class:`paramreduce_cli.multibody.loops.coordinates.Coordinates` finds them); those of an open
 tree are its independent ones.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cached_property
-from types import MappingProxyType
 
 import casadi as ca
 import numpy as np
 
 from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.multibody.direct_dynamics import direct_dynamics
-from paramreduce_cli.multibody.inverse_dynamics import inverse_dynamics
-from paramreduce_cli.multibody.projection import Projection
-from paramreduce_cli.records import FloatArray, IntArray, Mechanism
+from paramreduce_cli.multibody.inverse_dynamics import direct_dynamics, inverse_dynamics
+from paramreduce_cli.multibody.loops.projection import Projection
+from paramreduce_cli.records import FloatArray, IntArray, Mechanism, ReducedModel
+
+SINGULAR_MASS = 1e-10
+"""Smallest over largest eigenvalue at which a mass matrix counts as singular: accelerations are
+round-off then."""
 
 
 class Dynamics:
@@ -38,7 +40,7 @@ class Dynamics:
         self._once = once
         self.mechanism = mechanism
         self.n_dof = mechanism.n_dof
-        self.n_parameters = len(mechanism.parameter_names)
+        self.n_parameters = mechanism.n_parameters
         self._q, self._dq, self._ddq = (ca.SX.sym(s, mechanism.n_q) for s in ("q", "dq", "ddq"))
         self._phi = ca.SX.sym("phi", self.n_parameters)
 
@@ -52,8 +54,7 @@ class Dynamics:
     @cached_property
     def _direct_q(self) -> tuple[ca.SX, ca.SX]:
         """M_qq and delta_q of the open tree."""
-        rows, delta = direct_dynamics(self.mechanism, self._q, self._dq, self._phi)
-        return ca.vertcat(*(ca.horzcat(*row) for row in rows)), ca.vertcat(*delta)
+        return direct_dynamics(self.mechanism, self._q, self._dq, self._phi)
 
     @cached_property
     def _projection(self) -> Projection | None:
@@ -147,33 +148,22 @@ class Dynamics:
         return ObservationFunction([q, dz, ddz], closed, lambda q_bar: loop.pulled(q, q_bar))
 
     def count_operations(
-        self,
-        kept: IntArray,
-        *,
-        same: Mapping[int, int] = MappingProxyType({}),
-        signs_free: bool = True,
-        independent: bool = False,
-        direct: bool = True,
+        self, model: ReducedModel, *, signs_free: bool = True, independent: bool = False
     ) -> tuple[int, int]:
-        """Operations of IDM and [M | delta] when only some parameters are kept.
+        """Operations of IDM and [M | delta] of a model, parameters as inputs.
 
         Args:
-            kept: Indices of the parameters that are not zero.
-            same: Parameters that have the same value as another one.
+            model: Which parameters are kept.
             signs_free: See :mod:`paramreduce_cli.expressions.operations`.
             independent: Whether d_z and [M_zz | delta_z] are counted, with R and b handed in,
                 instead of d_q and [M_qq | delta_q]; on an open tree they are the same.
-            direct: Whether [M | delta] is counted too.
-
-        Returns:
-            Counts of the IDM and of the DDM functions, zero for what is not counted.
         """
-        dropped = np.setdiff1d(np.arange(self.n_parameters), kept)
-        programs = self._independent_programs if independent else self.programs
-        counts = [0, 0]
-        for k, program in enumerate(programs if direct else programs[:1]):
-            counts[k] = program.count(dropped.tolist(), same=same, signs_free=signs_free)
-        return counts[0], counts[1]
+        dropped = np.setdiff1d(np.arange(self.n_parameters), model.kept).tolist()
+        inverse, direct = self._independent_programs if independent else self.programs
+        return (
+            inverse.count(dropped, same=model.ties, signs_free=signs_free),
+            direct.count(dropped, same=model.ties, signs_free=signs_free),
+        )
 
     @cached_property
     def programs(self) -> tuple[Program, Program]:

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, FloatArray
 
 BLOCK_SAMPLES = 150

@@ -13,17 +13,15 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.expressions.compiled import BatchFunction
+from paramreduce_cli.expressions.vectors import cross, dot, subtract
 from paramreduce_cli.multibody.kinematics import (
     JointMotion,
-    cross,
     direction_in_base,
-    dot,
     motions,
     point_in_base,
-    subtract,
 )
-from paramreduce_cli.multibody.projection import Projection
-from paramreduce_cli.records import Constraint, FloatArray, Mechanism
+from paramreduce_cli.multibody.loops.projection import Projection
+from paramreduce_cli.records import DISTANCES, Constraint, FloatArray, Mechanism
 
 
 class Quantities:
@@ -132,7 +130,7 @@ def _natural(measures: ca.MX, constraints: tuple[Constraint, ...]) -> ca.MX:
         value = measures[k]
         if constraint.kind == "angle":
             value = ca.acos(ca.fmin(ca.fmax(value, -1), 1))
-        elif constraint.kind.startswith("distance"):
+        elif constraint.kind in DISTANCES:
             value = ca.sqrt(value)
         values.append(value)
     return ca.vertcat(*values)
@@ -143,7 +141,7 @@ def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
     has_upper, has_lower = upper < np.inf, lower > -np.inf
     if constraint.kind == "angle":
         over, under = ca.cos(upper) - measure, measure - ca.cos(lower)
-    elif constraint.kind.startswith("distance"):
+    elif constraint.kind in DISTANCES:
         over = measure / upper**2 - 1
         under = 1 - measure / lower**2
     elif constraint.kind == "singularity":

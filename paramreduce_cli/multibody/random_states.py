@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import FloatArray, Mechanism
 
 _SHARES = (0.25, 0.5, 1.0)
@@ -64,6 +64,6 @@ def _wandered(
 def _extent(mechanism: Mechanism) -> float:
     """A length that is typical of the mechanism, m; one if its bodies are all in one place."""
     if mechanism.lengths:
-        return max(abs(length) for length in mechanism.lengths.values())
+        return max(abs(length.value) for length in mechanism.lengths)
     q = np.zeros(mechanism.n_q) if mechanism.loops is None else mechanism.loops.assembly
     return float(np.ptp(body_poses(mechanism, q)[:, :3, 3], axis=0).max()) or 1.0

@@ -73,10 +73,7 @@ def _same(a: float, b: float) -> bool:
 
 
 def regrouping_expressions(
-    names: Sequence[str],
-    kept: IntArray,
-    beta: Sequence[FloatArray],
-    lengths: Sequence[Lengths],
+    names: Sequence[str], kept: IntArray, beta: Sequence[FloatArray], lengths: Sequence[Lengths]
 ) -> list[str]:
     """Base parameters in terms of standard ones, coefficients named where geometry explains them.
 

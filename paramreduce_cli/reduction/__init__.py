@@ -1,1 +1,1 @@
-"""Which parameters to keep: errors, and one file per heuristic."""
+"""Which parameters to keep: problem, criteria, heuristics, proofs, and the models they make."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.records import LAST, Columns, FloatArray, IntArray, preference_order
 
 
 @dataclass(frozen=True)
@@ -25,37 +25,45 @@ class Group:
 
 @dataclass(frozen=True)
 class GroupedColumns:
-    """The columns among which is chosen, and what they mean in standard parameters."""
+    """The columns among which is chosen, the most wanted of them, and which go together."""
 
-    names: tuple[str, ...]
-    expansion: FloatArray
-    """Standard parameters from values of the columns, (n_standard, n_columns)."""
+    columns: Columns
+    preference: IntArray
+    """Columns from the most to the least wanted, (n,)."""
     groups: tuple[IntArray, ...]
     """Columns that are chosen together."""
 
 
-def grouped_columns(names: Sequence[str], groups: Sequence[Group]) -> GroupedColumns:
+def grouped_columns(
+    names: Sequence[str], ranks: IntArray, groups: Sequence[Group]
+) -> GroupedColumns:
     """Replace the columns of tied groups by one each, and find those of the others.
 
     Args:
         names: Of the standard parameters, (n_standard,).
+        ranks: Their ranks of preference, (n_standard,); a tied group has that of its members
+            where they agree, and comes last where not.
         groups: With members among them, each in one group at most.
     """
     tied = {member: group for group in groups if group.tied for member in group.members}
-    columns: list[tuple[str, list[int]]] = []
-    for k, name in enumerate(names):
-        group = tied.get(name)
-        if group is None:
-            columns.append((name, [k]))
-        elif group.members[0] == name:
-            columns.append((group.name, [names.index(member) for member in group.members]))
-    labels = tuple(label for label, _ in columns)
-    expansion = np.zeros((len(names), len(columns)))
-    for j, (_, members) in enumerate(columns):
-        expansion[members, j] = 1.0
-    untied = (group for group in groups if not group.tied)
-    return GroupedColumns(
-        labels,
-        expansion,
-        tuple(np.array([labels.index(m) for m in g.members], dtype=np.int64) for g in untied),
+    labels = list(dict.fromkeys(tied[n].name if n in tied else n for n in names))
+    column = np.array([labels.index(tied[n].name if n in tied else n) for n in names])
+    wanted = []
+    for k in range(len(labels)):
+        own = set(ranks[column == k].tolist())
+        wanted.append(own.pop() if len(own) == 1 else LAST)
+    together = tuple(
+        np.array([labels.index(member) for member in group.members], dtype=np.int64)
+        for group in groups
+        if not group.tied
     )
+    return GroupedColumns(Columns(tuple(labels), column), preference_order(wanted), together)
+
+
+def merged_factor(factor: FloatArray, columns: Columns) -> FloatArray:
+    """The triangular factor of [W T | chi], T adding up the columns of tied groups."""
+    if not columns.tied:
+        return factor
+    added = np.column_stack([factor[:, :-1] @ columns.expansion, factor[:, -1]])
+    merged: FloatArray = np.linalg.qr(added, mode="r")  # type: ignore[assignment]
+    return merged

@@ -7,7 +7,7 @@ is a tuple of units in the order in which they were taken.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any
+from functools import cached_property
 
 import numpy as np
 
@@ -35,8 +35,20 @@ class Objective(ABC):
 
     def __init__(self, problem: SelectionProblem) -> None:
         self.problem = problem
-        self.units = problem.units()
+        self.units = problem.units
         self.widths = np.array([unit.size for unit in self.units])
+        self.single = bool((self.widths == 1).all())
+
+    @cached_property
+    def owner(self) -> IntArray:
+        """Unit of each column of ``problem.columns``, (n_candidates,)."""
+        return np.repeat(np.arange(self.widths.size), self.widths)
+
+    def per_unit(self, values: FloatArray) -> FloatArray:
+        """What the columns of each unit have, averaged over its columns, (n_units,)."""
+        if self.single:
+            return values
+        return np.bincount(self.owner, values, self.widths.size) / self.widths
 
     @abstractmethod
     def score(self, kept: Units) -> float:
@@ -60,7 +72,7 @@ class Objective(ABC):
         The subset itself where none is promising.
         """
 
-    @property
+    @cached_property
     def largest(self) -> int:
         """Number of columns beyond which nothing is to be gained."""
         return int(self.widths.sum())
@@ -80,7 +92,7 @@ class Objective(ABC):
 
     def width(self, kept: Units) -> int:
         """Number of its columns."""
-        return int(self.widths[list(kept)].sum())
+        return len(kept) if self.single else int(self.widths[list(kept)].sum())
 
     def units_of(self, columns: IntArray) -> Units:
         """Units of a subset of columns, in their order."""
@@ -94,10 +106,12 @@ class Objective(ABC):
             kept: The subset.
             most: Columns it may have then.
         """
-        gains = np.where(self.widths <= most - self.width(kept), self.gains(kept), -np.inf)
-        if not np.any(gains > -np.inf):
-            return kept
-        return (*kept, first_of_the_best(gains))
+        room = most - self.width(kept)
+        gains = self.gains(kept)
+        if not self.single:
+            gains = np.where(self.widths <= room, gains, -np.inf)
+        best = first_of_the_best(gains)
+        return (*kept, best) if room > 0 and gains[best] > -np.inf else kept
 
     def without_least(self, kept: Units) -> Units:
         """The subset without the unit that costs least; ties remove the least preferred."""
@@ -118,18 +132,3 @@ class Objective(ABC):
 def without(kept: Units, unit: int) -> Units:
     """A subset without one of its units."""
     return tuple(u for u in kept if u != unit)
-
-
-class Means(ABC):
-    """What criteria may need besides the least-squares problem."""
-
-    error_limit: float
-    """Torque error under which the cost is minimised."""
-
-    @abstractmethod
-    def accelerations(self, most: int) -> Any:
-        """AccelerationData of at most so many samples of the estimation set."""
-
-    @abstractmethod
-    def cost(self, kept: IntArray) -> int:
-        """Operations of a model that keeps these columns."""

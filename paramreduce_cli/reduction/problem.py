@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from paramreduce_cli.multibody.orthogonal import unit_columns
 from paramreduce_cli.records import FloatArray, IntArray
 
 FULL_PRECISION = 1e-13
-"""Share of the torques below which what is left to explain is round-off."""
+"""Share of the torques below which what is left to explain is round-off of the selection."""
 TIE = 1e-9
 """Relative difference below which two scores are equal."""
 
@@ -32,11 +34,17 @@ class SelectionProblem:
     preference: IntArray
     groups: tuple[IntArray, ...] = ()
 
+    def on(self, factor: FloatArray) -> SelectionProblem:
+        """The same choice on other data, a triangular factor of [W | chi]."""
+        W, chi = factor[:, :-1], factor[:, -1]
+        return SelectionProblem(W, chi, self.candidates, self.preference, self.groups)
+
     @property
     def candidates_by_preference(self) -> IntArray:
         """The candidates, the most wanted first."""
         return self.preference[np.isin(self.preference, self.candidates)]
 
+    @cached_property
     def units(self) -> list[IntArray]:
         """What is chosen as one, candidates alone or in groups, the most wanted first.
 
@@ -48,11 +56,35 @@ class SelectionProblem:
             found.setdefault(owner.get(column, -1 - column), []).append(column)
         return [np.array(columns, dtype=np.int64) for columns in found.values()]
 
+    @cached_property
+    def columns(self) -> IntArray:
+        """The columns of all units, one unit after the other, (n_candidates,)."""
+        return np.concatenate([np.zeros(0, np.int64), *self.units])
+
+    @cached_property
+    def _normalised(self) -> tuple[FloatArray, FloatArray]:
+        return unit_columns(self.W)
+
+    @property
+    def X(self) -> FloatArray:
+        """W with columns of unit length, (k, n)."""
+        return self._normalised[0]
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Lengths of the columns of W, one for columns of zeros, (n,)."""
+        return self._normalised[1]
+
+    @cached_property
+    def y(self) -> FloatArray:
+        """Chi with unit length: errors against it are shares of the torques, (k,)."""
+        return self.chi / (np.linalg.norm(self.chi) or 1.0)
+
 
 def first_of_the_best(scores: FloatArray) -> int:
     """Position of the first score that is the largest up to rounding.
 
     Scores come in order of preference, so this is where ties are broken.
     """
-    best = float(np.max(scores))
+    best = scores.max()
     return int(np.argmax(scores >= best - TIE * abs(best)))

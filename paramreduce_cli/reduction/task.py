@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from functools import cache, cached_property
 
-from threadpoolctl import threadpool_limits
+import numpy as np
+from threadpoolctl import ThreadpoolController
 
 from paramreduce_cli.records import IntArray, Progress, Proofs
+from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.objective import Objective, Units
-from paramreduce_cli.registry import heuristic
 
 
 @dataclass(frozen=True)
@@ -32,7 +34,7 @@ class Effort:
 
 
 @dataclass(frozen=True)
-class Task:
+class SelectionTask:
     """A criterion to select by, and how far to go."""
 
     objective: Objective
@@ -47,7 +49,7 @@ class Task:
     interrupted: Callable[[], None] = lambda: None
     """Told that a KeyboardInterrupt was met and heeded."""
 
-    @property
+    @cached_property
     def limit(self) -> int:
         """Largest number of columns."""
         most = self.objective.largest
@@ -55,34 +57,31 @@ class Task:
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundSubsets:
     """Subsets by growing number of columns, each in the order in which it was taken."""
 
     subsets: tuple[IntArray, ...]
     proofs: Proofs | None = None
 
 
-def run(name: str, task: Task) -> Found:
-    """Run a heuristic; on one core, as its matrices are too small for more.
+@cache
+def _threads() -> ThreadpoolController:
+    """The libraries that use threads; finding them takes longer than a greedy search."""
+    return ThreadpoolController()
 
-    Args:
-        name: Of the heuristic, perhaps with the criterion after an @.
-        task: What is asked for.
-    """
-    with threadpool_limits(limits=1):
-        found: Found = heuristic[name.partition("@")[0]](task)
+
+def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
+    """Run a heuristic by its name; on one core, as its matrices are too small for more."""
+    with _threads().limit(limits=1):
+        found: FoundSubsets = heuristics[heuristic](task)
     return found
 
 
-def nested(task: Task, order: Units) -> Found:
+def nested(task: SelectionTask, order: Units) -> FoundSubsets:
     """The subsets that an order of all units passes through."""
-    objective, subsets = task.objective, []
-    for k in range(1, len(order) + 1):
-        columns = objective.columns(order[:k])
-        if columns.size > task.limit:
-            break
-        subsets.append(columns)
-    return Found(tuple(subsets))
+    columns = task.objective.columns(order)
+    ends = np.cumsum(task.objective.widths[list(order)]).tolist()
+    return FoundSubsets(tuple(columns[:end] for end in ends if end <= task.limit))
 
 
 def completed(objective: Objective, kept: Units) -> Units:
@@ -90,6 +89,6 @@ def completed(objective: Objective, kept: Units) -> Units:
     return (*kept, *(u for u in range(len(objective.units)) if u not in kept))
 
 
-def by_size(objective: Objective, subsets: Iterable[Units]) -> Found:
+def by_size(objective: Objective, subsets: Iterable[Units]) -> FoundSubsets:
     """One subset for every number of columns."""
-    return Found(tuple(sorted((objective.columns(kept) for kept in subsets), key=len)))
+    return FoundSubsets(tuple(sorted((objective.columns(kept) for kept in subsets), key=len)))

@@ -11,15 +11,17 @@ from paramreduce_cli.records import (
     Block,
     FloatArray,
     Model,
+    ReducedModel,
     Reduction,
+    Tracking,
     Trajectories,
     Validation,
 )
-from paramreduce_cli.report.tracking import Tracking
+from paramreduce_cli.report.skeleton import Skeleton
 
 
 @dataclass(frozen=True)
-class Motion:
+class ShownMotion:
     """One trajectory of the validation set with its torques over the nominal ones."""
 
     time: FloatArray
@@ -35,53 +37,30 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class TrajectorySetup:
-    """What was asked of the trajectories, as (label, text)."""
-
-    rows: tuple[tuple[str, str], ...]
-
-
-@dataclass(frozen=True)
-class Skeleton:
-    """A mechanism in one pose, for drawing."""
-
-    z: FloatArray
-    poses: FloatArray
-    """Frames of the bodies, (n_bodies, 4, 4)."""
-    joints: FloatArray
-    """Frames of the joints, before their motion, (n_bodies, 4, 4)."""
-    masses: FloatArray
-    """Centres of mass, NaN for bodies without mass, (n_bodies, 3), m."""
-    parents: tuple[int, ...]
-    kinds: tuple[str, ...]
-    closures: tuple[FloatArray, ...]
-    """From one body's origin over the closure to the other's, for each loop, (n_points, 3), m."""
-
-
-@dataclass(frozen=True)
 class ReportData:
     """What the report is made from."""
 
     title: str
     model: Model
     trajectories: Trajectories | None
-    setup: TrajectorySetup
+    symmetries: int
+    """How many symmetries complete the estimation set."""
     reduction: Reduction
     validation: Validation
-    motion: Motion
+    motion: ShownMotion
     skeletons: tuple[Skeleton, ...]
     tracking: Tracking | None
     """Where it was asked for."""
 
 
 def first_motion(
-    blocks: Iterable[Block], column: FloatArray, nominal_torque: FloatArray, most: int = 1000
-) -> Motion:
+    blocks: Iterable[Block], model: ReducedModel, nominal_torque: FloatArray, most: int = 1000
+) -> ShownMotion:
     """The first trajectory of a set, with full and reduced torques.
 
     Args:
         blocks: The set.
-        column: The reduced model's parameters, zero where one is not kept, (n_parameters,).
+        model: The reduced model.
         nominal_torque: (n_dof,)
         most: Samples at which to stop.
     """
@@ -92,9 +71,10 @@ def first_motion(
             break
         parts.append(block)
         count += block.time.size
+    phi = model.standard
     full = np.concatenate([p.tau for p in parts])
-    reduced = np.concatenate([(p.W @ column).reshape(p.tau.shape) for p in parts])
-    return Motion(
+    reduced = np.concatenate([(p.W @ phi).reshape(p.tau.shape) for p in parts])
+    return ShownMotion(
         time=np.concatenate([p.time for p in parts]),
         z=np.concatenate([p.z for p in parts]),
         dz=np.concatenate([p.dz for p in parts]),

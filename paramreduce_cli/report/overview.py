@@ -5,20 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from paramreduce_cli.report.tables import Table, percent
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts import share
 
 Summary = Mapping[str, Any]
 
-_HEADER = (
-    "robot", "heuristic", "n_φ", "r", "n",
-    "d", "d, n", "saved", "ε_τ E", "ε_τ V",
+HEADER = (
+    "heuristic", "n_φ", "r", "n", "d", "d, n", "saved", "ε_τ E", "ε_τ V",
     "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V",
 )  # fmt: skip
 
 
 def overview(rows: Sequence[tuple[str, ...]]) -> Table:
     """The selected model of every robot beside its full one, inverse and direct dynamics."""
-    return Table("Reduced models", _HEADER, tuple(rows))
+    return Table("Reduced models", ("robot", *HEADER), tuple(rows))
 
 
 def overview_row(summary: Summary) -> tuple[str, ...]:
@@ -43,17 +43,14 @@ def overview_row(summary: Summary) -> tuple[str, ...]:
 
 
 def _function(summary: Summary, name: str, error: str) -> tuple[str, ...]:
-    full = int(summary["full"][f"operations_{name}"])
-    reduced = int(summary["selected"]["operations"][name])
-    errors = summary["selected"][error]
-    return (
-        str(full),
-        str(reduced),
-        f"{100 * (1 - reduced / full):.0f} %" if full else "-",
-        _share(errors["estimation"]),
-        _share(errors["validation"]),
-    )
+    errors, reduced = summary["selected"][error], summary["selected"]["operations"][name]
+    full = summary["full"][f"operations_{name}"]
+    return function_cells(int(full), int(reduced), errors["estimation"], errors["validation"])
 
 
-def _share(value: float | None) -> str:
-    return percent(float("inf") if value is None else value)
+def function_cells(
+    full: int, reduced: int, estimation: float | None, validation: float | None
+) -> tuple[str, ...]:
+    """What one function costs and how wrong it is: operations of both models, both errors."""
+    saved = f"{100 * (1 - reduced / full):.0f} %" if full else "-"
+    return str(full), str(reduced), saved, share(estimation), share(validation)

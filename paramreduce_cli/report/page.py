@@ -4,45 +4,82 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Mapping
+from dataclasses import dataclass
 from importlib import resources
 from typing import Any
 
 import jinja2
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.tables import Table, percent
+from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.sections import PageSection, place_of
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.report.tables import tables
+from paramreduce_cli.texts import share
 
 _FIGURE_MIME = "image/svg+xml"
+
+
+@dataclass(frozen=True)
+class _Item:
+    """A figure or a table on the page."""
+
+    name: str
+    caption: str
+    source: str = ""
+    """Of a figure's image."""
+    table: Table | None = None
+    tall: bool = False
 
 
 def render_page(
     data: ReportData,
     summary: Mapping[str, Any],
-    figures: Mapping[str, tuple[str, bytes]],
-    tables: Mapping[str, Table],
+    images: Mapping[str, bytes],
+    made: Mapping[str, Table],
 ) -> str:
     """The report as one HTML page with its figures inside.
 
     Args:
         data: What the report is made from.
         summary: As in summary.json.
-        figures: Caption and SVG by name.
-        tables: By name.
+        images: SVG of the figures that there are, by name.
+        made: Tables by name.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["percent"] = lambda v: "∞" if v is None else percent(v)
-    text = resources.files("paramreduce_cli.report").joinpath("page.html").read_text("utf-8")
-    images = {
-        name: {
-            "caption": caption,
-            "source": f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}",
+    environment.filters["percent"] = share
+    context = {"s": summary, "loops": data.model.mechanism.loops is not None}
+    items = _items(images, made)
+    sections = [
+        {
+            "title": section.title,
+            "text": environment.from_string(section.text).render(context),
+            "items": items[section],
         }
-        for name, (caption, svg) in figures.items()
+        for section in PageSection
+        if items[section]
+    ]
+    text = resources.files("paramreduce_cli.report").joinpath("page.html").read_text("utf-8")
+    return environment.from_string(text).render(title=data.title, sections=sections, **context)
+
+
+def _items(
+    images: Mapping[str, bytes], made: Mapping[str, Table]
+) -> dict[PageSection, list[_Item]]:
+    """Figures and tables by section, in their order; empty tables are left out."""
+    found = []
+    for name, svg in images.items():
+        draw = figures[name]
+        source = f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}"
+        found.append((place_of(draw), _Item(name, (draw.__doc__ or name).strip(), source)))
+    for name, table in made.items():
+        if table.rows:
+            make = tables[name]
+            place = place_of(make)
+            caption = (make.__doc__ or name).strip()
+            found.append((place, _Item(name, caption, table=table, tall=place.tall)))
+    found.sort(key=lambda entry: entry[0].order)
+    return {
+        section: [item for place, item in found if place.section is section]
+        for section in PageSection
     }
-    return environment.from_string(text).render(
-        title=data.title,
-        loops=data.model.mechanism.loops is not None,
-        s=summary,
-        figures=images,
-        tables=tables,
-    )

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
 
 from paramreduce_cli.records import (
+    About,
     HeuristicValidation,
     IntArray,
     Model,
+    ModelChoice,
     Provenance,
     Reduction,
     Subsets,
@@ -46,7 +49,7 @@ def summary_of(
         "reduction": {
             **{name: _subsets(reduction, found) for name, found in reduction.heuristics.items()},
             "proofs": _proofs(reduction),
-            "pareto": [_pareto(reduction, validation, *model) for model in validation.pareto],
+            "pareto": [_pareto(reduction, validation, model) for model in validation.pareto],
         },
         "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
@@ -54,13 +57,14 @@ def summary_of(
             "heuristic": selected.heuristic,
             "n": selected.n,
             "reason": selected.reason,
-            "parameters": dict(zip(selected.parameters, selected.values, strict=True)),
+            "parameters": dict(zip(selected.model.names, selected.model.values, strict=True)),
             "accepted": validation.accepted,
             "verdict": validation.verdict,
+            "remarks": [r.text for r in validation.remarks if r.about is About.SELECTED],
             **next(row for row in _rows(chosen) if row["n"] == selected.n),
         },
         "stability": _stability(reduction, validation),
-        "remarks": list(validation.remarks),
+        "remarks": [remark.text for remark in validation.remarks],
     }
     plain: dict[str, Any] = _plain(data)
     return plain
@@ -68,7 +72,7 @@ def summary_of(
 
 def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
     def named(columns: IntArray) -> list[str]:
-        return [reduction.names[k] for k in columns]
+        return [reduction.columns.names[k] for k in columns]
 
     nested = found.order is not None
     return {
@@ -77,7 +81,7 @@ def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
         "n": found.n,
         "torque_error_1": found.torque_error_1,
         "torque_error_inf": found.torque_error_inf,
-        "minimum_norm_from": _first(found.minimum_norm),
+        "minimum_norm_from": _first(found),
         "seconds": found.seconds,
     }
 
@@ -86,25 +90,18 @@ def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
     proofs = reduction.proofs
     if proofs is None:
         return []
-    return [
-        {
-            "n": n,
-            "torque_error": proofs.torque_error[k],
-            "lower_bound": proofs.lower_bound[k],
-            "status": proofs.status[k],
-            "seconds": proofs.seconds[k],
-        }
-        for k, n in enumerate(proofs.n)
-    ]
+    keys = ("n", "torque_error", "lower_bound", "status", "seconds")
+    return [{key: getattr(proofs, key)[k] for key in keys} for k in range(proofs.n.size)]
 
 
-def _pareto(reduction: Reduction, validation: Validation, heuristic: str, n: int) -> dict[str, Any]:
+def _pareto(reduction: Reduction, validation: Validation, model: ModelChoice) -> dict[str, Any]:
+    heuristic, n = model.heuristic, model.n
     result = validation.heuristics[heuristic]
     row = result.row(n)
     subset = reduction.heuristics[heuristic].subset(n)
     return {
         "heuristic": heuristic,
-        "parameters": [reduction.names[k] for k in subset],
+        "parameters": [reduction.columns.names[k] for k in subset],
         "n": n,
         "torque_error": result.torque_error_estimation[row],
         "acceleration_error": result.acceleration_error_estimation[row],
@@ -121,9 +118,9 @@ def _stability(reduction: Reduction, validation: Validation) -> dict[str, Any] |
         return None
     often = found.chosen.mean(axis=0)
     return {
-        "variants": list(found.variants),
+        "variants": [str(variant) for variant in found.variants],
         "torque_error": found.torque_error,
-        "share_chosen": {reduction.names[k]: often[k] for k in np.flatnonzero(often)},
+        "share_chosen": {reduction.columns.names[k]: often[k] for k in np.flatnonzero(often)},
     }
 
 
@@ -141,56 +138,34 @@ def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
 
 
 def _trajectory(t: Trajectory) -> dict[str, Any]:
-    return {
-        "kappa_start": t.kappa_start,
-        "kappa": t.kappa,
-        "kappa_variants": dict(t.kappa_variants),
-        "peak_position": t.peak_position,
-        "peak_velocity": t.peak_velocity,
-        "reach": t.reach,
-        "extremes": t.extremes,
-        "cpu_seconds": t.cpu_seconds,
-        "iterations": t.iterations,
-        "status": t.status,
-        "coefficients": t.coefficients,
+    return {**vars(t), "kappa_variants": dict(t.kappa_variants)}
+
+
+def _first(found: Subsets) -> int | None:
+    """The smallest size that is fitted with minimum norm."""
+    beyond = found.n[found.minimum_norm]
+    return int(beyond[0]) if beyond.size else None
+
+
+def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
+    counts = [f.name for f in fields(found) if f.name.startswith("operations_")]
+    sets = ("estimation", "validation")
+    errors = {
+        f"{of}_error": {s: f"{of}_error_{s}" for s in sets}
+        | {f"joints_{s}": f"{of}_error_joint_{s}" for s in sets}
+        for of in ("torque", "acceleration")
     }
-
-
-def _first(flags: np.ndarray) -> int | None:
-    """The first n at which a flag is set."""
-    return int(np.argmax(flags)) + 1 if flags.any() else None
-
-
-def _rows(r: HeuristicValidation) -> list[dict[str, Any]]:
+    names = errors | {
+        "operations": {name.removeprefix("operations_"): name for name in counts},
+        "mass_matrix": {key: f"mass_matrix_{key}" for key in ("condition", "smallest_eigenvalue")},
+    }
     return [
-        {
-            "n": int(r.n[k]),
-            "torque_error": {
-                "estimation": r.torque_error_estimation[k],
-                "validation": r.torque_error_validation[k],
-                "joints_estimation": r.torque_error_joint_estimation[k],
-                "joints_validation": r.torque_error_joint_validation[k],
-            },
-            "acceleration_error": {
-                "estimation": r.acceleration_error_estimation[k],
-                "validation": r.acceleration_error_validation[k],
-                "joints_estimation": r.acceleration_error_joint_estimation[k],
-                "joints_validation": r.acceleration_error_joint_validation[k],
-            },
-            "operations": {
-                "inverse": int(r.operations_inverse[k]),
-                "direct": int(r.operations_direct[k]),
-                "inverse_plain": int(r.operations_inverse_plain[k]),
-                "direct_plain": int(r.operations_direct_plain[k]),
-                "inverse_paper_rule": int(r.operations_inverse_paper_rule[k]),
-                "direct_paper_rule": int(r.operations_direct_paper_rule[k]),
-            },
-            "mass_matrix": {
-                "condition": r.mass_matrix_condition[k],
-                "smallest_eigenvalue": r.mass_matrix_smallest_eigenvalue[k],
-            },
+        {"n": n}
+        | {
+            part: {key: getattr(found, name)[k] for key, name in of.items()}
+            for part, of in names.items()
         }
-        for k in range(r.n.size)
+        for k, n in enumerate(found.n)
     ]
 
 

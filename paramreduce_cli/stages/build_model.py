@@ -6,52 +6,49 @@ import dataclasses
 
 import numpy as np
 
-from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import ModelSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.search import formulations
-from paramreduce_cli.multibody.base_parameters import (
-    affecting_columns,
-    base_parameters,
-    preference_order,
-    regrouping,
-)
+from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters, regrouping
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.multibody.relations import regrouping_expressions
-from paramreduce_cli.records import BaseParameters, FloatArray, Mechanism, Model
-from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.description import described_mechanism
+from paramreduce_cli.records import BaseParameters, FloatArray, IntArray, Mechanism, Model
+from paramreduce_cli.robots import Robot
 
 _STATES = 300
 """Random states on which ranks are decided; many more rows than columns."""
 _CHANGED_GEOMETRIES = 2
 """On which a guess of what a coefficient is must hold too."""
 
+States = tuple[FloatArray, FloatArray, FloatArray]
 
-@stage
-def build_model(config: Config) -> Model:
+
+def build_model(robot: Robot, model: ModelSection) -> Model:
     """Derive the model, its parameters and its base parameters.
 
     The ranks are decided on seeded random states.
     """
-    mechanism = described_mechanism(config)
-    rng = np.random.default_rng(config.model.seed)
+    mechanism = assembled(robot.mechanism())
+    rng = np.random.default_rng(model.seed)
     states = random_states(mechanism, _STATES, rng)
     K = Dynamics(mechanism).regressor(*states)
     W = K.reshape(-1, K.shape[2])
-    values = config.standard_parameters()
-    given = config.nominal_torque != "standard-deviation"
-    nominal = config.per_joint(config.nominal_torque) if given else np.std(K @ values, axis=0)
+    values = robot.parameter_values()
+    given = robot.given_nominal_torque()
+    nominal = np.std(K @ values, axis=0) if given is None else given
     if not np.all(nominal > 0):
         joint = mechanism.coordinate_names[int(np.argmin(nominal))]
         raise ConfigError(
-            f"nominal_torque: {joint} carries no torque or force, so its standard deviation is no "
-            "scale. Give nominal_torque in the config, in N m (N for a prismatic joint)."
+            f"{joint} carries no torque or force, so its standard deviation is no scale. Give "
+            "nominal_torque in the config, in N m (N for a prismatic joint).",
+            ("nominal_torque",),
         )
-    base = base_parameters(W, _preference(config, mechanism), config.model.rank_tolerance)
-    _check_named(config, mechanism, base)
-    texts = _expressions(config, mechanism, base, states, rng)
+    base = base_parameters(W, _preference(model, mechanism), model.rank_tolerance)
+    _check_named(model, mechanism, base)
+    texts = _expressions(robot, mechanism, base, states, rng)
     affecting = affecting_columns(W)
     lean = formulations(mechanism, affecting, base.columns)
     check_formulations(mechanism, lean, np.flatnonzero(affecting), states, rng)
@@ -61,47 +58,49 @@ def build_model(config: Config) -> Model:
         affecting=affecting,
         base=dataclasses.replace(base, expressions=tuple(texts)),
         nominal_torque=nominal,
-        nominal_torque_given=given,
+        nominal_torque_given=given is not None,
         formulations=lean,
     )
 
 
-def _check_named(config: Config, mechanism: Mechanism, base: BaseParameters) -> None:
+def _check_named(model: ModelSection, mechanism: Mechanism, base: BaseParameters) -> None:
     """Refuse named base columns that are no base parameters, instead of replacing them."""
     names = mechanism.parameter_names
-    for name in config.model.base_columns or []:
+    for name in model.base_columns or []:
         if names.index(name) not in base.columns:
             raise ConfigError(
-                f"model.base_columns: {name} has no effect on the torques, or depends on those "
-                "named before it. Leave it out."
+                f"{name} has no effect on the torques, or depends on those named before it. Leave it "
+                "out.",
+                ("model", "base_columns"),
             )
 
 
 def _expressions(
-    config: Config,
+    robot: Robot,
     mechanism: Mechanism,
     base: BaseParameters,
-    states: tuple[FloatArray, FloatArray, FloatArray],
+    states: States,
     rng: np.random.Generator,
 ) -> list[str]:
     """Regrouping relations, coefficients named where they follow changed lengths as well.
 
     Without named lengths, as in mechanisms with loops, coefficients are numbers.
     """
-    betas, lengths = [base.beta], [mechanism.lengths]
+    betas, geometries = [base.beta], [mechanism]
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
-        changed = described_mechanism(config, lambda length: length * rng.uniform(0.8, 1.25))
+        changed = robot.stretched(lambda length: length * rng.uniform(0.8, 1.25)).mechanism()
         K = Dynamics(changed, once=True).regressor(*states)
         betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns))
-        lengths.append(changed.lengths)
+        geometries.append(changed)
+    lengths = [{length.name: length.value for length in entry.lengths} for entry in geometries]
     return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
 
 
-def _preference(config: Config, mechanism: Mechanism) -> np.ndarray:
+def _preference(model: ModelSection, mechanism: Mechanism) -> IntArray:
     """Preference order of columns, those that the config names first."""
-    names = mechanism.parameter_names
-    usual = preference_order(names)
-    if config.model.base_columns is None:
+    usual = mechanism.preference_order
+    if model.base_columns is None:
         return usual
-    named = np.array([names.index(name) for name in config.model.base_columns], dtype=np.int64)
+    names = mechanism.parameter_names
+    named = np.array([names.index(name) for name in model.base_columns], dtype=np.int64)
     return np.concatenate([named, usual[~np.isin(usual, named)]])

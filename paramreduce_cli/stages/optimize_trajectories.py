@@ -6,82 +6,68 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import TrajectoriesSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.excitation.limits import JointLimits
 from paramreduce_cli.excitation.optimiser import Settings, describe
-from paramreduce_cli.excitation.workers import Task, excitation_of, optimise_all
+from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
 from paramreduce_cli.records import (
     Coefficients,
     Constraint,
     FloatArray,
+    JointLimits,
     Model,
     Run,
     Trajectories,
     Trajectory,
 )
-from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.description import described_constraints
 
 _SETS = ("estimation", "validation")
-_ROUNDING = 1e-9
+_LIMIT_ROUNDING = 1e-9
+"""Share by which a limit may be missed: round-off of the series."""
 
 
-@stage
 def optimize_trajectories(
-    config: Config, model: Model, coefficients: Coefficients | None, run: Run
+    trajectories: TrajectoriesSection, model: Model, coefficients: Coefficients | None, run: Run
 ) -> Trajectories:
     """Find exciting trajectories, or take the Fourier coefficients that the config names.
 
     Finished trajectories are kept at once: an interrupted run goes on with what is missing.
     """
-    wanted = config.trajectories
-    if coefficients is not None:
-        return _measured(config, model, coefficients)
-    task = Task(
+    wanted = trajectories
+    period = wanted.period if coefficients is None else coefficients.period
+    task = ExcitationTask(
         mechanism=model.mechanism,
         base=model.base,
         nominal_torque=model.nominal_torque,
         criterion=wanted.criterion,
-        constraints=described_constraints(config, model.mechanism),
-        settings=joint_settings(config, wanted.period, wanted.harmonics),
+        constraints=tuple(entry.constraint(model.mechanism) for entry in wanted.constraints),
+        settings=_settings(wanted, model, period, wanted.harmonics),
         seed=wanted.seed,
     )
-    counts = {"estimation": wanted.count, "validation": wanted.validation_count}
-    keys = [f"{name}-{k:04d}" for name in _SETS for k in range(counts[name])]
-    found = optimise_all(task, keys, run)
-    sets = {name: tuple(found[key] for key in keys if key.startswith(name)) for name in _SETS}
+    if coefficients is None:
+        sets = _optimised(wanted, task, run)
+    else:
+        sets = _measured(wanted, model, task, coefficients)
     return Trajectories(
-        wanted.period,
-        wanted.criterion,
-        wanted.scaling,
-        task.constraints,
-        sets["estimation"],
-        sets["validation"],
+        period=period,
+        points=wanted.points,
+        criterion=wanted.criterion if coefficients is None else "brought",
+        scaling=wanted.scaling,
+        use_full_range=wanted.use_full_range,
+        source="" if wanted.file is None else wanted.file.name,
+        limits=task.settings.limits,
+        constraints=task.constraints,
+        **sets,
     )
 
 
-def joint_limits(config: Config) -> JointLimits:
-    """The limits of every joint."""
-    wanted, n = config.trajectories, config.n_dof
-    pairs = np.array(wanted.position_limits, dtype=float)
-    pairs = np.broadcast_to(pairs, (n, 2)) if len(pairs) == 1 else pairs
-    return JointLimits(
-        lower=pairs[:, 0],
-        upper=pairs[:, 1],
-        velocity=config.per_joint(wanted.velocity_limits),
-        acceleration=config.per_joint(wanted.acceleration_limits or [np.inf]),
-    )
-
-
-def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
+def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonics: int) -> Settings:
     """What the config asks of every trajectory."""
-    wanted = config.trajectories
     return Settings(
         period=period,
         harmonics=harmonics,
         points=max(wanted.points, 2 * harmonics + 1),
-        limits=joint_limits(config),
+        limits=wanted.limits(model.mechanism.n_dof),
         mapping="gauge" if wanted.use_full_range else "ball",
         starts=wanted.starts,
         polished=wanted.polished,
@@ -90,24 +76,33 @@ def joint_settings(config: Config, period: float, harmonics: int) -> Settings:
     )
 
 
-def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectories:
+def _optimised(
+    wanted: TrajectoriesSection, task: ExcitationTask, run: Run
+) -> dict[str, tuple[Trajectory, ...]]:
+    counts = {"estimation": wanted.count, "validation": wanted.validation_count}
+    keys = {name: [f"{name}-{k:04d}" for k in range(counts[name])] for name in _SETS}
+    found = optimise_all(task, [key for own in keys.values() for key in own], run)
+    return {name: tuple(found[key] for key in keys[name]) for name in _SETS}
+
+
+def _measured(
+    wanted: TrajectoriesSection, model: Model, task: ExcitationTask, brought: Coefficients
+) -> dict[str, tuple[Trajectory, ...]]:
     """The trajectories of coefficients that the user brings, measured but not changed."""
-    wanted, n = config.trajectories, config.n_dof
-    constraints = described_constraints(config, model.mechanism)
     excitation = excitation_of(
         model.mechanism,
         model.base,
         model.nominal_torque,
         wanted.criterion,
         wanted.scaling,
-        constraints,
+        task.constraints,
     )
 
     def measure(coefficients: FloatArray) -> Trajectory:
-        settings = joint_settings(config, brought.period, (coefficients.shape[1] - 1) // 2)
+        harmonics = (coefficients.shape[1] - 1) // 2
         return describe(
             excitation,
-            settings,
+            _settings(wanted, model, brought.period, harmonics),
             coefficients,
             kappa_start=np.nan,
             cpu_seconds=0.0,
@@ -117,23 +112,16 @@ def _measured(config: Config, model: Model, brought: Coefficients) -> Trajectori
 
     sets = {}
     for name in _SETS:
-        values = getattr(brought, name)
-        if values.shape[1] != n:
+        values, n_dof = getattr(brought, name), model.mechanism.n_dof
+        if values.shape[1] != n_dof:
             raise DataError(
                 f"{brought.source}: the {name} coefficients are for {values.shape[1]} joints, but "
-                f"{config.robot} has {n}."
+                f"{model.mechanism.robot} has {n_dof}."
             )
         sets[name] = tuple(measure(entry) for entry in values)
-        _check_motion(brought.source, name, sets[name], joint_limits(config))
-        _check_bounds(brought.source, name, sets[name], constraints)
-    return Trajectories(
-        brought.period,
-        "brought",
-        wanted.scaling,
-        constraints,
-        sets["estimation"],
-        sets["validation"],
-    )
+        _check_motion(brought.source, name, sets[name], task.settings.limits)
+        _check_bounds(brought.source, name, sets[name], task.constraints)
+    return sets
 
 
 def _check_motion(
@@ -150,14 +138,12 @@ def _check_motion(
         for t in trajectories
     )
     for wrong, what in (
-        (worst > 1 + _ROUNDING, f"goes to {worst:.3g} times a joint's limit"),
+        (worst > 1 + _LIMIT_ROUNDING, f"goes to {worst:.3g} times a joint's limit"),
         (not moving.all(), "leaves a joint at rest"),
     ):
         if wrong:
             warnings.warn(
-                f"{source}: a trajectory of the {name} set {what}",
-                ParamreduceWarning,
-                stacklevel=2,
+                f"{source}: a trajectory of the {name} set {what}", ParamreduceWarning, stacklevel=2
             )
 
 
@@ -171,7 +157,7 @@ def _check_bounds(
     for k, constraint in enumerate(constraints):
         low = min(float(t.extremes[k, 0]) for t in trajectories)
         high = max(float(t.extremes[k, 1]) for t in trajectories)
-        slack = _ROUNDING * max(abs(low), abs(high))
+        slack = _LIMIT_ROUNDING * max(abs(low), abs(high))
         if low < constraint.lower - slack or high > constraint.upper + slack:
             warnings.warn(
                 f"{source}: {constraint.name} goes from {low:.4g} to {high:.4g} in the {name} set, "

@@ -5,52 +5,48 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
-from paramreduce_cli import registry
-from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import ReductionSection, Stop
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.multibody.base_parameters import (
-    independent_columns,
-)
+from paramreduce_cli.judgement.torque import NormErrors, torque_errors
+from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     combined_factor,
     standard_deviation,
     thinned_blocks,
 )
+from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import (
+    Columns,
+    CountedDynamics,
     FloatArray,
     IntArray,
     Model,
     Proofs,
+    ProofStatus,
     Reduction,
     Run,
     Samples,
+    SelectionMethod,
     Subsets,
 )
-from paramreduce_cli.reduction.acceleration_objective import AccelerationData
-from paramreduce_cli.reduction.fitting import Fit, NormErrors, torque_errors
-from paramreduce_cli.reduction.grouping import GroupedColumns
-from paramreduce_cli.reduction.objective import Means, Objective
-from paramreduce_cli.reduction.task import Task
+from paramreduce_cli.reduction.criteria import criteria
+from paramreduce_cli.reduction.fitting import Fit
+from paramreduce_cli.reduction.grouping import merged_factor
+from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
+from paramreduce_cli.reduction.objective import Objective
+from paramreduce_cli.reduction.setup import effort, selection_columns, selection_problem
+from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
-from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.counting import Counts
-from paramreduce_cli.stages.problem import (
-    effort,
-    merged_factor,
-    selection_problem,
-    tied_columns,
-)
 
 
-@stage
 def reduce(
-    config: Config | None,
+    reduction: ReductionSection,
+    counted: CountedDynamics,
     model: Model | None,
     samples: Samples,
     previous: Reduction | None,
@@ -62,16 +58,16 @@ def reduce(
     are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
     same command goes on from there.
     """
-    wanted = config.reduction if config is not None else ReductionSection()
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
             "the samples have other parameters than the model: they are of another robot. Bring "
             "samples of this one, or give no CONFIG."
         )
-    weights = _weights(wanted, samples)
-    columns = tied_columns(wanted, samples.names)
+    weights = _weights(reduction, samples)
+    grouped = selection_columns(reduction, samples)
+    columns = grouped.columns
     factor = merged_factor(combined_factor(samples.estimation.factors(), weights), columns)
-    problem = selection_problem(factor, model, columns)
+    problem = selection_problem(factor, model, grouped)
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
         raise DataError(
@@ -81,19 +77,19 @@ def reduce(
     _remark_on_rank(rank, model, columns)
     if previous is not None and not np.array_equal(previous.factor, factor):
         previous = None
-    means = _Means(config, model, samples, columns)
+    inputs = _criterion_inputs(reduction, counted, model, samples, columns)
     objectives: dict[str, Objective] = {}
     found, proofs = {}, None
-    for name in wanted.heuristics:
-        criterion = name.partition("@")[2] or "torque"
-        if criterion not in objectives:
-            objectives[criterion] = registry.selection_criterion[criterion](problem, means)
-        task = _task(objectives[criterion], wanted, previous, run)
-        found[name], made = _selected(task, name, wanted.stop)
+    for name in reduction.heuristics:
+        method = SelectionMethod.parse(name)
+        if method.criterion not in objectives:
+            objectives[method.criterion] = criteria[method.criterion](problem, inputs)
+        task = _task(objectives[method.criterion], reduction, previous, run)
+        found[name], made = _selected(task, method, reduction.stop)
         proofs = made if made is not None else proofs
     _remark_on_proofs(proofs)
     heuristics = _with_norms(found, samples, columns, weights)
-    return Reduction(columns.names, columns.expansion, weights, rank, factor, heuristics, proofs)
+    return Reduction(columns, weights, rank, factor, heuristics, proofs)
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
@@ -111,9 +107,8 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
     return weights
 
 
-def _remark_on_rank(rank: int, model: Model | None, columns: GroupedColumns) -> None:
-    tied = len(columns.names) < columns.expansion.shape[0]
-    if model is not None and not tied and rank < model.base.columns.size:
+def _remark_on_rank(rank: int, model: Model | None, columns: Columns) -> None:
+    if model is not None and not columns.tied and rank < model.base.columns.size:
         warnings.warn(
             f"the estimation set excites only {rank} of the {model.base.columns.size} base "
             "parameters; the others cannot be told apart on it",
@@ -122,65 +117,64 @@ def _remark_on_rank(rank: int, model: Model | None, columns: GroupedColumns) -> 
         )
 
 
-class _Means(Means):
+def _criterion_inputs(
+    wanted: ReductionSection,
+    counted: CountedDynamics,
+    model: Model | None,
+    samples: Samples,
+    columns: Columns,
+) -> CriterionInputs:
     """What criteria ask for, made from the stage's inputs when they do."""
 
-    def __init__(
-        self, config: Config | None, model: Model | None, samples: Samples, columns: GroupedColumns
-    ) -> None:
-        section = config.reduction if config is not None else ReductionSection()
-        self.error_limit = section.operations.torque_error
-        self._config, self._model = config, model
-        self._samples, self._columns = samples, columns
-
-    def _modelled(self, criterion: str) -> tuple[Config, Model]:
-        if self._config is None or self._model is None:
+    def modelled(criterion: str) -> Model:
+        if model is None:
             raise DataError(f"the criterion {criterion} needs a model; give a CONFIG.")
-        return self._config, self._model
+        return model
 
-    @cached_property
-    def _dynamics(self) -> Dynamics:
-        return Dynamics(self._modelled("of the heuristics")[1].mechanism)
+    @cache
+    def counts() -> Counts:
+        return Counts(modelled("operations"), counted)
 
-    @cached_property
-    def _counts(self) -> Counts:
-        return Counts(*self._modelled("operations"))
+    @cache
+    def dynamics() -> Dynamics:
+        return Dynamics(modelled("acceleration").mechanism)
 
-    def accelerations(self, most: int) -> AccelerationData:
+    def accelerations(most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""
-        self._modelled("acceleration")
-        nominal = self._samples.nominal_acceleration
+        direct_regressor = dynamics().direct_regressor
+        nominal = samples.nominal_acceleration
         if nominal is None:
             raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
-        every = max(1, -(-self._samples.estimation.n_samples // most))
-        blocks = list(thinned_blocks(self._samples.estimation.blocks(), every))
+        every = max(1, -(-samples.estimation.n_samples // most))
+        blocks = list(thinned_blocks(samples.estimation.blocks(), every))
         q, dq, ddz, tau = (
             np.concatenate([getattr(block, key) for block in blocks])
             for key in ("q", "dq", "ddz", "tau")
         )
-        A, B = self._dynamics.direct_regressor(q, dq)
-        expansion = self._columns.expansion
-        return AccelerationData(A @ expansion, B @ expansion, tau, ddz, nominal)
+        A, B = direct_regressor(q, dq)
+        return AccelerationData(A @ columns.expansion, B @ columns.expansion, tau, ddz, nominal)
 
-    def cost(self, kept: IntArray) -> int:
+    def cost(kept: IntArray) -> int:
         """Operations of the lean inverse dynamics, nearly."""
-        return self._counts.estimate(self._columns.expansion[:, kept])
+        return counts().estimate(np.isin(columns.column, kept))
+
+    return CriterionInputs(wanted.operations.torque_error, accelerations, cost)
 
 
 def _remark_on_proofs(proofs: Proofs | None) -> None:
     """Say what is not proven."""
-    if proofs is None or set(proofs.status) == {"optimal"}:
+    if proofs is None or set(proofs.status) == {ProofStatus.OPTIMAL}:
         return
-    counts = {status: proofs.status.count(status) for status in dict.fromkeys(proofs.status)}
-    text = f"best-subset: {counts.get('optimal', 0)} of {proofs.n.size} sizes are proven"
-    if "best-found" in counts:
+    counts = {status: proofs.status.count(status) for status in ProofStatus}
+    text = f"best-subset: {counts[ProofStatus.OPTIMAL]} of {proofs.n.size} sizes are proven"
+    if counts[ProofStatus.BEST_FOUND]:
         text += (
-            f", {counts['best-found']} are the best found so far, with lower bounds; `paramreduce "
+            f", {counts[ProofStatus.BEST_FOUND]} are the best found so far, with lower bounds; `paramreduce "
             "reduce` goes on with them"
         )
-    if "uncertified" in counts:
+    if counts[ProofStatus.UNCERTIFIED]:
         text += (
-            f", {counts['uncertified']} cannot be certified in double precision, because columns "
+            f", {counts[ProofStatus.UNCERTIFIED]} cannot be certified in double precision, because columns "
             "are nearly dependent"
         )
     warnings.warn(text, ParamreduceWarning, stacklevel=2)
@@ -197,8 +191,8 @@ class _Selected:
 
 def _task(
     objective: Objective, wanted: ReductionSection, previous: Reduction | None, run: Run
-) -> Task:
-    return Task(
+) -> SelectionTask:
+    return SelectionTask(
         objective=objective,
         largest=wanted.stop.parameters,
         effort=effort(wanted, run),
@@ -208,15 +202,18 @@ def _task(
     )
 
 
-def _selected(task: Task, name: str, stop: Stop) -> tuple[_Selected, Proofs | None]:
+def _selected(
+    task: SelectionTask, method: SelectionMethod, stop: Stop
+) -> tuple[_Selected, Proofs | None]:
     started = time.perf_counter()
-    found = run_heuristic(name, task)
+    found = run_heuristic(method.heuristic, task)
     seconds = time.perf_counter() - started
     if not found.subsets:
         smallest = int(task.objective.widths.min())
         raise ConfigError(
-            f"reduction.stop.parameters is {stop.parameters}, but with groups the smallest subset "
-            f"has {smallest} parameters. Raise it."
+            f"is {stop.parameters}, but with groups the smallest subset has {smallest} parameters. Raise "
+            "it.",
+            ("reduction", "stop", "parameters"),
         )
     fits = [task.objective.fit(subset) for subset in found.subsets]
     kept = _kept(fits, stop)
@@ -232,11 +229,11 @@ def _kept(fits: list[Fit], stop: Stop) -> int:
 
 
 def _with_norms(
-    found: dict[str, _Selected], samples: Samples, columns: GroupedColumns, weights: FloatArray
+    found: dict[str, _Selected], samples: Samples, columns: Columns, weights: FloatArray
 ) -> dict[str, Subsets]:
     """One pass over the samples for the 1- and infinity norms of all models together."""
     models = [
-        columns.expansion[:, subset] @ f.parameters
+        columns.model(subset, f.parameters).standard
         for entry in found.values()
         for subset, f in zip(entry.subsets, entry.fits, strict=True)
     ]

@@ -7,13 +7,14 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import SamplingSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.feasibility import FINER
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.excitation.symmetry import Symmetry, completed, symmetries
-from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.excitation.symmetry import completed, symmetries
+from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
     ObservedSet,
@@ -21,109 +22,105 @@ from paramreduce_cli.multibody.observation import (
     standard_deviation,
 )
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.records import (
-    FloatArray,
-    Model,
-    Recording,
-    Recordings,
-    Samples,
-    Trajectories,
-    Trajectory,
-)
-from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.description import described_constraints
-from paramreduce_cli.stages.optimize_trajectories import joint_limits
+from paramreduce_cli.records import FloatArray, Model, Recording, Recordings, Samples, Trajectories
 
-_ROUNDING = 1e-6
+_IMAGE_ROUNDING = 1e-6
+"""By which the image of a motion may miss its limits: round-off of the optimiser's."""
 
 
-@stage
 def sample(
-    config: Config, model: Model, trajectories: Trajectories | None, recordings: Recordings
+    sampling: SamplingSection,
+    model: Model,
+    trajectories: Trajectories | None,
+    recordings: Recordings,
 ) -> Samples:
     """Sample both sets: states, torques and observation matrices.
 
     From the optimised trajectories, or from recorded states where the config names them.
     """
     dynamics = Dynamics(model.mechanism)
-    wanted = config.sampling
-    images = symmetries(config.sampling.symmetries, model.mechanism.coordinate_names)
-    points = wanted.points or config.trajectories.points
-    estimation = _observed(
-        config, model, dynamics, trajectories, "estimation", recordings.estimation, points, images
-    )
-    points = wanted.validation_points or config.trajectories.points
-    validation = _observed(
-        config, model, dynamics, trajectories, "validation", recordings.validation, points, images
-    )
+
+    def observed(name: str, recording: Recording | None, points: int | None) -> ObservedSet:
+        if recording is not None:
+            return _recorded(model, dynamics, recording)
+        if trajectories is None:
+            raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
+        series = [trajectory.coefficients for trajectory in getattr(trajectories, name)]
+        if name == "estimation" and sampling.symmetries:
+            series = _completed(sampling, model, trajectories, series)
+        return _generated(model, dynamics, trajectories, name, series, points)
+
+    estimation = observed("estimation", recordings.estimation, sampling.points)
+    validation = observed("validation", recordings.validation, sampling.validation_points)
+    parameters = model.mechanism.parameters
     return Samples(
         names=model.mechanism.parameter_names,
+        preference=np.array([parameter.preference for parameter in parameters]),
         values=model.values,
         nominal_torque=_nominal_torque(model, estimation),
-        nominal_acceleration=_nominal_acceleration(config, model, estimation),
+        nominal_acceleration=_nominal_acceleration(sampling, model, estimation),
         estimation=estimation,
         validation=validation,
     )
 
 
-def _check_images(config: Config, model: Model, series: list[FloatArray], period: float) -> None:
-    """Refuse symmetries that lead out of the limits: they are none of this mechanism."""
-    if not config.sampling.symmetries:
-        return
-    limits = joint_limits(config)
-    quantities = Quantities(model.mechanism, described_constraints(config, model.mechanism))
+def _completed(
+    sampling: SamplingSection, model: Model, trajectories: Trajectories, series: list[FloatArray]
+) -> list[FloatArray]:
+    """The images of all series under the symmetries of the mechanism.
+
+    Those that lead out of the limits are refused: they are none of this mechanism.
+    """
+    series = completed(series, symmetries(sampling.symmetries, model.mechanism.coordinate_names))
+    limits = trajectories.limits
+    quantities = Quantities(model.mechanism, trajectories.constraints)
     coordinates = Coordinates(model.mechanism)
-    times = sample_times(period, config.trajectories.points)
+    period = trajectories.period
+    times = sample_times(period, trajectories.points)
     for coefficients in series:
         basis = fourier_basis(period, (coefficients.shape[1] - 1) // 2, times)
         z, dz, ddz = basis.states(coefficients)
         excess = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
-        if excess <= _ROUNDING:
+        if excess <= _IMAGE_ROUNDING:
             q, _, _ = coordinates.states(z, dz, ddz)
             excess = quantities.rows(q).max(initial=-np.inf)
-        if excess > _ROUNDING:
+        if excess > _IMAGE_ROUNDING:
             raise ConfigError(
-                "sampling.symmetries: the image of a trajectory leaves the limits or constraints "
-                "under trajectories, so that this is no symmetry of the mechanism and its limits."
+                "the image of a trajectory leaves the limits or constraints under trajectories, so "
+                "that this is no symmetry of the mechanism and its limits.",
+                ("sampling", "symmetries"),
             )
+    return series
 
 
-def _observed(
-    config: Config,
+def _generated(
     model: Model,
     dynamics: Dynamics,
-    trajectories: Trajectories | None,
+    trajectories: Trajectories,
     name: str,
-    recording: Recording | None,
-    points: int,
-    images: list[Symmetry],
+    series: list[FloatArray],
+    points: int | None,
 ) -> ObservedSet:
-    if recording is not None:
-        _warn_of_still_joints(model, recording)
-        return ObservedSet(
-            lambda: _recorded_blocks(recording),
-            recording.time.size,
-            dynamics,
-            model.values,
-            recording.source,
-        )
-    if trajectories is None:
-        raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
-    found: tuple[Trajectory, ...] = getattr(trajectories, name)
-    series = [trajectory.coefficients for trajectory in found]
-    if name == "estimation":
-        series = completed(series, images)
-        _check_images(config, model, series, trajectories.period)
-    period = trajectories.period
-    finer = 1
-    if model.mechanism.loops is not None:
-        finer = -(-FINER * config.trajectories.points // points)
+    """Samples of Fourier series, as many as these were optimised on if nothing else is asked for."""
+    points = points or trajectories.points
+    finer = 1 if model.mechanism.loops is None else -(-FINER * trajectories.points // points)
     return ObservedSet(
-        lambda: _series_blocks(series, period, points, finer),
+        lambda: _series_blocks(series, trajectories.period, points, finer),
         len(series) * points,
         dynamics,
         model.values,
         f"{name} set",
+    )
+
+
+def _recorded(model: Model, dynamics: Dynamics, recording: Recording) -> ObservedSet:
+    _warn_of_still_joints(model, recording)
+    return ObservedSet(
+        lambda: _recorded_blocks(recording),
+        recording.time.size,
+        dynamics,
+        model.values,
+        recording.source,
     )
 
 
@@ -163,24 +160,18 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
 def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
     if model.nominal_torque_given:
         return model.nominal_torque
-    return _scale(
-        standard_deviation(block.tau for block in estimation.blocks()),
-        model,
-        "nominal_torque",
-        "torque",
-    )
+    deviation = standard_deviation(block.tau for block in estimation.blocks())
+    return _scale(deviation, model, "nominal_torque", "torque")
 
 
-def _nominal_acceleration(config: Config, model: Model, estimation: ObservedSet) -> FloatArray:
-    given = config.sampling.nominal_acceleration
+def _nominal_acceleration(
+    sampling: SamplingSection, model: Model, estimation: ObservedSet
+) -> FloatArray:
+    given = sampling.nominal_acceleration
     if given != "standard-deviation":
-        return config.per_joint(given)
-    return _scale(
-        standard_deviation(block.ddz for block in estimation.states()),
-        model,
-        "sampling.nominal_acceleration",
-        "acceleration",
-    )
+        return per_joint(given, model.mechanism.n_dof)
+    deviation = standard_deviation(block.ddz for block in estimation.states())
+    return _scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
 
 
 def _scale(deviation: FloatArray, model: Model, key: str, what: str) -> FloatArray:

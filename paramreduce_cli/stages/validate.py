@@ -6,15 +6,20 @@ import dataclasses
 
 import numpy as np
 
-from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import ReductionSection, SelectedSection, ValidationSection
 from paramreduce_cli.errors import DataError
+from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
+from paramreduce_cli.judgement.picking import pareto_front
+from paramreduce_cli.judgement.selection import select
+from paramreduce_cli.judgement.stability import stability
+from paramreduce_cli.judgement.torque import NormErrors, torque_errors
+from paramreduce_cli.judgement.verdict import remarks, verdict
+from paramreduce_cli.lean.counting import COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.observation import (
-    combined_factor,
-    joint_factors,
-    thinned_blocks,
-)
+from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.records import (
+    DataChange,
+    DataVariant,
     FloatArray,
     HeuristicValidation,
     IntArray,
@@ -24,27 +29,17 @@ from paramreduce_cli.records import (
     Samples,
     SampleSet,
     Selected,
+    SelectionMethod,
     Stability,
     Validation,
 )
-from paramreduce_cli.reduction.acceleration import AccelerationErrors, acceleration_errors
-from paramreduce_cli.reduction.fitting import NormErrors, torque_errors
-from paramreduce_cli.reduction.picking import pareto_front
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.grouping import merged_factor
+from paramreduce_cli.reduction.models import base_model, full_model
 from paramreduce_cli.reduction.problem import SelectionProblem
-from paramreduce_cli.reduction.stability import stability
-from paramreduce_cli.reduction.task import Task
+from paramreduce_cli.reduction.setup import effort, selection_columns, selection_problem
+from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
-from paramreduce_cli.reduction.torque import TorqueObjective
-from paramreduce_cli.registry import stage
-from paramreduce_cli.stages.counting import COUNTS, Counts
-from paramreduce_cli.stages.problem import (
-    effort,
-    merged_factor,
-    selection_problem,
-    tied_columns,
-)
-from paramreduce_cli.stages.selection import select
-from paramreduce_cli.stages.verdict import remarks, verdict
 
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
@@ -52,9 +47,14 @@ _NODES = 50_000
 """Of each proof while stability is looked at; the best found is good enough there."""
 
 
-@stage
 def validate(
-    config: Config, model: Model, samples: Samples, reduction: Reduction, run: Run
+    judging: ValidationSection,
+    wanted: SelectedSection,
+    search: ReductionSection,
+    model: Model,
+    samples: Samples,
+    reduction: Reduction,
+    run: Run,
 ) -> Validation:
     """Judge the reduced models on both sets.
 
@@ -70,33 +70,33 @@ def validate(
     _check_coordinates(model, samples)
 
     def errors_on(sample_set: SampleSet) -> tuple[NormErrors, AccelerationErrors]:
-        torque = torque_errors(sample_set.blocks(), models.columns, reduction.nominal_torque)
+        torque = torque_errors(sample_set.blocks(), models.values, reduction.nominal_torque)
         acceleration = acceleration_errors(
-            sample_set.blocks(), dynamics.direct_regressor, models.columns, nominal
+            sample_set.blocks(), dynamics.direct_regressor, models.values, nominal
         )
         return torque, acceleration
 
     estimation, validation = errors_on(samples.estimation), errors_on(samples.validation)
-    counts = Counts(config, model)
+    counts = Counts(model, judging.operations)
     heuristics = {}
     for name, found in reduction.heuristics.items():
-        rows = models.rows[name]
-        expansions = [reduction.expansion[:, subset] for subset in found.subsets]
-        operations = np.array([counts.all(expansion) for expansion in expansions])
-        heuristics[name] = _judged(found.n, operations, estimation, validation, rows)
+        operations = np.array([counts.all(reduction.model(name, k)) for k in range(found.n.size)])
+        heuristics[name] = _judged(found.n, operations, estimation, validation, models.rows[name])
     full = _full_model(model, counts, estimation[1], validation[1])
-    selected = select(config.selected, model, reduction, heuristics)
-    accepted, sentence = verdict(config.validation.accept, selected, heuristics[selected.heuristic])
+    selected = select(wanted, model, reduction, heuristics)
+    accepted, sentence = verdict(judging.accept, selected, heuristics[selected.heuristic])
     return Validation(
         heuristics=heuristics,
         full=full,
         nominal_acceleration=nominal,
         selected=selected,
-        pareto=tuple((name, int(heuristics[name].n[k])) for name, k in pareto_front(heuristics)),
-        stability=_stability(config, model, samples, reduction, selected, run),
+        pareto=pareto_front(heuristics),
+        stability=_stability(search, model, samples, reduction, selected, run)
+        if judging.stability
+        else None,
         accepted=accepted,
         verdict=sentence,
-        remarks=tuple(remarks(config.validation, heuristics, full, selected)),
+        remarks=tuple(remarks(judging, heuristics, full, selected)),
     )
 
 
@@ -114,12 +114,12 @@ class _Models:
     """Standard parameters of all reduced models, each different one once, and the full model last.
 
     Attributes:
-        columns: (n_standard, n_models)
+        values: (n_standard, n_models)
         rows: Which models the subsets of each heuristic are.
     """
 
     def __init__(self, reduction: Reduction, model: Model) -> None:
-        if reduction.expansion.shape[0] != len(model.mechanism.parameter_names):
+        if reduction.columns.column.size != model.mechanism.n_parameters:
             raise DataError(
                 "reduction.h5 has other parameters than model.h5; run `paramreduce run`."
             )
@@ -128,14 +128,14 @@ class _Models:
         self.rows: dict[str, IntArray] = {}
         for name, found in reduction.heuristics.items():
             rows = []
-            for subset, values in zip(found.subsets, found.parameters, strict=True):
-                column = reduction.standard(np.sort(subset), values[np.argsort(subset)])
+            for k in range(found.n.size):
+                column = reduction.model(name, k).standard
                 number = numbers.setdefault(column.tobytes(), len(columns))
                 if number == len(columns):
                     columns.append(column)
                 rows.append(number)
             self.rows[name] = np.array(rows, dtype=np.int64)
-        self.columns: FloatArray = np.column_stack([*columns, model.values])
+        self.values: FloatArray = np.column_stack([*columns, model.values])
 
 
 def _judged(
@@ -167,10 +167,9 @@ def _judged(
 
 def _full_model(
     model: Model, counts: Counts, estimation: AccelerationErrors, validation: AccelerationErrors
-) -> dict[str, int | float]:
-    unit = np.eye(model.values.size)
-    full, base = counts.all(unit[:, model.affecting]), counts.all(unit[:, model.base.columns])
-    result: dict[str, int | float] = dict(zip(COUNTS, full, strict=True))
+) -> dict[str, float]:
+    full, base = counts.all(full_model(model)), counts.all(base_model(model))
+    result: dict[str, float] = dict(zip(COUNTS, full, strict=True))
     result |= {f"base_{name}": value for name, value in zip(COUNTS, base, strict=True)}
     result["mass_matrix_condition"] = float(max(estimation.condition[-1], validation.condition[-1]))
     result["mass_matrix_smallest_eigenvalue"] = float(
@@ -180,41 +179,39 @@ def _full_model(
 
 
 def _stability(
-    config: Config,
+    search: ReductionSection,
     model: Model,
     samples: Samples,
     reduction: Reduction,
     selected: Selected,
     run: Run,
-) -> Stability | None:
+) -> Stability:
     """The selection repeated by torque with each trajectory left out and with fewer samples."""
-    if not config.validation.stability:
-        return None
-    columns = tied_columns(config.reduction, samples.names)
+    grouped = selection_columns(search, samples)
     weights = reduction.nominal_torque
-    problem = selection_problem(reduction.factor, model, columns)
-    quick = dataclasses.replace(effort(config.reduction, run), node_limit=_NODES)
+    problem = selection_problem(reduction.factor, model, grouped)
+    quick = dataclasses.replace(effort(search, run), node_limit=_NODES)
+    heuristic = SelectionMethod.parse(selected.heuristic).heuristic
 
     def factor(factors: FloatArray) -> FloatArray:
-        return merged_factor(combined_factor(factors, weights), columns)
+        return merged_factor(combined_factor(factors, weights), grouped.columns)
 
     def chosen(other: SelectionProblem) -> IntArray:
-        task = Task(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)
-        found = run_heuristic(selected.heuristic, task).subsets
+        task = SelectionTask(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)
+        found = run_heuristic(heuristic, task).subsets
         # With groups the size itself may not come up on other data.
         fitting = [subset for subset in found if subset.size <= selected.n]
         return fitting[-1] if fitting else np.zeros(0, np.int64)
 
     own = samples.estimation.factors()
-    variants = {"all": reduction.factor}
-    if len(own) > 1:
-        for k in range(len(own)):
-            variants[f"without trajectory {k + 1}"] = factor(np.delete(own, k, axis=0))
+    variants = [(DataVariant(DataChange.ALL), reduction.factor)]
+    for k in range(len(own) if len(own) > 1 else 0):
+        left_out = DataVariant(DataChange.WITHOUT_TRAJECTORY, k + 1)
+        variants.append((left_out, factor(np.delete(own, k, axis=0))))
     rows = samples.estimation.n_samples * weights.size
     for every in _THINNED:
         if rows // every >= 2 * problem.candidates.size:
             blocks = thinned_blocks(samples.estimation.blocks(), every)
-            variants[f"every {every}{'nd' if every == 2 else 'th'} sample"] = factor(
-                joint_factors(blocks)
-            )
+            thinned = DataVariant(DataChange.THINNED, every)
+            variants.append((thinned, factor(joint_factors(blocks))))
     return stability(problem, variants, chosen)

@@ -12,9 +12,9 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.multibody.follower import Follower
+from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.optimize_trajectories import joint_settings
+from paramreduce_cli.stages.optimize_trajectories import _settings
 
 CONFIG = Path(__file__).resolve().parents[2] / "configs" / "puma560.yaml"
 
@@ -50,12 +50,12 @@ def descend(make, start):
 
 def rows():
     config = load_config(CONFIG)
-    model = build_model(config)
+    model = build_model(config, config.model)
     wanted = config.trajectories
     excitation = excitation_of(
         model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
     )
-    settings = joint_settings(config, wanted.period, wanted.harmonics)
+    settings = _settings(wanted, model, wanted.period, wanted.harmonics)
     basis = settings_basis(settings)
     limits = LimitMap(settings.limits, basis, "gauge")
 

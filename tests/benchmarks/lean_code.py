@@ -12,15 +12,12 @@ import subprocess
 import warnings
 from pathlib import Path
 
-import numpy as np
-
-from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.records import PARAMETER_KINDS
-from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.export import Chosen, chosen_model, export
+from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.writing import Exported, export
+from paramreduce_cli.records import Kind
+from tests.conftest import model_of, whole
 
-ROOT = Path(__file__).resolve().parents[2]
 DRIVER = Path(__file__).with_suffix(".cpp")
 FLAGS = ["-O3", "-march=native", "-DNDEBUG"]
 DEFINITIONS = [
@@ -31,7 +28,7 @@ DEFINITIONS = [
 ]
 """Of Pinocchio's headers, as its CMake targets say."""
 FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
-DYNAMIC = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+DYNAMIC = [Kind.of(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
 """Pinocchio's order."""
 
 
@@ -39,22 +36,20 @@ def sources():
     """All files of the driver, by name."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)
-        model = build_model(load_config(ROOT / "configs" / "puma560.yaml"))
+        model = model_of("puma560")
     names = model.mechanism.parameter_names
     kept = [names.index(name) for name in FS_18.split()]
-    some = tuple(names[k] for k in kept)
-    expansion = np.eye(len(names))[:, kept]
     chosen = {
-        "full": chosen_model("full", model, None, None),
-        "base": chosen_model("base", model, None, None),
-        "fs18": Chosen("the paper's FS-18", some, model.values[kept], some, expansion),
+        "full": chosen_model("full", model, None, None)[0],
+        "base": chosen_model("base", model, None, None)[0],
+        "fs18": whole(model.mechanism, kept, model.values[kept]),
     }
     files = {"lean_code.cpp": DRIVER.read_bytes(), "arm.h": arm(model).encode()}
     for name, one in chosen.items():
-        for what, robot in (("both", name), ("regressor", f"{name}_K")):
+        for what, robot in ((Exported.BOTH, name), (Exported.REGRESSOR, f"{name}_K")):
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
-            made = export(named, one, kind="c", what=what, constant=False, single=False)
+            made = export(named, one, title=name, language="c", what=what)
             files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
     return files
 
@@ -68,9 +63,9 @@ def arm(model):
         return repr(float(values))
 
     bodies = model.mechanism.bodies
-    places = [body.before[:3].tolist() for body in bodies]
-    table = model.values.reshape(len(bodies), len(PARAMETER_KINDS))
-    inertias = [[row[PARAMETER_KINDS.index(kind)] for kind in DYNAMIC] for row in table]
+    places = [body.parent_to_joint[:3].tolist() for body in bodies]
+    columns = [model.mechanism.columns(k) for k in range(len(bodies))]
+    inertias = [[model.values[own[kind]] for kind in DYNAMIC] for own in columns]
     return (
         f"static const double gravity[3] = {listed(model.mechanism.gravity.tolist())};\n"
         f"static const double places[6][3][4] = {listed(places)};\n"

@@ -19,9 +19,9 @@ import rich.table
 from sklearn.feature_selection import SequentialFeatureSelector
 from sklearn.linear_model import LinearRegression
 
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.problem import SelectionProblem
-from paramreduce_cli.reduction.task import Effort, Task, run
-from paramreduce_cli.reduction.torque import TorqueObjective
+from paramreduce_cli.reduction.task import Effort, SelectionTask, run
 from tests.conftest import ROOT
 
 SIZES = {"puma560": (12, 18, 24), "hexaglide": (12, 15, 17, 20)}
@@ -83,12 +83,12 @@ def main():
         def error(subset, objective=objective):
             return objective.score(objective.units_of(np.asarray(subset)))
 
-        run("best-subset", Task(TorqueObjective(p), 2))  # compile
+        run("best-subset", SelectionTask(TorqueObjective(p), 2))  # compile
         reference = None
         for name in OURS:
             started = time.perf_counter()
             effort = Effort(time_limit=600, jobs=os.cpu_count() or 1)
-            found = run(name, Task(TorqueObjective(p), max(sizes), effort=effort)).subsets
+            found = run(name, SelectionTask(TorqueObjective(p), max(sizes), effort=effort)).subsets
             seconds = time.perf_counter() - started
             reference = reference or seconds
             errors = [error(next(s for s in found if s.size == n)) for n in sizes]

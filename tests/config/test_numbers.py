@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paramreduce_cli.config.numbers import parse_number
+from paramreduce_cli.fields.numbers import parse_number
 
 
 @pytest.mark.parametrize(

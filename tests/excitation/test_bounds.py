@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import CONFIGS, constraints_of
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
@@ -12,25 +12,24 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.multibody.coordinates import Coordinates
-from paramreduce_cli.multibody.follower import Follower
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.description import described_constraints
-from paramreduce_cli.stages.optimize_trajectories import joint_settings
+from paramreduce_cli.stages.optimize_trajectories import _settings
 
 
 @pytest.fixture(scope="module", params=["five_bar", "hexaglide"])
 def case(request):
     config = load_config(CONFIGS / f"{request.param}.yaml")
-    model = build_model(config)
+    model = build_model(config, config.model)
     wanted = config.trajectories
-    constraints = described_constraints(config, model.mechanism)
+    constraints = constraints_of(config, model.mechanism)
     excitation = excitation_of(
         model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling,
         constraints,
     )  # fmt: skip
-    settings = joint_settings(config, wanted.period, wanted.harmonics)
+    settings = _settings(wanted, model, wanted.period, wanted.harmonics)
     settings = dataclasses.replace(settings, starts=1, polished=1, max_iterations=20)
     return excitation, settings, constraints
 
@@ -99,11 +98,11 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(tmp_path):
     path = tmp_path / "distance.yaml"
     path.write_text(text)
     config = load_config(path)
-    model = build_model(config)
+    model = build_model(config, config.model)
     excitation = excitation_of(
         model.mechanism, model.base, model.nominal_torque, "condition-number", "weighted"
     )
-    settings = joint_settings(config, 2 * np.pi, 3)
+    settings = _settings(config.trajectories, model, 2 * np.pi, 3)
     settings = dataclasses.replace(settings, starts=3, polished=2, max_iterations=40)
     for seed in range(2):
         found = optimise_trajectory(excitation, settings, [seed])

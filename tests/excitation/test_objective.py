@@ -2,15 +2,17 @@ import numpy as np
 import pytest
 from conftest import puma_mechanism
 
-from paramreduce_cli import registry
+from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.excitation.limits import JointLimits, LimitMap
+from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
-from paramreduce_cli.multibody.base_parameters import base_parameters, preference_order
-from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.excitation.scalings import scalings
+from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.follower import Follower
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.records import JointLimits
 
 NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
 
@@ -21,7 +23,7 @@ def parts():
     dynamics = Dynamics(mechanism)
     rng = np.random.default_rng(0)
     K = dynamics.regressor(*(rng.normal(size=(100, 6)) for _ in range(3)))
-    base = base_parameters(K.reshape(-1, 60), preference_order(mechanism.parameter_names), 1e-9)
+    base = base_parameters(K.reshape(-1, 60), mechanism.preference_order, 1e-9)
     return dynamics, base
 
 
@@ -34,8 +36,8 @@ def excitation(parts, criterion="condition-number", scaling="column-normalised")
         Quantities(dynamics.mechanism, ()),
         base.beta,
         NOMINAL,
-        registry.criterion[criterion],
-        registry.scaling[scaling],
+        criteria[criterion],
+        scalings[scaling],
     )
 
 
@@ -48,8 +50,8 @@ def basis_and_limits(mapping="gauge", acceleration=np.inf):
 
 
 @pytest.mark.parametrize("mapping", ["gauge", "ball"])
-@pytest.mark.parametrize("scaling", list(registry.scaling))
-@pytest.mark.parametrize("criterion", list(registry.criterion))
+@pytest.mark.parametrize("scaling", list(scalings))
+@pytest.mark.parametrize("criterion", list(criteria))
 def test_gradients_against_finite_differences(parts, criterion, scaling, mapping):
     basis, limits, _ = basis_and_limits(mapping)
     measured = excitation(parts, criterion, scaling)
@@ -67,7 +69,7 @@ def test_gradients_against_finite_differences(parts, criterion, scaling, mapping
         assert slope == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-4)
 
 
-@pytest.mark.parametrize("scaling", list(registry.scaling))
+@pytest.mark.parametrize("scaling", list(scalings))
 def test_sharp_objective_is_the_logarithm_of_the_condition_number(parts, scaling):
     measured = excitation(parts, scaling=scaling)
     basis, limits, _ = basis_and_limits()

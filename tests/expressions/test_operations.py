@@ -1,6 +1,7 @@
 import casadi as ca
 import pytest
 
+from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 
 x = ca.SX.sym("x", 4)
@@ -53,3 +54,14 @@ def test_signs_cost_where_they_are_counted():
     assert count(*negated) == 2
     assert count(*negated, signs_free=False) == 3
     assert count(x[0] - x[1], signs_free=False) == 1
+
+
+def test_a_difference_is_one_operation_in_programs_made_from_graphs():
+    graph = Graph()
+    a, b, c = (graph.input(k) for k in range(3))
+    difference = graph.subtract(a, b)
+    program = Program.of_graph(graph, [difference, graph.subtract(graph.negate(a), c)])
+    assert program.count() == 2
+    assert program.count(signs_free=False) == 3  # of -a - c the sign is one
+    assert Program.of_graph(graph, [difference]).count(signs_free=False) == 1
+    assert Program.of_graph(graph, [graph.subtract(b, a)]).count(signs_free=False) == 1

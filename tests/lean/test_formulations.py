@@ -1,9 +1,11 @@
 """Formulations against plain recursion, and what they take."""
 
+import dataclasses
+
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import CONFIGS, MECHANISMS
+from conftest import CONFIGS, MECHANISMS, model_of, whole
 from oracles import textbook
 from trees import random_tree
 
@@ -12,7 +14,7 @@ from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
-from paramreduce_cli.lean.choices import OPTIONS, Choice, alternatives, from_data, to_data
+from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.lean.search import direct_outputs, formulations, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
@@ -25,7 +27,9 @@ SEEDS = range(12)
 
 def random_choices(count, rng):
     return [
-        Choice(**{name: values[rng.integers(len(values))] for name, values in OPTIONS.items()})
+        JointFormulation(
+            **{name: values[rng.integers(len(values))] for name, values in OPTIONS.items()}
+        )
         for _ in range(count)
     ]
 
@@ -38,7 +42,7 @@ def relative(values, expected):
 def compared(mechanism, choices, rng, samples=30):
     """Errors of d and of [M | delta] against plain recursion, relative to the largest value."""
     q, dq, ddq = rng.normal(size=(3, samples, mechanism.n_q))
-    phi = rng.normal(size=len(mechanism.parameter_names))
+    phi = rng.normal(size=mechanism.n_parameters)
     plain = Dynamics(mechanism, once=True)
     A, B = plain.direct_regressor(q, dq)
     inputs = [*np.tile(phi, (samples, 1)).T, *q.T, *dq.T, *ddq.T]
@@ -82,116 +86,62 @@ def test_choices_survive_being_written_down():
 
 def test_alternatives_differ_and_come_once():
     joint = lean_tree(MECHANISMS["puma"]()).joints[2]
-    found = alternatives(Choice(), joint)
-    assert Choice() not in found
+    found = alternatives(JointFormulation(), joint)
+    assert JointFormulation() not in found
     assert len(set(found)) == len(found)
-    assert Choice(aligned=True) in found
+    assert JointFormulation(aligned=True) in found
 
 
 def test_parallel_and_opposite_axes_are_found():
     config = load_config(CONFIGS / "puma560.yaml")
-    joints = lean_tree(build_model(config).mechanism).joints
+    joints = lean_tree(build_model(config, config.model).mechanism).joints
     assert [joint.parallel for joint in joints] == [False, False, True, False, False, False]
 
 
 @pytest.fixture(scope="module")
 def puma():
-    return build_model(load_config(CONFIGS / "puma560.yaml"))
+    return model_of("puma560")
 
 
 @pytest.fixture(scope="module")
 def hexaglide():
-    return build_model(load_config(CONFIGS / "hexaglide.yaml"))
+    return model_of("hexaglide")
 
 
-PAPERS_PUMA = [
-    "m_3",
-    "Izz_5",
-    "Izz_3",
-    "my_6",
-    "mx_6",
-    "my_5",
-    "mx_2",
-    "my_4",
-    "Izz_4",
-    "my_3",
-    "Izz_6",
-    "Ixx_3",
-    "Ixz_2",
-    "mx_4",
-    "Ixx_4",
-    "mx_5",
-    "Iyy_3",
-    "my_2",
-]
-PAPERS_HEXAGLIDE = [
-    "m_P",
-    "Izz_P",
-    "m_4",
-    "mz_1",
-    "m_5",
-    "mz_2",
-    "mz_6",
-    "m_3",
-    "mz_P",
-    "mx_1",
-    "m_2",
-    "mz_4",
-    "m_6",
-    "Ixx_1",
-    "Iyy_P",
-    "Ixx_P",
-    "m_1",
-]
-FEW_OPERATIONS = [
-    "m_P",
-    "mz_P",
-    "Ixx_P",
-    "Iyy_P",
-    "Izz_P",
-    "m_1",
-    "m_2",
-    "m_3",
-    "m_4",
-    "m_5",
-    "m_6",
-    "mz_1",
-    "Iyy_2",
-    "Iyy_5",
-    "Ixx_6",
-    "Iyy_6",
-]
+PAPERS_PUMA = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
+PAPERS_HEXAGLIDE = (
+    "m_P Izz_P m_4 mz_1 m_5 mz_2 mz_6 m_3 mz_P mx_1 m_2 mz_4 m_6 Ixx_1 Iyy_P Ixx_P m_1"
+)
+FEW_OPERATIONS = "m_P mz_P Ixx_P Iyy_P Izz_P m_1 m_2 m_3 m_4 m_5 m_6 mz_1 Iyy_2 Iyy_5 Ixx_6 Iyy_6"
 
 
 def counts(model, kept):
     """d and [M | delta] of the leanest formulations."""
-    if isinstance(kept, list):
-        kept = np.sort([model.mechanism.parameter_names.index(name) for name in kept])
+    if isinstance(kept, str):
+        names = model.mechanism.parameter_names
+        kept = np.sort([names.index(name) for name in kept.split()])
     lean = LeanModels(model.mechanism, model.formulations)
-    return lean.inverse(kept).n_operations, lean.direct(kept).n_operations
+    reduced = whole(model.mechanism, kept)
+    return lean.inverse(reduced).n_operations, lean.direct(reduced).n_operations
 
 
 def test_operations_of_the_puma(puma):
-    for kept, inverse, direct in (
-        (np.flatnonzero(puma.affecting), 510, 580),
-        (np.sort(puma.base.columns), 450, 540),
-        (PAPERS_PUMA, 340, 430),
+    for kept, *expected in (
+        (np.flatnonzero(puma.affecting), 484, 566),
+        (np.sort(puma.base.columns), 447, 534),
+        (PAPERS_PUMA, 315, 422),
     ):
-        found = counts(puma, kept)
-        assert found[0] <= inverse
-        assert found[1] <= direct
+        assert list(counts(puma, kept)) == expected
 
 
 def test_operations_of_the_hexaglide(hexaglide):
-    for kept, inverse, direct in (
-        (np.flatnonzero(hexaglide.affecting), 560, 520),
-        (np.sort(hexaglide.base.columns), 540, 500),
-        (PAPERS_HEXAGLIDE, 225, 205),
-        (FEW_OPERATIONS, 150, 140),
+    for kept, *expected in (
+        (np.flatnonzero(hexaglide.affecting), 545, 462),
+        (np.sort(hexaglide.base.columns), 521, 438),
+        (PAPERS_HEXAGLIDE, 217, 177),
+        (FEW_OPERATIONS, 144, 112),
     ):
-        found = counts(hexaglide, kept)
-        assert found[0] <= inverse
-        assert found[1] <= direct
+        assert list(counts(hexaglide, kept)) == expected
 
 
 def test_any_subset_of_a_formulation_is_the_reduced_model(puma):
@@ -216,11 +166,13 @@ def test_a_wrong_formulation_is_an_error(puma, monkeypatch):
 def test_tied_and_known_parameters_take_less(puma):
     kept = np.flatnonzero(puma.affecting)
     lean = LeanModels(puma.mechanism, puma.formulations)
-    whole = lean.inverse(kept).n_operations
-    same = {int(k): int(kept[5]) for k in kept[20:30]}
-    assert lean.inverse(kept, same=same).n_operations <= whole
-    values = {int(k): float(k) / 7 for k in kept}
-    assert lean.inverse(kept, constants=values).n_operations < whole
+    reduced = whole(puma.mechanism, kept, kept / 7)
+    count = lean.inverse(reduced).n_operations
+    position = reduced.position.copy()
+    position[kept[20:30]] = position[kept[5]]
+    tied = dataclasses.replace(reduced, position=position)
+    assert lean.inverse(tied).n_operations <= count
+    assert lean.inverse(reduced, constant=True).n_operations < count
 
 
 def test_estimates_are_near_the_counts(puma):
@@ -228,28 +180,29 @@ def test_estimates_are_near_the_counts(puma):
     lean = LeanModels(puma.mechanism, puma.formulations)
     for n in (6, 12, 18, 30, 45):
         kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
-        count = lean.inverse(kept).n_operations
+        count = lean.inverse(whole(puma.mechanism, kept)).n_operations
         assert count <= lean.estimate(kept) <= 1.1 * count + 10
 
 
 @pytest.mark.parametrize("seed", [1, 5])
 def test_lean_models_never_take_more_than_plain_recursion(seed):
     mechanism = random_tree(seed)
-    default = tuple(to_data(Choice()) for _ in range(mechanism.n_q))
+    default = tuple(to_data(JointFormulation()) for _ in range(mechanism.n_q))
     lean = LeanModels(mechanism, Formulations((default,), (default,)))
     plain = Dynamics(mechanism, once=True)
     rng = np.random.default_rng(seed)
     for n in (1, 3, 8, 20):
-        kept = np.sort(rng.choice(len(mechanism.parameter_names), n, replace=False))
-        inverse, direct = plain.count_operations(kept)
-        assert lean.inverse(kept).n_operations <= inverse
-        assert lean.direct(kept).n_operations <= direct
+        kept = np.sort(rng.choice(mechanism.n_parameters, n, replace=False))
+        reduced = whole(mechanism, kept)
+        inverse, direct = plain.count_operations(reduced)
+        assert lean.inverse(reduced).n_operations <= inverse
+        assert lean.direct(reduced).n_operations <= direct
 
 
 @pytest.mark.parametrize("name", ["standard", "tree"])
 def test_lean_models_take_less_than_textbooks(name):
     mechanism = MECHANISMS[name]()
-    everything = np.arange(len(mechanism.parameter_names))
+    everything = np.arange(mechanism.n_parameters)
     dynamics = Dynamics(mechanism, once=True)
     rng = np.random.default_rng(0)
     K = dynamics.regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
@@ -258,8 +211,8 @@ def test_lean_models_take_less_than_textbooks(name):
     found = formulations(mechanism, affecting, kept)
     lean = LeanModels(mechanism, found)
     inverse, direct = textbook.count(mechanism, kept)
-    assert lean.inverse(kept).n_operations <= 0.85 * inverse
-    assert lean.direct(kept).n_operations <= 0.6 * direct
+    assert lean.inverse(whole(mechanism, kept)).n_operations <= 0.85 * inverse
+    assert lean.direct(whole(mechanism, kept)).n_operations <= 0.6 * direct
 
 
 def test_equal_branches_get_equal_choices(hexaglide):
@@ -287,7 +240,7 @@ def test_the_textbook_oracle_is_the_same_dynamics(name):
     n = mechanism.n_q
     rng = np.random.default_rng(0)
     q, dq, ddq = rng.normal(size=(3, n))
-    phi = rng.normal(size=len(mechanism.parameter_names))
+    phi = rng.normal(size=mechanism.n_parameters)
     symbols = [ca.SX.sym("x", len(x)) for x in (q, dq, ddq, phi)]
     found = ca.Function("d", symbols, [textbook.torques(mechanism, *symbols, mechanism.gravity)])
     expected = Dynamics(mechanism, once=True).inverse(q[None], dq[None], ddq[None], phi)[0]
@@ -296,8 +249,8 @@ def test_the_textbook_oracle_is_the_same_dynamics(name):
 
 def test_formulations_of_nothing_chosen_still_count():
     mechanism = random_tree(3)
-    default = tuple(to_data(Choice()) for _ in range(mechanism.n_q))
+    default = tuple(to_data(JointFormulation()) for _ in range(mechanism.n_q))
     lean = LeanModels(mechanism, Formulations((default,), (default,)))
-    kept = np.arange(len(mechanism.parameter_names))
-    assert lean.inverse(kept).n_operations > 0
-    assert lean.inverse(kept[:0]).n_operations == 0
+    kept = np.arange(mechanism.n_parameters)
+    assert lean.inverse(whole(mechanism, kept)).n_operations > 0
+    assert lean.inverse(whole(mechanism, kept[:0])).n_operations == 0

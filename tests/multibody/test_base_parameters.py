@@ -4,11 +4,7 @@ from conftest import branching_tree, puma_mechanism, random_states
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramreduce_cli.multibody.base_parameters import (
-    affecting_columns,
-    base_parameters,
-    preference_order,
-)
+from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 
 
@@ -21,7 +17,7 @@ def test_puma_has_49_affecting_and_khalils_36_base_parameters():
     mechanism = puma_mechanism()
     names = mechanism.parameter_names
     W = observation(mechanism)
-    base = base_parameters(W, preference_order(names), 1e-9)
+    base = base_parameters(W, mechanism.preference_order, 1e-9)
     khalil = {"Izz_1"} | {
         f"{kind}_{body}"
         for kind in ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "mx", "my")
@@ -42,7 +38,7 @@ def test_rank_is_that_of_a_singular_value_decomposition():
 
 def test_beta_reproduces_all_columns(mechanism):
     W = observation(mechanism)
-    base = base_parameters(W, preference_order(mechanism.parameter_names), 1e-9)
+    base = base_parameters(W, mechanism.preference_order, 1e-9)
     others = np.setdiff1d(np.arange(W.shape[1]), base.columns)
     assert base.beta.shape == (base.columns.size, others.size)
     assert np.abs(W[:, others] - W[:, base.columns] @ base.beta).max() < 1e-11 * np.abs(W).max()

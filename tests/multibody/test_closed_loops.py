@@ -4,21 +4,21 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import CLOSED_LOOPS, CONFIGS
+from conftest import CLOSED_LOOPS, CONFIGS, config_of, constraints_of, model_of
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.multibody.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.follower import Follower
 from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.records import Constraint
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.description import described_constraints, described_mechanism
 
 REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8}
 """Amplitudes of independent coordinates about the assembly, rad or m, that all loops survive."""
@@ -27,9 +27,9 @@ REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8}
 @pytest.fixture(scope="module", params=CLOSED_LOOPS)
 def case(request):
     config = load_config(CONFIGS / f"{request.param}.yaml")
-    mechanism = described_mechanism(config)
+    mechanism = assembled(config.mechanism())
     rng = np.random.default_rng(3)
-    phi = config.standard_parameters() + rng.normal(size=len(mechanism.parameter_names)) * 1e-2
+    phi = config.parameter_values() + rng.normal(size=mechanism.n_parameters) * 1e-2
     return config, mechanism, Lagrange(mechanism), phi
 
 
@@ -116,18 +116,18 @@ def test_base_count_is_the_rank_of_the_oracles_observation_matrix(case):
     live = lengths > 1e-10 * lengths.max()
     singular = np.linalg.svd(W[:, live] / lengths[live], compute_uv=False)
     rank = int(np.sum(singular > 1e-9 * singular[0]))
-    model = build_model(config)
+    model = build_model(config, config.model)
     assert (model.affecting.sum(), model.base.columns.size) == (live.sum(), rank)
 
 
 def test_counts_of_the_six_legged_robot():
-    model = build_model(load_config(CONFIGS / "hexaglide.yaml"))
+    model = model_of("hexaglide")
     assert (model.values.size, model.affecting.sum(), model.base.columns.size) == (70, 70, 64)
 
 
 def test_a_point_mass_at_a_spherical_joint_may_belong_to_either_body():
     """The six null vectors: a unit mass at the end of a bar, taken from the platform."""
-    mechanism = described_mechanism(load_config(CONFIGS / "hexaglide.yaml"))
+    mechanism = assembled(config_of("hexaglide").mechanism())
     K = Dynamics(mechanism).regressor(*states_of(mechanism, 40))
     W = K.reshape(-1, 70)
     W = W / np.linalg.norm(W, axis=0).max()
@@ -146,7 +146,7 @@ def test_a_point_mass_at_a_spherical_joint_may_belong_to_either_body():
 
 @pytest.mark.parametrize("name", CLOSED_LOOPS)
 def test_adjoint_of_observations_through_the_position_problem(name):
-    mechanism = described_mechanism(load_config(CONFIGS / f"{name}.yaml"))
+    mechanism = assembled(config_of(name).mechanism())
     observation = Dynamics(mechanism).observation(np.arange(3, 8))
     coordinates = Coordinates(mechanism)
     q, dq, ddq = states_of(mechanism, 6)
@@ -182,7 +182,7 @@ QUANTITIES = [
 
 
 def test_quantities_by_their_definitions_and_their_derivatives():
-    mechanism = described_mechanism(load_config(CONFIGS / "five_bar.yaml"))
+    mechanism = assembled(config_of("five_bar").mechanism())
     quantities = Quantities(mechanism, QUANTITIES)
     q, _, _ = states_of(mechanism, 5)
     values = quantities.values(q)
@@ -211,7 +211,7 @@ def test_quantities_by_their_definitions_and_their_derivatives():
 
 
 def test_distance_to_singularity_is_zero_where_far_links_line_up():
-    mechanism = described_mechanism(load_config(CONFIGS / "five_bar.yaml"))
+    mechanism = assembled(config_of("five_bar").mechanism())
     # Elbows so far apart that both far links lie on one line.
     half = np.arccos((0.45 - 0.15) / 0.35)
     q = np.array([np.pi - half, half - np.pi, half, -half])
@@ -220,7 +220,7 @@ def test_distance_to_singularity_is_zero_where_far_links_line_up():
 
 
 def test_a_turning_crank_stays_on_its_assembly_mode():
-    mechanism = described_mechanism(load_config(CONFIGS / "four_bar.yaml"))
+    mechanism = assembled(config_of("four_bar").mechanism())
     coordinates = Coordinates(mechanism)
     time = np.linspace(0, 4 * np.pi, 400)
     z = (mechanism.loops.assembly[0] + time)[:, None]
@@ -232,7 +232,7 @@ def test_a_turning_crank_stays_on_its_assembly_mode():
 
 def test_a_rocker_driven_over_its_dead_point_is_refused():
     config = load_config(CONFIGS / "four_bar.yaml")
-    mechanism = described_mechanism(config)
+    mechanism = assembled(config.mechanism())
     driven = dataclasses.replace(mechanism.loops, independent=(2,))
     mechanism = dataclasses.replace(mechanism, loops=driven)
     z = np.linspace(mechanism.loops.assembly[2], mechanism.loops.assembly[2] + 2.0, 50)
@@ -241,7 +241,7 @@ def test_a_rocker_driven_over_its_dead_point_is_refused():
 
 
 def test_follower_finds_what_a_fresh_start_finds():
-    mechanism = described_mechanism(load_config(CONFIGS / "hexaglide.yaml"))
+    mechanism = assembled(config_of("hexaglide").mechanism())
     coordinates = Coordinates(mechanism)
     follower = Follower(coordinates)
     basis = fourier_basis(2 * np.pi, 2, sample_times(2 * np.pi, 40))
@@ -257,8 +257,8 @@ def test_follower_finds_what_a_fresh_start_finds():
 
 def test_constraints_of_the_six_legged_robot_at_home():
     config = load_config(CONFIGS / "hexaglide.yaml")
-    mechanism = described_mechanism(config)
-    constraints = described_constraints(config, mechanism)
+    mechanism = assembled(config.mechanism())
+    constraints = constraints_of(config, mechanism)
     values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
     assert values[0] == pytest.approx(0, abs=1e-9)
     assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)

@@ -13,5 +13,5 @@ def test_poses_agree_with_pinocchio(mechanism):
         pin.forwardKinematics(model, data, z + offsets)
         found = body_poses(mechanism, z)
         for k, body in enumerate(mechanism.bodies):
-            expected = data.oMi[k + 1].homogeneous @ body.after
+            expected = data.oMi[k + 1].homogeneous @ body.joint_to_body
             assert np.allclose(found[k], expected, atol=1e-13)

@@ -1,11 +1,7 @@
 import numpy as np
 import pytest
 
-from paramreduce_cli.multibody.observation import (
-    combined_factor,
-    joint_factors,
-    standard_deviation,
-)
+from paramreduce_cli.multibody.observation import combined_factor, joint_factors, standard_deviation
 from paramreduce_cli.records import Block
 
 

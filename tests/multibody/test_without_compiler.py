@@ -15,12 +15,12 @@ import numpy as np
 from pathlib import Path
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.multibody.coordinates import Coordinates
+from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.stages.description import described_mechanism
 warnings.simplefilter("ignore", ParamreduceWarning)
-mechanism = described_mechanism(load_config(Path(sys.argv[1])))
+mechanism = assembled(load_config(Path(sys.argv[1])).mechanism())
 q, dq, ddq = random_states(mechanism, 5, np.random.default_rng(0))
 print(repr(Dynamics(mechanism).regressor(q, dq, ddq).ravel().tolist()))
 lined_up = np.zeros((3, mechanism.n_q))  # both far links along one line

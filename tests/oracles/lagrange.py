@@ -6,6 +6,8 @@ Loops are closed with Lagrange multipliers; nothing here knows of projections.
 import casadi as ca
 import numpy as np
 
+from paramreduce_cli.records import INERTIAL
+
 
 class Lagrange:
     """Energies, equations of motion and closure equations of a mechanism as CasADi functions."""
@@ -13,13 +15,15 @@ class Lagrange:
     def __init__(self, mechanism):
         n = mechanism.n_q
         q, dq, ddq = (ca.MX.sym(name, n) for name in ("q", "dq", "ddq"))
-        phi = ca.MX.sym("phi", len(mechanism.parameter_names))
+        phi = ca.MX.sym("phi", mechanism.n_parameters)
         poses = _poses(mechanism, q)
         kinetic, potential = 0, 0
-        for order, k in enumerate(mechanism.inertial):
-            own_kinetic, own_potential = _energies(
-                poses[k], q, dq, phi[10 * order : 10 * order + 10], mechanism.gravity
-            )
+        for k in range(n):
+            columns = mechanism.columns(k)
+            if not columns:
+                continue
+            own = ca.vertcat(*(phi[columns[kind]] for kind in INERTIAL))
+            own_kinetic, own_potential = _energies(poses[k], q, dq, own, mechanism.gravity)
             kinetic, potential = kinetic + own_kinetic, potential + own_potential
         momentum = ca.gradient(kinetic, dq)
         rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)
@@ -53,7 +57,7 @@ def _poses(mechanism, q):
             ca.horzcat(c, -s, 0, 0), ca.horzcat(s, c, 0, 0), ca.horzcat(0, 0, 1, slide),
             ca.horzcat(0, 0, 0, 1),
         )  # fmt: skip
-        local = ca.mtimes([ca.DM(body.before), motion, ca.DM(body.after)])
+        local = ca.mtimes([ca.DM(body.parent_to_joint), motion, ca.DM(body.joint_to_body)])
         poses.append(local if body.parent < 0 else ca.mtimes(poses[body.parent], local))
     return poses
 

@@ -13,15 +13,15 @@ def build(mechanism, phi):
     joints = []
     for k, body in enumerate(mechanism.bodies):
         parent = 0 if body.parent == BASE else joints[body.parent]
-        above = np.eye(4) if body.parent == BASE else mechanism.bodies[body.parent].after
+        above = np.eye(4) if body.parent == BASE else mechanism.bodies[body.parent].joint_to_body
         joint = pin.JointModelRZ() if body.joint == "revolute" else pin.JointModelPZ()
-        placement = pin.SE3(above @ body.before)
+        placement = pin.SE3(above @ body.parent_to_joint)
         joints.append(model.addJoint(parent, joint, placement, body.name))
         m, mx, my, mz, xx, xy, xz, yy, yz, zz = phi[10 * k : 10 * k + 10]
         inertia = pin.Inertia.FromDynamicParameters(
             np.array([m, mx, my, mz, xx, xy, yy, xz, yz, zz])
         )
-        model.appendBodyToJoint(joints[-1], inertia, pin.SE3(body.after))
+        model.appendBodyToJoint(joints[-1], inertia, pin.SE3(body.joint_to_body))
     offsets = np.array([body.offset for body in mechanism.bodies])
     return model, offsets
 

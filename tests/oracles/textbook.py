@@ -7,10 +7,7 @@ column from it, with common subexpressions found afterwards and nothing else don
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.records import BASE, PARAMETER_KINDS
-
-WIDTH = len(PARAMETER_KINDS)
+from paramreduce_cli.records import BASE, INERTIAL
 
 
 def _cleaned(matrix):
@@ -19,8 +16,8 @@ def _cleaned(matrix):
     return np.where(np.abs(matrix - nearest) < 1e-12, nearest, matrix)
 
 
-def _inertia(phi, position):
-    m, mx, my, mz, xx, xy, xz, yy, yz, zz = (phi[WIDTH * position + k] for k in range(WIDTH))
+def _inertia(phi, columns):
+    m, mx, my, mz, xx, xy, xz, yy, yz, zz = (phi[columns[kind]] for kind in INERTIAL)
     tensor = ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
     return m, ca.vertcat(mx, my, mz), tensor
 
@@ -28,10 +25,9 @@ def _inertia(phi, position):
 def torques(mechanism, q, dq, ddq, phi, gravity):
     """Joint torques of a tree; all arguments are expressions or numbers."""
     n = mechanism.n_q
-    order = {body: k for k, body in enumerate(mechanism.inertial)}
     rotations, origins, axes, omega, rate, acceleration = [], [], [], [], [], []
     for i, body in enumerate(mechanism.bodies):
-        before, after = _cleaned(body.before), _cleaned(body.after)
+        before, after = _cleaned(body.parent_to_joint), _cleaned(body.joint_to_body)
         value = q[i] + body.offset if body.offset else q[i]
         revolute = body.joint == "revolute"
         c, s = (ca.cos(value), ca.sin(value)) if revolute else (ca.SX(1), ca.SX(0))
@@ -60,10 +56,11 @@ def torques(mechanism, q, dq, ddq, phi, gravity):
         omega.append(own_w), rate.append(own_dw), acceleration.append(own_a)
     forces, moments = [], []
     for i in range(n):
-        if i not in order:
+        columns = mechanism.columns(i)
+        if not columns:
             forces.append(ca.SX(3, 1)), moments.append(ca.SX(3, 1))
             continue
-        m, d, tensor = _inertia(phi, order[i])
+        m, d, tensor = _inertia(phi, columns)
         w, dw, a = omega[i], rate[i], acceleration[i]
         forces.append(m * a + ca.cross(dw, d) + ca.cross(w, ca.cross(w, d)))
         moments.append(tensor @ dw + ca.cross(w, tensor @ w) + ca.cross(d, a))
@@ -89,13 +86,23 @@ def count(mechanism, kept):
     """Operations of IDM and [M | delta] with some parameters, the others zero."""
     n = mechanism.n_q
     q, dq, ddq = (ca.SX.sym(s, n) for s in ("q", "dq", "ddq"))
-    phi = ca.SX.sym("phi", len(mechanism.parameter_names))
+    phi = ca.SX.sym("phi", mechanism.n_parameters)
     tau = torques(mechanism, q, dq, ddq, phi, mechanism.gravity)
     still = np.zeros(n)
     columns = [torques(mechanism, q, still, np.eye(n)[k], phi, np.zeros(3)) for k in range(n)]
     lower = [columns[j][i] for i in range(n) for j in range(i + 1)]
     delta = torques(mechanism, q, dq, still, phi, mechanism.gravity)
-    dropped = sorted(set(range(phi.numel())) - {int(k) for k in kept})
-    inverse = ca.Function("d", [phi, q, dq, ddq], [tau])
-    direct = ca.Function("m", [phi, q, dq], [ca.vertcat(*lower, delta)])
-    return tuple(Program.of_function(f).count(dropped) for f in (inverse, direct))
+    dropped = np.setdiff1d(np.arange(phi.numel()), kept).tolist()
+    values = [ca.SX(0) if k in dropped else phi[k] for k in range(phi.numel())]
+    outputs = ca.substitute([tau, ca.vertcat(*lower, delta)], [phi], [ca.vertcat(*values)])
+    inputs = [q, dq, ddq, phi]
+    return tuple(_operations(ca.Function("f", inputs, ca.cse([output]))) for output in outputs)
+
+
+_FREE = {ca.OP_INPUT, ca.OP_OUTPUT, ca.OP_CONST, ca.OP_NEG}
+
+
+def _operations(function):
+    """Instructions of CasADi's virtual machine that calculate; changes of sign are free."""
+    found = (function.instruction_id(k) for k in range(function.n_instructions()))
+    return sum(operation not in _FREE for operation in found)

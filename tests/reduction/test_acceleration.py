@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from conftest import branching_tree, random_states
 
+from paramreduce_cli.judgement.acceleration import acceleration_errors
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block
-from paramreduce_cli.reduction.acceleration import acceleration_errors
 
 
 def setup(seed=0):

@@ -5,7 +5,7 @@ import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import Effort, found, problem
 
-from paramreduce_cli.reduction.branch_and_bound import Search, unit_problem
+from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
 
 KINDS = ("generic", "sparse", "proportional", "dependent", "near-dependent", "nearly-parallel")
 

@@ -9,15 +9,13 @@ from conftest import puma_mechanism, random_states, standard_arm
 from oracles.selection import error_by_definition
 from selecting import problem
 
-from paramreduce_cli import registry
 from paramreduce_cli.multibody.base_parameters import affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.reduction.acceleration_objective import (
-    AccelerationData,
-    AccelerationObjective,
-)
-from paramreduce_cli.reduction.operations_objective import OperationsObjective
-from paramreduce_cli.reduction.task import Task
+from paramreduce_cli.reduction.criteria.acceleration import AccelerationObjective
+from paramreduce_cli.reduction.criteria.operations import OperationsObjective
+from paramreduce_cli.reduction.heuristics import heuristics
+from paramreduce_cli.reduction.inputs import AccelerationData
+from paramreduce_cli.reduction.task import SelectionTask
 
 
 class Case:
@@ -49,7 +47,8 @@ class Case:
         )
 
     def cost(self, kept):
-        return self.dynamics.count_operations(kept, direct=False)[0]
+        dropped = np.setdiff1d(np.arange(self.dynamics.n_parameters), kept)
+        return self.dynamics.programs[0].count(dropped.tolist())
 
 
 @pytest.fixture(scope="module")
@@ -59,7 +58,7 @@ def arm():
 
 def test_the_fit_minimises_the_exact_acceleration_error(arm):
     objective = AccelerationObjective(arm.problem, arm.data(), arm.data())
-    torque = registry.heuristic["swap"](Task(objective.cheap)).subsets
+    torque = heuristics["swap"](SelectionTask(objective.cheap)).subsets
     subset = next(s for s in torque if s.size == 12)
     fitted = objective.fit(subset).parameters
     error = arm.acceleration_error(subset, fitted)
@@ -73,8 +72,8 @@ def test_the_fit_minimises_the_exact_acceleration_error(arm):
 
 def test_accelerations_choose_better_subsets_than_torques(arm):
     objective = AccelerationObjective(arm.problem, arm.data(), arm.data())
-    own = {s.size: s for s in registry.heuristic["swap"](Task(objective, 12)).subsets}
-    torque = {s.size: s for s in registry.heuristic["swap"](Task(objective.cheap, 12)).subsets}
+    own = {s.size: s for s in heuristics["swap"](SelectionTask(objective, 12)).subsets}
+    torque = {s.size: s for s in heuristics["swap"](SelectionTask(objective.cheap, 12)).subsets}
     better = 0
     for n in range(8, 13):
         one, two = (objective.score(objective.units_of(s[n])) for s in (own, torque))
@@ -86,7 +85,7 @@ def test_accelerations_choose_better_subsets_than_torques(arm):
 @pytest.mark.parametrize("name", ["forward-selection", "floating", "backward-elimination"])
 def test_other_heuristics_run_by_acceleration(arm, name):
     objective = AccelerationObjective(arm.problem, arm.data(), arm.data())
-    found = registry.heuristic[name](Task(objective)).subsets
+    found = heuristics[name](SelectionTask(objective)).subsets
     assert [s.size for s in found] == list(range(1, arm.problem.candidates.size + 1))
     assert all(np.unique(s).size == s.size for s in found)
     exact = next(s for s in found if objective.score(objective.units_of(s)) < 1e-6)
@@ -120,7 +119,7 @@ def test_the_fewest_operations_under_a_limit_are_those_of_exhaustive_search(limi
     objective = OperationsObjective(p, case.cost, limit)
     kept = [
         s
-        for s in registry.heuristic["swap"](Task(objective)).subsets
+        for s in heuristics["swap"](SelectionTask(objective)).subsets
         if error_by_definition(W, chi, s) <= limit
     ]
     assert min(case.cost(np.sort(s)) for s in kept) <= best * 1.05  # a local search proves nothing
@@ -129,7 +128,7 @@ def test_the_fewest_operations_under_a_limit_are_those_of_exhaustive_search(limi
 @pytest.mark.parametrize("name", ["forward-selection", "floating", "backward-elimination"])
 def test_other_heuristics_run_by_operations(arm, name):
     objective = OperationsObjective(arm.problem, arm.cost, 0.02)
-    found = registry.heuristic[name](Task(objective)).subsets
+    found = heuristics[name](SelectionTask(objective)).subsets
     assert all(np.unique(s).size == s.size for s in found)
     within = [s for s in found if error_by_definition(arm.problem.W, arm.problem.chi, s) <= 0.02]
     assert within

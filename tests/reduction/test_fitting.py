@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
 
+from paramreduce_cli.judgement.torque import torque_errors
 from paramreduce_cli.records import Block
-from paramreduce_cli.reduction.fitting import fit, torque_errors
+from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 

@@ -7,9 +7,9 @@ import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import found, order, problem, subsets
 
-from paramreduce_cli import registry
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.grouping import Group, grouped_columns
+from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 GROUPS = ([0, 3, 5], [1, 7])
@@ -25,7 +25,7 @@ def sizes_between_units(name, p):
     return [subset.size for subset in found(name, p).subsets]
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 @pytest.mark.parametrize("seed", range(4))
 def test_groups_stay_together(name, seed):
     p = grouped_problem(seed)
@@ -39,7 +39,7 @@ def test_groups_stay_together(name, seed):
 @pytest.mark.parametrize("seed", range(6))
 def test_the_best_subset_of_groups_is_that_of_exhaustive_search(seed):
     p = grouped_problem(seed, rank=12)
-    best = all_best_errors(p.W, p.chi, [u.tolist() for u in p.units()])
+    best = all_best_errors(p.W, p.chi, [u.tolist() for u in p.units])
     proofs = found("best-subset", p).proofs
     assert set(proofs.status) == {"optimal"}
     for n, subset in zip(proofs.n, proofs.subsets, strict=True):
@@ -61,7 +61,7 @@ def test_each_forward_step_explains_most_per_parameter(seed):
         before = squared(taken_order[:n])
         gains = {
             tuple(unit): (before - squared([*taken_order[:n], *unit])) / len(unit)
-            for unit in map(tuple, p.units())
+            for unit in map(tuple, p.units)
             if unit[0] not in taken_order[:n]
         }
         taken = (before - squared(taken_order[:after])) / (after - n)
@@ -79,7 +79,7 @@ def test_each_backward_step_loses_least_per_parameter(seed):
         kept = taken_order[:after].tolist()
         now = error_by_definition(p.W, p.chi, kept) ** 2
         losses = []
-        for unit in map(tuple, p.units()):
+        for unit in map(tuple, p.units):
             if unit[0] in kept:
                 rest = [k for k in kept if k not in unit]
                 squared = error_by_definition(p.W, p.chi, rest) ** 2 if rest else 1.0
@@ -92,9 +92,11 @@ def test_a_tied_group_is_one_column_with_one_value():
     names = ("m_1", "m_2", "mx_1", "mx_2", "m_3")
     tied = Group("m_all", ("m_1", "m_2", "m_3"), tied=True)
     loose = Group("mx_all", ("mx_1", "mx_2"), tied=False)
-    columns = grouped_columns(names, [tied, loose])
+    grouped = grouped_columns(names, np.array([9, 9, 5, 5, 9]), [tied, loose])
+    columns = grouped.columns
     assert columns.names == ("m_all", "mx_1", "mx_2")
-    assert [g.tolist() for g in columns.groups] == [[1, 2]]
+    assert [g.tolist() for g in grouped.groups] == [[1, 2]]
+    assert grouped.preference.tolist() == [1, 2, 0]
     assert (columns.expansion @ [2.0, 3.0, 4.0]).tolist() == [2, 2, 3, 4, 2]
     rng = np.random.default_rng(0)
     W, chi = rng.normal(size=(30, 5)), rng.normal(size=30)

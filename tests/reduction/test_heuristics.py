@@ -12,8 +12,8 @@ from oracles.selection import (
 )
 from selecting import Effort, order, problem, subsets
 
-from paramreduce_cli import registry
 from paramreduce_cli.reduction.fitting import fit
+from paramreduce_cli.reduction.heuristics import heuristics
 
 
 def dependent_problem(seed, rows=60, rank=8, columns=12, **changes):
@@ -23,7 +23,7 @@ def dependent_problem(seed, rows=60, rank=8, columns=12, **changes):
     return problem(W, W @ rng.normal(size=columns), **changes)
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 @pytest.mark.parametrize("seed", range(3))
 def test_every_heuristic_finds_a_subset_of_every_size(name, seed):
     p = dependent_problem(seed)
@@ -32,14 +32,14 @@ def test_every_heuristic_finds_a_subset_of_every_size(name, seed):
     assert all(len(set(s)) == n and set(s) <= set(range(12)) for n, s in found.items())
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 @pytest.mark.parametrize("seed", range(3))
 def test_full_precision_at_the_rank(name, seed):
     p = dependent_problem(seed)
     assert error_by_definition(p.W, p.chi, subsets(name, p)[8]) < 1e-12
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 def test_candidates_alone_are_chosen(name):
     whole = dependent_problem(0)
     p = problem(whole.W, whole.chi, candidates=[1, 4, 7])
@@ -48,7 +48,7 @@ def test_candidates_alone_are_chosen(name):
     assert set(found[3]) == {1, 4, 7}
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 @pytest.mark.parametrize("factor", [2.0**-20, 2.0**20])  # no rounding
 def test_units_of_the_torques_do_not_matter(name, factor):
     p = dependent_problem(1)
@@ -57,7 +57,7 @@ def test_units_of_the_torques_do_not_matter(name, factor):
     assert all(set(one[n]) == set(two[n]) for n in range(1, 8))
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 def test_sizes_are_limited(name):
     assert max(subsets(name, dependent_problem(2), largest=5)) == 5
 
@@ -146,7 +146,7 @@ def test_each_qr_step_takes_the_most_independent_column(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 def test_no_subset_beats_exhaustive_search_and_some_equal_it(name, seed):
     p = dependent_problem(seed, rank=7, columns=7)
     found = subsets(name, p)
@@ -166,14 +166,14 @@ def twins(preference):
     return problem(W, free @ [3.0, 2.0, 1.0], preference=preference)
 
 
-@pytest.mark.parametrize("name", list(registry.heuristic))
+@pytest.mark.parametrize("name", list(heuristics))
 def test_ties_go_to_the_preferred_column(name):
     for preference, winners in (([0, 1, 2, 3, 4], {0, 2, 4}), ([1, 3, 4, 0, 2], {1, 3, 4})):
         assert set(subsets(name, twins(preference))[3]) == winners
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 10_000), st.integers(2, 9), st.sampled_from(list(registry.heuristic)))
+@given(st.integers(0, 10_000), st.integers(2, 9), st.sampled_from(list(heuristics)))
 def test_errors_never_rise_with_n(seed, columns, name):
     p = dependent_problem(seed, rows=20, rank=max(1, columns - 2), columns=columns)
     errors = [fit(p, np.array(s)).torque_error for s in subsets(name, p).values()]

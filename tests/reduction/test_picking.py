@@ -5,14 +5,14 @@ import dataclasses
 import numpy as np
 import pytest
 
-from paramreduce_cli.records import HeuristicValidation, Proofs
-from paramreduce_cli.reduction.picking import (
+from paramreduce_cli.judgement.picking import (
     best_of_size,
     nearest_to,
     pareto_front,
     proven_necessary,
     smallest_within,
 )
+from paramreduce_cli.records import HeuristicValidation, ModelChoice, Proofs
 
 
 def judged(n, torque, torque_validation=None, acceleration=None, inverse=None, direct=None):
@@ -106,11 +106,11 @@ def test_the_front_is_what_nothing_beats(seed):
             all(x <= y for x, y in zip(two, one, strict=True)) and two != one for two in everything
         )
 
-    front = [values(*choice) for choice in pareto_front(results)]
+    front = [values(m.heuristic, results[m.heuristic].row(m.n)) for m in pareto_front(results)]
     assert len(front) == len(set(front))
     assert set(front) == {one for one in everything if not beaten(one)}
 
 
 def test_round_off_is_no_improvement():
     results = {"a": judged([3, 4], [1e-15, 1e-16], inverse=[30, 40], direct=[30, 40])}
-    assert pareto_front(results) == [("a", 0)]
+    assert pareto_front(results) == (ModelChoice("a", 3),)

@@ -87,6 +87,21 @@ def test_orders_are_compared_up_to_ties(summary):
     assert any("subset" in entry for entry in bad(summary, different))
 
 
+def test_a_search_that_was_cut_short_may_have_found_less(summary):
+    row = next(row for row in summary["validation"]["best-subset"] if row["n"] == 3)
+    proof = next(proof for proof in summary["reduction"]["proofs"] if proof["n"] == 3)
+    assert proof["status"] == "optimal"
+    row["operations"]["direct"] += 1
+    cut_short = copy.deepcopy(summary)
+    row["operations"]["direct"] -= 1
+    assert bad(summary, cut_short)
+    found = next(proof for proof in cut_short["reduction"]["proofs"] if proof["n"] == 3)
+    found |= {"status": "best-found", "torque_error": proof["torque_error"] * 1.1}
+    assert bad(summary, cut_short) == []
+    found["lower_bound"] = proof["torque_error"] * 1.05
+    assert bad(summary, cut_short)  # the bound is above what is known to be possible
+
+
 def test_only_what_is_asked(summary):
     other = changed(summary, ["model", "n_base"], lambda v: v + 1)
     assert bad(summary, other, only=("kappa", "order")) == []

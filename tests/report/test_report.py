@@ -7,8 +7,10 @@ from html.parser import HTMLParser
 import numpy as np
 import pytest
 
-from paramreduce_cli import registry
-from paramreduce_cli.report.tables import Table
+from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.sections import place_of
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.report.tables import tables
 
 PAPER_FIGURES = (
     "trajectory",
@@ -32,13 +34,13 @@ def summary(folder):
 
 @pytest.mark.parametrize("name", [*PAPER_FIGURES, "poses", "mass-matrix-condition"])
 def test_figures_are_there_in_every_format(folder, name):
-    assert name in registry.figure
+    assert name in figures
     assert (folder / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
     assert (folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     ET.fromstring((folder / "figures" / f"{name}.svg").read_text())
 
 
-@pytest.mark.parametrize("name", list(registry.table))
+@pytest.mark.parametrize("name", list(tables))
 def test_tables_are_rectangular(folder, name):
     rows = list(csv.reader(io.StringIO((folder / "tables" / f"{name}.csv").read_text())))
     assert len({len(row) for row in rows}) == 1
@@ -60,6 +62,18 @@ def test_the_page_needs_nothing_else(folder):
     assert len(links.found) == 10
     assert all(link.startswith("data:image/svg+xml;base64,") for link in links.found)
     assert "http" not in page.split("<body>")[1].replace("data:image", "")[:2000]
+
+
+@pytest.mark.parametrize("name", [*figures, *tables])
+def test_everything_has_a_place_on_the_page_and_stands_there(folder, name):
+    place_of(figures[name] if name in figures else tables[name])
+    page = (folder / "index.html").read_text()
+    if name in figures:
+        drawn = (folder / "figures" / f"{name}.svg").exists()
+        assert (f'id="figure-{name}"' in page) == drawn
+    if name in tables:
+        lines = (folder / "tables" / f"{name}.csv").read_text().splitlines()
+        assert (f'id="table-{name}"' in page) == (len(lines) > 1)
 
 
 def test_summary_holds_what_a_regression_job_compares(summary):
@@ -113,11 +127,11 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
 
 def test_latex_escapes_what_latex_would_trip_over():
     table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
-    text = table.to_latex()
+    text = table.to_latex({"m_3": r"m_{\mathrm{3}}"})
     for piece in (
         r"$\kappa$ \& 5 \%",
         r"$m_{\mathrm{3}}$",
-        r"$a_{\mathrm{b}}$",
+        r"a\_b",
         r"50 \%",
         r"$\varepsilon_\tau$",
         r"x\^{}2",

@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from conftest import CONFIGS
 
-from paramreduce_cli.report.tracking import point_to_point, simulate
+from paramreduce_cli.records import Paths, Tracking
+from paramreduce_cli.tracking.control import simulate
+from paramreduce_cli.tracking.paths import point_to_point
 
 INERTIA, WEIGHT = 0.4, 3.0
 
@@ -17,20 +19,33 @@ def model(share=1.0):
     return lambda z, dz, ddz: share * INERTIA * ddz + share * WEIGHT * np.cos(z)
 
 
-def path(period=1e-3, moves=3):
+def path(period=1e-3, moves=3, seeds=range(1, 2)):
     one = np.ones(1)
-    return point_to_point(-one, one, 2 * one, moves, period, seed=1)
+    return point_to_point(-one, one, 2 * one, moves, period, seeds)
 
 
 def test_paths_start_and_end_at_rest_and_keep_to_speeds():
-    made = path()
+    made = path(2.5e-4, seeds=range(3))
     assert np.all(np.abs(made.dz) <= 2 + 1e-9)
     assert np.all(np.abs(made.z) <= 1 + 1e-9)
-    assert made.dz[0] == 0
+    assert np.all(made.dz[0] == 0)
     step = made.time[1] - made.time[0]
-    np.testing.assert_allclose(np.gradient(made.z[:, 0], step)[5:-5], made.dz[5:-5, 0], atol=1e-3)
-    jumps = np.abs(np.diff(made.ddz[:, 0])).max()
-    assert jumps < 0.2 * np.abs(made.ddz).max()
+    for k, n in enumerate(made.samples):
+        z, dz, ddz = (x[:, k, 0] for x in (made.z, made.dz, made.ddz))
+        rate = np.gradient(z[:n], step)
+        np.testing.assert_allclose(rate[5:-5], dz[5 : n - 5], atol=step * np.abs(ddz).max())
+        assert np.abs(np.diff(ddz[:n])).max() < 0.2 * np.abs(ddz).max()
+        assert np.all(dz[n:] == 0)
+        assert np.all(z[n:] == z[n - 1])
+
+
+def test_a_path_does_not_depend_on_those_beside_it():
+    alone, together = path(seeds=range(2, 3)), path(seeds=range(3))
+    n = alone.samples[0]
+    assert together.samples[2] == n
+    np.testing.assert_array_equal(alone.z[:n, 0], together.z[:n, 2])
+    one, many = (simulate(paths, model(0.9), arm, 20.0) for paths in (alone, together))
+    np.testing.assert_allclose(one[:n, 0], many[:n, 2], rtol=1e-12, atol=1e-15)
 
 
 def test_the_right_model_follows_as_well_as_its_period_allows():
@@ -41,14 +56,18 @@ def test_the_right_model_follows_as_well_as_its_period_allows():
 
 def test_a_wrong_model_is_off_by_what_feedback_leaves():
     """At rest w^2 e INERTIA share = (1 - share) WEIGHT cos z."""
-    slow = point_to_point(np.zeros(1), np.full(1, 1e-9), np.ones(1), 1, 1e-3, seed=0)
-    long = type(slow)(
-        np.arange(3000) * 1e-3,
-        *(np.repeat(x[:1], 3000, axis=0) for x in (slow.z, slow.dz, slow.ddz)),
-    )
+    still = np.zeros((3000, 1, 1))
+    long = Paths(np.arange(3000) * 1e-3, np.array([3000]), still, still, still)
     errors = simulate(long, model(0.9), arm, 20.0)
     expected = 0.1 * WEIGHT / (0.9 * INERTIA * 20.0**2)
-    assert errors[-1, 0] == pytest.approx(expected, rel=1e-3)
+    assert errors[-1, 0, 0] == pytest.approx(expected, rel=1e-3)
+
+
+def test_the_error_of_a_path_is_over_its_own_samples():
+    paths = Paths(np.arange(4.0), np.array([2, 4]), *[np.zeros((4, 2, 1))] * 3)
+    errors = np.ones((4, 2, 1))
+    errors[2:, 0] = 100.0
+    assert Tracking(paths, {"m": errors}, {}, "").rms("m").tolist() == [1.0, 1.0]
 
 
 def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):
@@ -62,9 +81,9 @@ def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):
 
 
 def test_without_a_compiler_the_controller_is_interpreted(invoke, two_link_copy, monkeypatch):
-    from paramreduce_cli.stages import tracking
+    from paramreduce_cli.export import running
 
-    monkeypatch.setattr(tracking, "load", lambda *_: None)
+    monkeypatch.setattr(running, "load", lambda *_: None)
     code, _, err = invoke(
         "report", CONFIGS / "two_link.yaml", "--results", two_link_copy, "--force",
         "--set", "report.tracking={moves: 1, control_period: 0.01}", "--set", "report.formats=[svg]",

@@ -1,8 +1,9 @@
 import numpy as np
 import pytest
+from conftest import dh, mechanism_of
 
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.robots.dh import DHRow, mechanism_from_dh, rotation_x, rotation_z
+from paramreduce_cli.robots.frames import rotation_x, rotation_z
 
 
 def transform(axis, angle, along):
@@ -18,8 +19,7 @@ def transform(axis, angle, along):
 @pytest.mark.parametrize("convention", ["modified", "standard"])
 @pytest.mark.parametrize("joint", ["revolute", "prismatic"])
 def test_one_link_is_the_product_of_its_textbook_transforms(convention, joint):
-    row = DHRow("1", None, joint, 0.3, 0.7, 0.2, 0.5)
-    mechanism = mechanism_from_dh("arm", [row], convention, [0, 0, -9.81])
+    mechanism = mechanism_of(dh([("1", None, joint, 0.3, 0.7, 0.2, 0.5)], convention))
     z = 0.4
     theta, d = (0.5 + z, 0.2) if joint == "revolute" else (0.5, 0.2 + z)
     about_x, about_z = transform("x", 0.7, 0.3), transform("z", theta, d)
@@ -35,10 +35,10 @@ def test_right_angles_are_exact():
 
 def test_a_branch_is_placed_on_its_parent():
     rows = [
-        DHRow("trunk", None, "revolute", 0, 0, 0, 0),
-        DHRow("branch", "trunk", "revolute", 0.1, 0.2, 0.3, 0.0, 0.4, 0.5),
+        ("trunk", None, "revolute", 0, 0, 0, 0),
+        ("branch", "trunk", "revolute", 0.1, 0.2, 0.3, 0.0, 0.4, 0.5),
     ]
-    mechanism = mechanism_from_dh("tree", rows, "modified", [0, 0, 0])
+    mechanism = mechanism_of(dh(rows))
     poses = body_poses(mechanism, np.array([0.6, 0.7]))
     expected = (
         transform("z", 0.6, 0) @ transform("z", 0.4, 0.5) @ transform("x", 0.2, 0.1)
@@ -48,6 +48,14 @@ def test_a_branch_is_placed_on_its_parent():
 
 
 def test_table_for_people_shows_angles_as_fractions_of_pi():
-    rows = [DHRow("1", None, "revolute", 0.1, -np.pi / 2, 0, 0)]
-    table = mechanism_from_dh("arm", rows, "modified", [0, 0, 0]).table
+    rows = [("1", None, "revolute", 0.1, -np.pi / 2, 0, 0)]
+    table = mechanism_of(dh(rows)).table
     assert table[1] == ("1", "base", "revolute", "0.1", "-pi/2", "0", "z_1")
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-6, 1e-5, 0.1, np.pi / 2 + 1e-6, np.pi / 3])
+def test_rotations_by_any_angle_are_rotations(angle):
+    """Also by angles whose cosine alone looks like that of a right one."""
+    for rotation in (rotation_x, rotation_z):
+        R = rotation(angle)[:3, :3]
+        assert np.abs(R @ R.T - np.eye(3)).max() < 1e-15

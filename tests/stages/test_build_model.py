@@ -1,13 +1,10 @@
 import pytest
-from conftest import CONFIGS
-
-from paramreduce_cli.config import load_config
-from paramreduce_cli.stages.build_model import build_model
+from conftest import model_of
 
 
 @pytest.fixture(scope="module")
 def puma():
-    return build_model(load_config(CONFIGS / "puma560.yaml"))
+    return model_of("puma560")
 
 
 def test_counts_of_the_puma(puma):
@@ -27,15 +24,13 @@ def test_regrouping_relations_follow_khalil(puma):
 
 
 def test_named_base_columns_come_first():
-    overrides = ["model.base_columns=[Iyy_2, mz_4]"]
-    model = build_model(load_config(CONFIGS / "puma560.yaml", overrides))
+    model = model_of("puma560", "model.base_columns=[Iyy_2, mz_4]")
     names = [model.mechanism.parameter_names[k] for k in model.base.columns]
     assert names[:2] == ["Iyy_2", "mz_4"]
     assert len(names) == 36
 
 
 def test_standard_deviation_as_nominal_torque():
-    config = load_config(CONFIGS / "puma560.yaml", ["nominal_torque=standard-deviation"])
-    model = build_model(config)
+    model = model_of("puma560", "nominal_torque=standard-deviation")
     assert not model.nominal_torque_given
     assert (model.nominal_torque > 0).all()

@@ -1,0 +1,15 @@
+"""The determinant of W'W."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.excitation.criteria import SMALLEST
+from paramreduce_cli.records import FloatArray
+
+
+def d_optimality(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
+    """Minus half the logarithm of det W'W per parameter; smooth as it is."""
+    safe = np.maximum(eigenvalues, SMALLEST)
+    r = eigenvalues.size
+    return -0.5 * float(np.sum(np.log(safe))) / r, -0.5 / (safe * r)

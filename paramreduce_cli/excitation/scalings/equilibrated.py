@@ -1,0 +1,51 @@
+"""Columns and rows of unit size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.excitation.scalings import Pullback
+from paramreduce_cli.records import FloatArray
+
+
+def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
+    """Columns divided by their largest magnitude, then rows by theirs."""
+    columns, pull_columns = _divide_by_largest(W, 0, norm)
+    rows, pull_rows = _divide_by_largest(columns, 1, norm)
+    return rows, lambda bar: pull_columns(pull_rows(bar))
+
+
+def _divide_by_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, Pullback]:
+    size, share = _largest(W, axis, norm)
+    scaled = W / size
+
+    def pull(bar: FloatArray) -> FloatArray:
+        lost = np.sum(bar * scaled, axis=axis, keepdims=True)
+        result: FloatArray = (bar - lost * share) / size
+        return result
+
+    return scaled, pull
+
+
+def _largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:
+    """Largest magnitude along an axis and its derivative by W.
+
+    Smoothly as the norm of the next power of two, whose powers are cheap.
+    """
+    magnitude = np.abs(W)
+    largest = magnitude.max(axis=axis, keepdims=True)
+    largest = np.where(largest > 0, largest, 1.0)
+    if np.isinf(norm):
+        where = np.expand_dims(np.argmax(magnitude, axis=axis), axis)
+        share = np.zeros_like(W)
+        np.put_along_axis(share, where, np.sign(np.take_along_axis(W, where, axis)), axis)
+        return largest, share
+    ratio = W / largest
+    power, odd = ratio * ratio, ratio.copy()
+    doublings = max(1, round(np.log2(norm)))
+    for _ in range(doublings - 1):
+        odd *= power
+        power *= power
+    total = np.maximum(power.sum(axis=axis, keepdims=True), np.finfo(float).tiny)
+    root = total ** (1 / 2**doublings)
+    return largest * root, odd * (root / total)

@@ -1,0 +1,113 @@
+"""Whether exported functions compute what plain recursion does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.lean.checking import TOLERANCE, refuse_if_off
+from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.records import FloatArray, Mechanism, ReducedModel
+
+_GUESS = 0.01
+"""How far off the guesses of the position problem are in the self-test, rad or m."""
+
+
+def random_cases(
+    mechanism: Mechanism, model: ReducedModel, count: int, rng: np.random.Generator
+) -> dict[str, FloatArray]:
+    """Random states with the results of plain recursion, by the names of the functions' arrays.
+
+    Args:
+        mechanism: Of the robot.
+        model: The reduced model.
+        count: Number of states.
+        rng: Where they come from.
+    """
+    q, dq, ddq = random_states(mechanism, count, rng)
+    plain = Dynamics(mechanism, once=True)
+    phi = model.standard
+    expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
+    A, B = plain.direct_regressor(q, dq)
+    K = plain.regressor(q, dq, ddq)
+    result = {
+        "phi": np.tile(model.values, (count, 1)),
+        "q": q,
+        "dq": dq,
+        "ddq": ddq,
+        "tau": K @ phi,
+        "M": A @ phi,
+        "delta": B @ phi,
+        "K": K @ expansion,
+    }
+    if mechanism.loops is None:
+        return result
+    dependent, independent = list(mechanism.dependent), list(mechanism.independent)
+    R = Coordinates(mechanism, once=True).tangent(q)[:, dependent]
+    b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
+    guess = q.copy()
+    guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
+    z = {name: result[name][:, independent] for name in ("q", "dq", "ddq")}
+    loops = {"z": z["q"], "dz": z["dq"], "ddz": z["ddq"], "guess": guess, "R": R, "b": b}
+    return result | loops
+
+
+def check(
+    functions: tuple[Function, ...], stored: Mapping[str, FloatArray], tolerance: float = TOLERANCE
+) -> None:
+    """Compare functions with stored results.
+
+    Args:
+        functions: To be checked.
+        stored: Their arguments and expected results, (n_states, ...) by name.
+        tolerance: Of the largest value of each result.
+
+    Raises:
+        FormulationError: They are not the same.
+    """
+    for function in functions:
+        for name, got in _evaluated(function, stored).items():
+            wanted = stored[name].reshape(got.shape)
+            refuse_if_off(f"{function.name}: {name}", got - wanted, wanted, tolerance)
+
+
+def check_closures(closures: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:
+    """The loops are closed, and their derivatives are those of R and b."""
+    values: dict[str, FloatArray] = {}
+    for function in closures:
+        values |= _evaluated(function, stored)
+    refuse_if_off("closure", values["Phi"], stored["q"], TOLERANCE)
+    along = values["Phi_d"] @ stored["R"]
+    refuse_if_off("closure_jacobian", along + values["Phi_z"], along, TOLERANCE)
+    drift = np.einsum("kij,kj->ki", values["Phi_d"], stored["b"])
+    refuse_if_off("closure_bias", drift - values["gamma"], drift, TOLERANCE)
+
+
+def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
+    """Results of a function for stored arguments, (n_states, ...) by name."""
+    inputs = [
+        column
+        for argument in function.arguments
+        for column in stored[argument.name].reshape(-1, argument.size).T
+    ]
+    values = function.program.evaluated(inputs)
+    count = len(stored["q"])
+    result = {}
+    for array in function.results:
+        own, values = values[: array.size], values[array.size :]
+        columns = [np.broadcast_to(value, count) for value in own]
+        result[array.name] = np.column_stack(columns).reshape(count, *array.shape)
+    return result
+
+
+def doubtful_mass_matrices(M: FloatArray) -> str:
+    """What is wrong with the mass matrices of random states; empty if nothing is."""
+    values = np.linalg.eigvalsh(M)
+    bad = int(np.sum(values[:, 0] <= SINGULAR_MASS * np.abs(values).max()))
+    if not bad:
+        return ""
+    return f"M is singular or not positive definite on {bad} of {len(M)} random states"

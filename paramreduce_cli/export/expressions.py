@@ -1,0 +1,61 @@
+"""Straight-line functions as text: what differs between languages, and what does not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from paramreduce_cli.expressions.functions import Argument, Function
+from paramreduce_cli.expressions.graph import Node
+
+FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2")
+"""That expressions may call."""
+
+
+@dataclass(frozen=True)
+class Language:
+    """How a language writes expressions."""
+
+    calls: Mapping[str, str]
+    """Its names of :data:`FUNCTIONS`."""
+    number: Callable[[float], str]
+    """How a constant is written."""
+    element: Callable[[Argument, int], str]
+    """An element of an array, by its position row by row."""
+
+    def leaves(self, function: Function) -> dict[int, str]:
+        """Texts of constants and inputs, by node."""
+        places = function.places(function.arguments)
+        names = {}
+        for number, node in enumerate(function.program.nodes):
+            if node.operation == "constant":
+                names[number] = self.number(node.number)
+            elif node.operation == "input":
+                names[number] = self.element(*places[int(node.number)])
+        return names
+
+    def expression(self, names: Mapping[int, str], node: Node) -> str:
+        """An operation on what has names."""
+        operation, operands = node.operation, [signed(names, value) for value in node.operands]
+        if operation == "inv":
+            return f"1 / {names[node.operands[0] >> 1]}"
+        if operation in self.calls:
+            return f"{self.calls[operation]}({', '.join(operands)})"
+        a, b = operands
+        if not b.startswith("-"):
+            return f"{a} {operation} {b}"
+        return f"{a} - {b[1:]}" if operation == "+" else f"{a} {operation} ({b})"
+
+    def body(self, function: Function) -> tuple[list[tuple[str, str]], list[str]]:
+        """Names and texts of the operations one after the other, and texts of the results."""
+        names = self.leaves(function)
+        lines = []
+        for number, node in function.steps():
+            lines.append((f"t{number}", self.expression(names, node)))
+            names[number] = f"t{number}"
+        return lines, [signed(names, value) for value in function.program.outputs]
+
+
+def signed(names: Mapping[int, str], value: int) -> str:
+    """A signed reference as text."""
+    return f"-{names[value >> 1]}" if value & 1 else names[value >> 1]

@@ -1,0 +1,239 @@
+"""C99: a header, a source, a self-test and the files that build them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.expressions import FUNCTIONS, Language, signed
+from paramreduce_cli.export.rendering import rendered
+from paramreduce_cli.expressions.functions import Argument, Function
+
+BLOCK = 64
+"""States whose sines and cosines are kept at once in the batched functions."""
+
+
+def c(model: ExportedModel) -> dict[str, bytes]:
+    """C99 without allocation and without globals; single states and batches of them."""
+    writer = _Writer(model)
+    context = writer.context()
+    result = {}
+    for template, name in (
+        ("model.h", f"{model.name}.h"),
+        ("model.c", f"{model.name}.c"),
+        ("test.c", f"{model.name}_test.c"),
+        ("Makefile", "Makefile"),
+        ("CMakeLists.txt", "CMakeLists.txt"),
+    ):
+        text = rendered(template, **context)
+        result[name] = text.encode("ascii", "replace")
+    return result
+
+
+class _Writer:
+    """Texts of a model in C.
+
+    Args:
+        model: The model.
+    """
+
+    def __init__(self, model: ExportedModel) -> None:
+        self._model = model
+        self._suffix = "f" if model.single else ""
+
+    def context(self) -> dict[str, object]:
+        """What the templates use."""
+        model = self._model
+        return {
+            "name": model.name,
+            "guard": f"{model.name.upper()}_H",
+            "about": about(model),
+            "real": "float" if model.single else "double",
+            "f": self._suffix,
+            "block": BLOCK,
+            **model.sides(),
+            "n_phi": 0 if model.constant else len(model.parameters),
+            "loops": bool(model.closures),
+            "values": [self.number(p.value) for p in model.parameters],
+            "signature": self.signature,
+            "batch_signature": self.batch_signature,
+            "batch_arguments": self.batch_arguments,
+            "shifted": self.shifted,
+            "body": self.body,
+            "test_arguments": self.test_arguments,
+            "test_batch_arguments": self.test_batch_arguments,
+            "functions": [self.function(f) for f in model.functions],
+            "closures": [self.function(f) for f in model.closures],
+            "stack": self.stack(),
+            "waves": any(self.batched(f)["angles"] for f in model.functions),
+            "cases": self.cases(),
+            "n_cases": len(next(iter(model.cases.values()))),
+            "tolerance": "1e-3f" if model.single else "1e-12",
+        }
+
+    def number(self, value: float) -> str:
+        """How a number is written, in the precision of the code."""
+        text = repr(float(value))
+        text = text if any(mark in text for mark in ".en") else f"{text}.0"
+        return f"{text}{self._suffix}"
+
+    def function(self, function: Function) -> dict[str, object]:
+        """Texts of a function for one state and for many."""
+        return {
+            "name": function.name,
+            "text": function.text,
+            "arguments": function.arguments,
+            "results": function.results,
+            "operations": function.program.n_operations,
+            "unused": [a.name for a in function.arguments if a.name not in function.used()],
+            "statements": self.statements(function),
+            "batched": self.batched(function),
+        }
+
+    def signature(self, f: Mapping[str, Any]) -> str:
+        """Arguments and results of a function of one state."""
+        type_ = f"{self._model.name}_real"
+        given = [f"const {type_} {a.name}[{a.size}]" for a in f["arguments"]]
+        return ", ".join([*given, *(f"{type_} {a.name}[{a.size}]" for a in f["results"])])
+
+    def batch_signature(self, f: Mapping[str, Any]) -> str:
+        """Of a function of many states."""
+        return f"size_t n, {self._pointers(f, '')}"
+
+    def batch_arguments(self, f: Mapping[str, Any]) -> str:
+        """Of a function of one block of them."""
+        return self._pointers(f, "RESTRICT ")
+
+    def _pointers(self, f: Mapping[str, Any], mark: str) -> str:
+        type_ = f"{self._model.name}_real"
+        given = [
+            f"const {type_} phi[{a.size}]" if a.name == "phi" else f"const {type_} *{mark}{a.name}"
+            for a in f["arguments"]
+        ]
+        return ", ".join([*given, *(f"{type_} *{mark}{a.name}" for a in f["results"])])
+
+    def shifted(self, f: Mapping[str, Any]) -> str:
+        """Arguments of the function of a block that begins at ``start``."""
+        names = [a.name for a in (*f["arguments"], *f["results"])]
+        return ", ".join(name if name == "phi" else f"{name} + start" for name in names)
+
+    def body(self, f: Mapping[str, Any]) -> str:
+        """Of a function of one state."""
+        unused = [f"(void){name};" for name in f["unused"]]
+        return "\n".join(f"  {line}" for line in [*unused, *f["statements"]])
+
+    def test_arguments(self, f: Mapping[str, Any]) -> str:
+        """For state k of the self-test."""
+        given = [f"case_{a.name}[k]" for a in f["arguments"]]
+        return ", ".join([*given, *(f"{a.name}[k]" for a in f["results"])])
+
+    def test_batch_arguments(self, f: Mapping[str, Any]) -> str:
+        """For all states of the self-test."""
+        given = ["case_phi[0]" if a.name == "phi" else f"all_{a.name}" for a in f["arguments"]]
+        return ", ".join([*given, *(f"all_{a.name}" for a in f["results"])])
+
+    def statements(self, function: Function) -> list[str]:
+        """The body, one operation a line."""
+        steps, outputs = self._language(batched=False).body(function)
+        lines = [f"const {self._real} {name} = {text};" for name, text in steps]
+        places = zip(function.places(function.results), outputs, strict=True)
+        return lines + [f"{array.name}[{k}] = {text};" for (array, k), text in places]
+
+    @property
+    def _real(self) -> str:
+        return "float" if self._model.single else "double"
+
+    def _language(self, *, batched: bool) -> Language:
+        """In batches, states are stored coordinate by coordinate."""
+
+        def element(array: Argument, k: int) -> str:
+            column = batched and array.name != "phi"
+            return f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
+
+        calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS}
+        return Language(calls, self.number, element)
+
+    def batched(self, function: Function) -> dict[str, Any]:
+        """The body in parts: what depends on parameters alone, angles, and all the rest."""
+        program = function.program
+        language = self._language(batched=True)
+        names = language.leaves(function)
+        states, angles, needed = _dependence(function)
+        once: list[str] = []
+        before: list[str] = []
+        rest: list[str] = []
+        waves: dict[int, int] = {}
+        for number, node in function.steps():
+            if node.operation in ("sin", "cos") and states[number]:
+                angle = node.operands[0] >> 1
+                row = waves.setdefault(angle, len(waves))
+                names[number] = f"{node.operation}_{row}[k]"
+                continue
+            if number not in needed:
+                continue
+            text = f"const {self._real} t{number} = {language.expression(names, node)};"
+            names[number] = f"t{number}"
+            (rest if states[number] else once).append(text)
+        again = language.leaves(function)
+        for number, node in function.steps():
+            if number in angles:
+                text = f"const {self._real} a{number} = {language.expression(again, node)};"
+                again[number] = f"a{number}"
+                before.append(text)
+        filled = [(row, again[angle]) for angle, row in waves.items()]
+        outputs = list(dict.fromkeys(program.outputs))
+        rest += [f"out[{row}][k] = {signed(names, value)};" for row, value in enumerate(outputs)]
+        places = zip(function.places(function.results), program.outputs, strict=True)
+        return {
+            "once": once,
+            "before": before,
+            "angles": filled,
+            "rest": rest,
+            "outputs": outputs,
+            "copies": [(outputs.index(value), array.name, k) for (array, k), value in places],
+        }
+
+    def stack(self) -> int:
+        """Of the batched functions, kB, at most: block arrays and as much again for temporaries."""
+        arrays = max(
+            3 * len(body["angles"]) + len(body["outputs"])
+            for body in map(self.batched, self._model.functions)
+        )
+        width = 4 if self._model.single else 8
+        return int(np.ceil(2 * arrays * BLOCK * width / 1024))
+
+    def cases(self) -> dict[str, dict[str, object]]:
+        """Stored vectors of the self-test."""
+        return {
+            name: {
+                "size": int(np.prod(values.shape[1:])),
+                "rows": [", ".join(self.number(x) for x in np.ravel(row)) for row in values],
+            }
+            for name, values in self._model.cases.items()
+        }
+
+
+def _dependence(function: Function) -> tuple[list[bool], set[int], set[int]]:
+    """Which nodes depend on the state, which ones the angles are made of, which all the rest."""
+    places = function.places(function.arguments)
+    nodes = function.program.nodes
+    states: list[bool] = []
+    for node in nodes:
+        if node.operation == "input":
+            states.append(places[int(node.number)][0].name != "phi")
+        else:
+            states.append(any(states[value >> 1] for value in node.operands))
+    angles: set[int] = set()
+    needed = {value >> 1 for value in function.program.outputs}
+    for number in range(len(nodes) - 1, -1, -1):
+        below = {value >> 1 for value in nodes[number].operands}
+        if nodes[number].operation in ("sin", "cos") and states[number]:
+            angles |= below
+        else:
+            angles |= below if number in angles else set()
+            needed |= below if number in needed else set()
+    operations = {number for number, _ in function.steps()}
+    return states, angles & operations, needed

@@ -1,0 +1,28 @@
+"""Exported files from the templates that say what is the same in all of them."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import files
+
+import jinja2
+
+
+@cache
+def _environment() -> jinja2.Environment:
+    def load(name: str) -> str:
+        return (files("paramreduce_cli.export") / "templates" / name).read_text(encoding="utf-8")
+
+    return jinja2.Environment(
+        loader=jinja2.FunctionLoader(load),
+        undefined=jinja2.StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=True,
+        autoescape=False,
+    )
+
+
+def rendered(template: str, **context: object) -> str:
+    """A file from its template, by the template's name without ``.jinja``."""
+    return _environment().get_template(f"{template}.jinja").render(context)

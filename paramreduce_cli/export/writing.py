@@ -1,0 +1,133 @@
+"""A reduced model as files in some language, checked before they are written."""
+
+from __future__ import annotations
+
+import warnings
+from enum import StrEnum
+
+import numpy as np
+
+from paramreduce_cli import __version__
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.export.check import check, check_closures, doubtful_mass_matrices, random_cases
+from paramreduce_cli.export.exported import ExportedModel, ParameterValue
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.lean.functions import LeanFunctions
+from paramreduce_cli.records import Model, ReducedModel
+
+_CASES = 16
+"""States in the self-test."""
+_CHECKED = 200
+"""States on which the functions are checked before they are written."""
+_LOOPS = {"z", "dz", "ddz", "guess", "q", "dq", "ddq", "R", "b"}
+"""What the position, velocity and acceleration problems take and give."""
+
+
+class Exported(StrEnum):
+    """Which functions are exported."""
+
+    IDM = "idm"
+    DDM = "ddm"
+    BOTH = "both"
+    REGRESSOR = "regressor"
+
+
+_FUNCTIONS = {
+    Exported.IDM: ("inverse",),
+    Exported.DDM: ("direct",),
+    Exported.BOTH: ("inverse", "direct"),
+    Exported.REGRESSOR: ("regressor",),
+}
+
+
+def export(
+    model: Model,
+    chosen: ReducedModel,
+    *,
+    title: str,
+    language: str,
+    what: Exported = Exported.BOTH,
+    constant: bool = False,
+    single: bool = False,
+    origin: str = "",
+) -> dict[str, bytes]:
+    """Files of a model in some language.
+
+    Args:
+        model: Of the robot.
+        chosen: The model that is exported, with expressions.
+        title: What it is called.
+        language: Of :data:`paramreduce_cli.export.languages.languages`.
+        what: Which functions.
+        constant: Whether the values of the parameters are part of the code.
+        single: Whether numbers have single precision.
+        origin: Of the model, for the comment that opens every file.
+
+    Raises:
+        FormulationError: The functions do not compute what the straightforward model does.
+    """
+    mechanism = model.mechanism
+    functions = exported_functions(model, chosen, what, constant=constant)
+    closures: tuple[Function, ...] = ()
+    if mechanism.loops is not None:
+        closures = tuple(LeanFunctions(model, chosen, constant=constant).closures())
+    rng = np.random.default_rng(0)
+    checked = random_cases(mechanism, chosen, _CHECKED, rng)
+    check(functions, checked)
+    if closures:
+        check_closures(closures, checked)
+    unsafe = ""
+    if "direct" in _FUNCTIONS[what] and (unsafe := doubtful_mass_matrices(checked["M"])):
+        warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
+    used = {a.name for f in functions for a in (*f.arguments, *f.results)}
+    if mechanism.loops is not None:
+        used |= _LOOPS
+    stored = random_cases(mechanism, chosen, _CASES, rng)
+    exported = ExportedModel(
+        robot=mechanism.robot,
+        heading=(
+            f"{mechanism.robot}: {title}.",
+            *([f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []),
+            "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
+            f"Made by paramreduce {__version__} ({origin}).",
+        ),
+        coordinates=mechanism.generalised_names,
+        units=tuple("rad" if b.joint == "revolute" else "m" for b in mechanism.bodies),
+        independent=np.array(mechanism.independent, dtype=np.int64),
+        parameters=_parameter_values(model, chosen),
+        symbols=mechanism.symbols,
+        constant=constant,
+        functions=functions,
+        closures=closures,
+        single=single,
+        cases={name: values for name, values in stored.items() if name in used},
+    )
+    files: dict[str, bytes] = languages[language](exported)
+    return files
+
+
+def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
+    """Values with units: those of the first standard parameter that has each."""
+    first = [int(np.flatnonzero(chosen.position == k)[0]) for k in range(chosen.n)]
+    return tuple(
+        ParameterValue(name, float(value), model.mechanism.parameters[k].unit, expression)
+        for k, name, value, expression in zip(
+            first, chosen.names, chosen.values, chosen.expressions, strict=True
+        )
+    )
+
+
+def exported_functions(
+    model: Model, chosen: ReducedModel, what: Exported, *, constant: bool = False
+) -> tuple[Function, ...]:
+    """Functions of a model.
+
+    Args:
+        model: Of the robot.
+        chosen: The model.
+        what: Which functions.
+        constant: Whether the values of the parameters are part of them.
+    """
+    lean = LeanFunctions(model, chosen, constant=constant)
+    return tuple(getattr(lean, name)() for name in _FUNCTIONS[what])

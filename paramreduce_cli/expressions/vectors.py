@@ -1,0 +1,44 @@
+"""Small vectors and matrices of scalars, as tuples.
+
+The scalars may be CasADi's or those of an expression graph: products with the zeros and ones of
+a geometry vanish as they are formed, instead of being simplified afterwards.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+Vector = tuple[Any, Any, Any]
+Matrix = tuple[Vector, Vector, Vector]
+"""Rows of a 3 x 3 matrix."""
+
+
+def add(a: Vector, b: Vector) -> Vector:
+    """The sum a + b."""
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+def subtract(a: Vector, b: Vector) -> Vector:
+    """The difference a - b."""
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def scale(factor: Any, a: Vector) -> Vector:
+    """The multiple factor a."""
+    return (factor * a[0], factor * a[1], factor * a[2])
+
+
+def dot(a: Sequence, b: Vector) -> Any:
+    """The inner product a . b."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def cross(a: Sequence, b: Sequence) -> Vector:
+    """The cross product a x b."""
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+def apply(matrix: Sequence[Sequence], a: Vector) -> Vector:
+    """The product of a matrix, by rows, with a."""
+    return (dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a))

@@ -1,0 +1,1 @@
+"""What judges reduced models: their errors, picking one, the verdict, stability."""

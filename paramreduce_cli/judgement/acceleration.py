@@ -1,0 +1,82 @@
+"""Errors of the accelerations that reduced models predict, and the health of their mass matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.multibody.dynamics import SINGULAR_MASS
+from paramreduce_cli.records import Block, FloatArray
+
+DirectRegressor = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Generalised coordinates and velocities to the linear maps of [M | delta] by the parameters."""
+
+_VALUES_AT_ONCE = 4_000_000
+"""Mass-matrix elements held in memory at a time."""
+
+
+@dataclass(frozen=True)
+class AccelerationErrors:
+    """Of many models; each (n_models,) unless said otherwise."""
+
+    error: FloatArray
+    joints: FloatArray
+    """Joint by joint, (n_models, n_dof)."""
+    condition: FloatArray
+    """Largest condition number of the mass matrix over the samples."""
+    smallest_eigenvalue: FloatArray
+    """Smallest eigenvalue of the mass matrix over the samples."""
+
+
+def acceleration_errors(
+    blocks: Iterable[Block],
+    direct_regressor: DirectRegressor,
+    parameters: FloatArray,
+    nominal_acceleration: FloatArray,
+) -> AccelerationErrors:
+    """Normalised errors of ddz_R = M_R^-1 (tau - delta_R) [Ros2019], Eq. 24.
+
+    Args:
+        blocks: The samples.
+        direct_regressor: Linear maps of M and delta.
+        parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
+        nominal_acceleration: (n_dof,)
+
+    Returns:
+        Errors; infinite where a mass matrix is singular at some sample.
+    """
+    n_models, n_dof = parameters.shape[1], nominal_acceleration.size
+    squares, total = np.zeros((n_models, n_dof)), np.zeros(n_dof)
+    condition, smallest = np.zeros(n_models), np.full(n_models, np.inf)
+    step = max(1, _VALUES_AT_ONCE // (n_models * n_dof * n_dof))
+    for block in blocks:
+        for start in range(0, block.time.size, step):
+            part = slice(start, start + step)
+            A, B = direct_regressor(block.q[part], block.dq[part])
+            M = np.moveaxis(A @ parameters, -1, 1)
+            bias = np.moveaxis(B @ parameters, -1, 1)
+            values, vectors = np.linalg.eigh(M)
+            sizes = np.abs(values)
+            largest = sizes.max(axis=2)
+            singular = sizes.min(axis=2) <= SINGULAR_MASS * np.maximum(
+                largest, np.finfo(float).tiny
+            )
+            safe = np.where(singular[..., None], np.nan, values)
+            right = (block.tau[part][:, None, :] - bias)[..., None]
+            along = (vectors.swapaxes(2, 3) @ right)[..., 0] / safe
+            ddz = (vectors @ along[..., None])[..., 0]
+            error = (ddz - block.ddz[part][:, None, :]) / nominal_acceleration
+            squares += np.where(np.isnan(error), np.inf, error**2).sum(axis=0)
+            total += np.sum((block.ddz[part] / nominal_acceleration) ** 2, axis=0)
+            ratio = np.where(singular, np.inf, largest / np.where(singular, 1.0, sizes.min(axis=2)))
+            condition = np.maximum(condition, ratio.max(axis=0))
+            smallest = np.minimum(smallest, values.min(axis=(0, 2)))
+    tiny = np.finfo(float).tiny
+    return AccelerationErrors(
+        error=np.sqrt(squares.sum(axis=1) / max(total.sum(), tiny)),
+        joints=np.sqrt(squares / np.maximum(total, tiny)),
+        condition=condition,
+        smallest_eigenvalue=smallest,
+    )

@@ -1,0 +1,106 @@
+"""Which reduced model the config asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from paramreduce_cli.config.schema import SelectedSection
+from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.judgement.picking import (
+    Pick,
+    best_of_size,
+    excess,
+    nearest_to,
+    proven_necessary,
+    smallest_within,
+)
+from paramreduce_cli.records import HeuristicValidation, Model, Reduction, Selected
+from paramreduce_cli.reduction.models import reduced_model
+from paramreduce_cli.texts import share
+
+_DEFAULT = {"torque_error": 0.01}
+
+
+def select(
+    wanted: SelectedSection,
+    model: Model,
+    reduction: Reduction,
+    results: Mapping[str, HeuristicValidation],
+) -> Selected:
+    """The model of the size asked for, or the smallest one within the tolerances on both sets.
+
+    Where none keeps to them it is the nearest one, and says so.
+
+    Raises:
+        ConfigError: There is no model of that size.
+        DataError: The heuristic asked for was not run.
+    """
+    if wanted.heuristic is not None:
+        if wanted.heuristic not in results:
+            raise DataError(
+                f"reduction.h5 has no {wanted.heuristic}; run `paramreduce reduce` with this config."
+            )
+        results = {wanted.heuristic: results[wanted.heuristic]}
+    missed = ""
+    if wanted.n is not None:
+        heuristic, row = _of_size(wanted.n, results)
+        reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
+    else:
+        tolerances = wanted.tolerances() or _DEFAULT
+        choice = smallest_within(results, tolerances)
+        heuristic, row = choice if choice is not None else nearest_to(results, tolerances)
+        n = int(results[heuristic].n[row])
+        if choice is None:
+            worst = float(excess(results[heuristic], tolerances)[row])
+            missed = f"no model has {_listed(tolerances)}, the nearest is {worst:.3g} times beyond"
+            reason = f"{heuristic} with n = {n}: {missed}."
+        else:
+            reason = _reason(wanted, tolerances, reduction, heuristic, n)
+    chosen = reduced_model(reduction, heuristic, row, model.values)
+    return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
+
+
+def _of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:
+    choice = best_of_size(results, n)
+    if choice is not None:
+        return choice
+    sizes = sorted({int(k) for result in results.values() for k in result.n})
+    who = " and ".join(results)
+    raise ConfigError(
+        f"is {n}, but {who} orders {sizes[-1]} parameters. Ask for fewer, or let reduction.stop go "
+        "further."
+        if n > sizes[-1]
+        else f"is {n}, but with groups {who} has subsets of {', '.join(map(str, sizes))} parameters "
+        "only. Choose one of these.",
+        ("selected", "n"),
+    )
+
+
+def _reason(
+    wanted: SelectedSection,
+    tolerances: Mapping[str, float],
+    reduction: Reduction,
+    heuristic: str,
+    n: int,
+) -> str:
+    who = f"{heuristic} with n = {n}"
+    if set(tolerances) == {"operations"}:
+        return f"{who} has the smallest torque error with {_listed(tolerances)}."
+    whose = f" of {wanted.heuristic}" if wanted.heuristic is not None else ""
+    text = f"{who} is the smallest model found{whose} with {_listed(tolerances)}"
+    limit = tolerances.get("torque_error")
+    if reduction.proofs is None or limit is None or n == 1:
+        return f"{text}."
+    if proven_necessary(reduction.proofs, n, limit):
+        return f"{text}; proven: with fewer parameters none has that torque error on the estimation set."
+    return f"{text}; smaller ones are not excluded by proof."
+
+
+def _listed(tolerances: Mapping[str, float]) -> str:
+    shown = [
+        f"{key.replace('_', ' ')} at most {share(value)} on both sets"
+        if "error" in key
+        else f"at most {value:g} operations of d"
+        for key, value in tolerances.items()
+    ]
+    return " and ".join(shown)

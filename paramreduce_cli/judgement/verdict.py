@@ -1,0 +1,117 @@
+"""Whether the selected model is accepted, and what the user should know of the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from paramreduce_cli.config.schema import Acceptance, ValidationSection
+from paramreduce_cli.records import About, BoolArray, HeuristicValidation, Remark, Selected
+from paramreduce_cli.texts import share
+
+_NEGLIGIBLE = 1e-6
+"""Errors below this are not compared: there a model is exact but for round-off."""
+
+
+def verdict(
+    limits: Acceptance, selected: Selected, result: HeuristicValidation
+) -> tuple[bool, str]:
+    """Whether the selected model keeps to the limits of the config, and the sentence for it."""
+    met: list[str] = []
+    missed: list[str] = [selected.missed] if selected.missed else []
+    for key in type(limits).model_fields:
+        limit = getattr(limits, key)
+        if limit is None:
+            continue
+        value = float(getattr(result, key)[result.row(selected.n)])
+        relative = "error" in key
+        text = (
+            f"{key.replace('_', ' ')} {_shown(value, relative)} (limit {_shown(limit, relative)})"
+        )
+        (met if value <= limit else missed).append(text)
+    who = f"{selected.heuristic} with {selected.n} parameters"
+    if missed:
+        return False, f"{who} is not accepted: {', '.join(missed)}."
+    if met:
+        return True, f"{who} is accepted: {', '.join(met)}."
+    return True, f"{who} is not judged: validation.accept sets no limits."
+
+
+def _shown(value: float, relative: bool) -> str:
+    return share(value) if relative else f"{value:g}"
+
+
+def remarks(
+    section: ValidationSection,
+    heuristics: Mapping[str, HeuristicValidation],
+    full: Mapping[str, int | float],
+    selected: Selected,
+) -> Iterator[Remark]:
+    """Where reduced models should not be trusted; the same of several heuristics once."""
+    common: dict[str, list[str]] = {}
+    who = f"The selected model ({selected.heuristic}, n = {selected.n})"
+    for name, result in heuristics.items():
+        chosen = result.row(selected.n) if name == selected.heuristic else None
+        for flags, text, consequence in _doubts(section, full, result):
+            if flags.any():
+                common.setdefault(text, []).append(name)
+            if chosen is not None and flags[chosen]:
+                yield Remark(About.SELECTED, f"{who} {consequence}")
+    for text, names in common.items():
+        yield Remark(About.HEURISTICS, f"{', '.join(names)}: {text}")
+
+
+def _doubts(
+    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
+) -> Iterator[tuple[BoolArray, str, str]]:
+    """Which subsets are doubtful, why, and what that means for the selected model."""
+    unsafe = _unsafe(section, full, result)
+    last = int(result.n[unsafe].max(initial=0))
+    yield (
+        unsafe,
+        f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass matrix loses "
+        f"positive definiteness on the samples, or comes more than {section.condition_factor:g} times "
+        "nearer to singular than the full model's.",
+        "is not safe for direct dynamics: use its inverse dynamics only.",
+    )
+    for what in ("torque", "acceleration"):
+        apart = _apart(section, result, what)
+        yield (
+            apart,
+            f"{what} errors on the two sets differ more than {section.error_factor:g} times at n = "
+            f"{', '.join(_ranges(result.n[apart].tolist()))}.",
+            f"has {what} errors on the two sets that part: use more trajectories, or more parameters.",
+        )
+
+
+def _unsafe(
+    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
+) -> BoolArray:
+    smallest = result.mass_matrix_smallest_eigenvalue
+    factor = section.condition_factor
+    near = smallest <= max(0.0, full["mass_matrix_smallest_eigenvalue"] / factor)
+    unsafe: BoolArray = near | (
+        result.mass_matrix_condition > factor * full["mass_matrix_condition"]
+    )
+    return unsafe
+
+
+def _apart(section: ValidationSection, result: HeuristicValidation, what: str) -> BoolArray:
+    one = np.asarray(getattr(result, f"{what}_error_estimation"))
+    two = np.asarray(getattr(result, f"{what}_error_validation"))
+    smaller, larger = np.minimum(one, two), np.maximum(one, two)
+    apart: BoolArray = (larger > section.error_factor * smaller) & (
+        (smaller > _NEGLIGIBLE) & (larger < 1)
+    )
+    return apart
+
+
+def _ranges(numbers: list[int]) -> Iterator[str]:
+    """Runs of consecutive numbers as text."""
+    start = 0
+    for k, number in enumerate(numbers):
+        if k + 1 < len(numbers) and numbers[k + 1] == number + 1:
+            continue
+        yield f"{number}" if start == k else f"{numbers[start]}...{number}"
+        start = k + 1

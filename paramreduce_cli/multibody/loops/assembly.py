@@ -1,0 +1,240 @@
+"""Close the loops of a mechanism once, and tell whether its description makes sense.
+
+Ranks are decided on several configurations reached from the assembly by small random moves,
+so that one singular configuration is not taken for a property of the mechanism.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Iterable
+
+import casadi as ca
+import numpy as np
+import scipy.optimize
+
+from paramreduce_cli.errors import Concern, ConcernError
+from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.loops.closures import closure_equations, equation_owners
+from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.records import BASE, Closure, FloatArray, IntArray, Loops, Mechanism
+
+_ASSEMBLED = 1e-9
+"""Largest gap of an assembled loop, m."""
+_RANK = 1e-7
+"""Share of its length that must be left of a row or column that counts as independent."""
+_MOVES = 8
+_MOVE = 0.05
+"""Length of a random move, rad or m."""
+_SEED = 0
+
+
+def assembled(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with its loops closed, and its independent coordinates as in the guess.
+
+    Raises:
+        ConcernError: The loops cannot be closed from the guess, equations are redundant, or the
+            independent coordinates are too many, too few or not independent.
+    """
+    loops = mechanism.loops
+    if loops is None:
+        return mechanism
+    equations = _Equations(mechanism)
+    if not mechanism.dependent:
+        raise ConcernError(
+            "all coordinates are named, so that the closures have "
+            "none left to determine. Leave out those that the loops determine.",
+            Concern.INDEPENDENT,
+        )
+    nearest = _closed(equations, mechanism, loops, range(mechanism.n_q))
+    jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
+    _check_redundancy(mechanism, jacobians)
+    _check_choice(mechanism, jacobians)
+    q = _closed(equations, mechanism, loops, mechanism.dependent)
+    _check_regular(mechanism, equations.jacobian(q))
+    _check_hinges(mechanism, q)
+    return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
+
+
+class _Equations:
+    """Phi and its Jacobian in numbers, at one configuration."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        q = ca.SX.sym("q", mechanism.n_q)
+        phi = closure_equations(mechanism, q)
+        self._function = ca.Function("phi", [q], [phi, ca.jacobian(phi, q)])
+
+    def gap(self, q: FloatArray) -> FloatArray:
+        return np.array(self._function(q)[0]).ravel()
+
+    def jacobian(self, q: FloatArray) -> FloatArray:
+        return np.array(self._function(q)[1])
+
+
+def _closed(
+    equations: _Equations, mechanism: Mechanism, loops: Loops, moving: Iterable[int]
+) -> FloatArray:
+    """Move some coordinates from the guess until the loops are closed."""
+    free = list(moving)
+    start = loops.assembly
+
+    def whole(values: FloatArray) -> FloatArray:
+        q = start.copy()
+        q[free] = values
+        return q
+
+    found = scipy.optimize.least_squares(
+        lambda values: equations.gap(whole(values)),
+        start[free],
+        jac=lambda values: equations.jacobian(whole(values))[:, free],
+        method="trf",
+        x_scale="jac",
+        xtol=1e-15,
+        ftol=1e-15,
+        gtol=1e-15,
+        max_nfev=300,
+    )
+    q = whole(found.x)
+    gaps = np.abs(equations.gap(q))
+    if gaps.max() > _ASSEMBLED:
+        worst = int(np.argmax(gaps))
+        open_at = _named(equation_owners(mechanism)[worst])
+        before = float(np.abs(equations.gap(start)).max())
+        fixed = ", ".join(
+            f"{mechanism.generalised_names[k]} = {start[k]:g}"
+            for k in range(mechanism.n_q)
+            if k not in free
+        )
+        raise ConcernError(
+            f"the loops cannot be closed from it"
+            f"{f' with {fixed}' if fixed else ''}: at the guess they are open by {before:.3g}, and at "
+            f"best by {gaps[worst]:.3g}, at {open_at} (m, or no unit for a tilt). Give a guess nearer to an assembly, or "
+            "check lengths and frames.",
+            Concern.ASSEMBLY,
+        )
+    return q
+
+
+def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:
+    """Configurations nearby, by random moves along the loops."""
+    rng = np.random.default_rng(_SEED)
+    found = []
+    for _ in range(_MOVES):
+        move = rng.normal(size=q.size)
+        new = q + _MOVE * move / np.linalg.norm(move)
+        for _ in range(20):
+            step, *_ = np.linalg.lstsq(equations.jacobian(new), equations.gap(new), rcond=1e-9)
+            new = new - step
+        if np.abs(equations.gap(new)).max() <= _ASSEMBLED:
+            found.append(new)
+    return found
+
+
+def _independent(rows: FloatArray) -> IntArray:
+    """Rows that do not depend on those before them; lengths as they are, rows are alike."""
+    return np.array(independent_columns(rows.T, np.arange(rows.shape[0]), _RANK), dtype=np.int64)
+
+
+def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, IntArray]:
+    """The Jacobian of the largest rank, and its independent rows."""
+    rows = [_independent(jacobian) for jacobian in jacobians]
+    best = max(range(len(rows)), key=lambda k: rows[k].size)
+    return jacobians[best], rows[best]
+
+
+def _check_redundancy(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
+    owners = equation_owners(mechanism)
+    _, rows = _generic(jacobians)
+    if rows.size == mechanism.n_q:
+        raise ConcernError(
+            f"the loops are over-constrained: {rows.size} independent "
+            f"equations for {mechanism.n_q} coordinates leave nothing that moves. Leave out a "
+            "closure, or use joints or closures with more freedom.",
+            Concern.CLOSURES,
+        )
+    if rows.size < len(owners):
+        extra = [owner for k, owner in enumerate(owners) if k not in rows]
+        hint = ""
+        if any(closure.kind in ("point", "revolute") for closure, _ in extra):
+            hint = (
+                " In a mechanism that moves in a plane, a pin is a closure of type planar (two "
+                "equations across the z axis of its first frame)."
+            )
+        raise ConcernError(
+            f"of the {len(owners)} equations only {rows.size} are "
+            f"independent; these follow from the ones before them wherever the loops are closed: "
+            f"{', '.join(map(_named, extra))}. Use closures with fewer equations.{hint}",
+            Concern.CLOSURES,
+        )
+
+
+def _named(owner: tuple[Closure, str]) -> str:
+    """An equation for people."""
+    closure, part = owner
+    return f"{closure.name} ({part})"
+
+
+def _closures(mechanism: Mechanism) -> tuple[Closure, ...]:
+    return mechanism.loops.closures if mechanism.loops is not None else ()
+
+
+def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
+    jacobian, rows = _generic(jacobians)
+    freedom = mechanism.n_q - rows.size
+    names = mechanism.generalised_names
+    named = [names[k] for k in mechanism.independent]
+    suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
+    if len(named) != freedom:
+        raise ConcernError(
+            f"names {len(named)} coordinates, but {freedom} are "
+            f"independent: {mechanism.n_q} coordinates less {rows.size} independent equations. Name "
+            f"{freedom}, for example {suggestion}.",
+            Concern.INDEPENDENT,
+        )
+    dependent = list(mechanism.dependent)
+    ratios = []
+    for entry in jacobians:
+        block = entry[:, dependent]
+        sizes = np.linalg.svd(block, compute_uv=False)
+        ratios.append(sizes[-1] / sizes[0])
+    if max(ratios) <= _RANK:
+        raise ConcernError(
+            f"{', '.join(named)} are not independent: the loops tie "
+            "them to each other, and leave others undetermined. Choose others, for example "
+            f"{suggestion}.",
+            Concern.INDEPENDENT,
+        )
+
+
+def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
+    sizes = np.linalg.svd(jacobian[:, list(mechanism.dependent)], compute_uv=False)
+    if sizes[-1] <= _RANK * sizes[0]:
+        named = (mechanism.generalised_names[k] for k in mechanism.independent)
+        raise ConcernError(
+            "the assembly it leads to is a singular configuration, in which "
+            f"{', '.join(named)} do not determine the other coordinates. Give a guess away from it.",
+            Concern.ASSEMBLY,
+        )
+
+
+def _check_hinges(mechanism: Mechanism, q: FloatArray) -> None:
+    """Refuse hinges that closed with their axes against each other, which the equations allow."""
+    poses = body_poses(mechanism, q)
+    for closure in _closures(mechanism):
+        a, b = (
+            frame[:3, 2] if body == BASE else poses[body, :3, :3] @ frame[:3, 2]
+            for body, frame in zip(closure.bodies, closure.frames, strict=True)
+        )
+        if closure.kind == "revolute" and a @ b < 0:
+            raise ConcernError(
+                f"{closure.name} closes with its two z axes against each other.",
+                Concern.HINGE_DIRECTION,
+            )
+
+
+def _well_chosen(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:
+    """Coordinates that can be independent, those already named first where they can be."""
+    others = [k for k in range(mechanism.n_q) if k not in mechanism.independent]
+    order = np.array([*others, *mechanism.independent], dtype=np.int64)
+    dependent = independent_columns(jacobian, order, _RANK)
+    return [k for k in range(mechanism.n_q) if k not in dependent]

@@ -1,0 +1,64 @@
+"""The equations that close the loops of a mechanism, symbolically.
+
+Phi(q) = 0 in the generalised coordinates of the open tree; lengths are in m and directions
+without unit, so that every equation is about as large as the gap it measures.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from paramreduce_cli.expressions.vectors import Vector, dot, subtract
+from paramreduce_cli.multibody.kinematics import (
+    JointMotion,
+    direction_in_base,
+    motions,
+    point_in_base,
+)
+from paramreduce_cli.records import Closure, Mechanism
+
+EQUATIONS = {
+    "point": ("x", "y", "z"),
+    "planar": ("x", "y"),
+    "revolute": ("x", "y", "z", "tilt x", "tilt y"),
+    "distance": ("distance",),
+}
+"""What each equation of a kind of closure measures."""
+
+
+def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
+    """Phi(q), all closures stacked, (n_equations,).
+
+    Args:
+        mechanism: With loops.
+        q: Generalised coordinates, (n_q,), rad or m.
+    """
+    if mechanism.loops is None:
+        return ca.SX(0, 1)
+    joints = motions(mechanism, q)
+    return ca.vertcat(*(e for c in mechanism.loops.closures for e in _equations(joints, c)))
+
+
+def equation_owners(mechanism: Mechanism) -> list[tuple[Closure, str]]:
+    """For every equation in order its closure, and what of it the equation measures."""
+    closures = mechanism.loops.closures if mechanism.loops is not None else ()
+    return [(closure, part) for closure in closures for part in EQUATIONS[closure.kind]]
+
+
+def _equations(joints: list[JointMotion], closure: Closure) -> list[ca.SX]:
+    (a, b), (A, B) = closure.bodies, closure.frames
+    start, end = point_in_base(joints, a, A[:3, 3]), point_in_base(joints, b, B[:3, 3])
+    gap = subtract(end, start)
+    if closure.kind == "distance":
+        length = closure.length
+        return [(dot(gap, gap) - length**2) / (2 * length)]
+    if closure.kind == "point":
+        return list(gap)
+
+    def across(other: Vector) -> list[ca.SX]:
+        """Components along the x and y axes of A."""
+        return [dot(direction_in_base(joints, a, A[:3, k]), other) for k in (0, 1)]
+
+    if closure.kind == "planar":
+        return across(gap)
+    return [*gap, *across(direction_in_base(joints, b, B[:3, 2]))]

@@ -1,0 +1,55 @@
+"""Positions of closed loops along a motion that an optimiser changes step by step."""
+
+from __future__ import annotations
+
+import contextlib
+
+import numpy as np
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.records import FloatArray
+
+
+class Follower:
+    """Positions along a motion that changes a little from call to call.
+
+    Each call starts from the positions kept last, of as many samples, and stays on the side of
+    singular configurations that the assembly is on.
+
+    Args:
+        coordinates: Of the mechanism.
+    """
+
+    def __init__(self, coordinates: Coordinates) -> None:
+        self._coordinates = coordinates
+        self._kept: FloatArray | None = None
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def __call__(self, z: FloatArray) -> FloatArray:
+        """Generalised coordinates, (n_samples, n_q), at z (n_samples, n_dof).
+
+        Raises:
+            DataError: The loops cannot be closed at a sample without passing a singularity.
+        """
+        if self._coordinates.mechanism.loops is None:
+            return z
+        if self._last is None or not np.array_equal(self._last[0], z):
+            self._last = (z, self._found(z))
+        return self._last[1]
+
+    def _found(self, z: FloatArray) -> FloatArray:
+        """From the positions that were kept; if that leads elsewhere, anew from the assembly."""
+        if self._kept is not None:
+            with contextlib.suppress(DataError):
+                q = self._coordinates.positions(z, self._kept)
+                self._coordinates.check_side(z, q)
+                return q
+        q = self._coordinates.positions(z, None)
+        self._coordinates.check_side(z, q)
+        return q
+
+    def keep(self) -> None:
+        """Start from the positions found last from now on, because they are good ones."""
+        if self._last is not None:
+            self._kept = self._last[1]

@@ -1,0 +1,101 @@
+"""From the generalised coordinates of an open tree to the independent ones of closed loops.
+
+With Phi(q) = 0, d the dependent coordinates and z the independent ones [Ros2019]:
+
+* dq = R dz with R = [-Phi_d^-1 Phi_z; 1];
+* ddq = R ddz + b with b = [Phi_d^-1 gamma; 0] and gamma = -dPhi_q/dt dq;
+* d_z = R' d_q, M_zz = R' M_qq R, delta_z = R' (delta_q + M_qq b).
+
+The sum in delta_z has M_qq, and b its sign, by inserting ddq into d_q = M_qq ddq + delta_q;
+the paper prints it without and with the other sign.
+"""
+
+from __future__ import annotations
+
+from typing import TypeVar
+
+import casadi as ca
+import numpy as np
+
+from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.records import Mechanism
+
+Expression = TypeVar("Expression", ca.SX, ca.MX)
+
+_SOLVER = "qr"
+"""Sparse and with generated C code; structure is analysed once."""
+
+
+class Projection:
+    """The kinematics of loops as expressions of ``q`` that can be compiled and differentiated.
+
+    ``R`` and ``b`` are symbols for what the methods :meth:`tangent` and :meth:`drift` solve for:
+    scalar expressions cannot hold a linear solver, expressions of matrices can.
+
+    Args:
+        mechanism: With as many independent equations as dependent coordinates.
+    """
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self._d, self._z = list(mechanism.dependent), list(mechanism.independent)
+        n_d, n_z = len(self._d), len(self._z)
+        self.q = ca.MX.sym("q", mechanism.n_q)
+        self.R_d, self.b_d = ca.SX.sym("R_d", n_d, n_z), ca.SX.sym("b_d", n_d)
+        self.R = self._whole(self.R_d, ca.SX.eye(n_z))
+        self.b = self._whole(self.b_d, ca.SX(n_z, 1))
+        q, dq = ca.SX.sym("q", mechanism.n_q), ca.SX.sym("dq", mechanism.n_q)
+        equations = closure_equations(mechanism, q)
+        jacobian = ca.jacobian(equations, q)
+        gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
+        self._equations = _function("closure", [q], [equations])
+        self._jacobian = _function("closure_jacobian", [q], [jacobian])
+        self._gamma = _function("closure_gamma", [q, dq], [gamma])
+
+    def equations(self, q: ca.MX) -> ca.MX:
+        """Phi, (n_equations,)."""
+        return self._equations(q)
+
+    def dependent_jacobian(self, q: ca.MX) -> ca.MX:
+        """Phi_d, (n_d, n_d)."""
+        return ca.densify(self._jacobian(q)[:, self._d])
+
+    def solve(self, q: ca.MX, right: ca.MX) -> ca.MX:
+        """Phi_d^-1 right."""
+        return ca.solve(self._jacobian(q)[:, self._d], right, _SOLVER)
+
+    def tangent(self, q: ca.MX) -> ca.MX:
+        """Derivative of the dependent coordinates by the independent ones, (n_d, n_dof)."""
+        return -self.solve(q, ca.densify(self._jacobian(q)[:, self._z]))
+
+    def rates(self, q: ca.MX, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Velocities dq and accelerations ddq, each (n_q,)."""
+        tangent = self.tangent(q)
+        dq = self._whole(tangent @ dz, dz)
+        return dq, self._whole(tangent @ ddz + self.drift(q, dq), ddz)
+
+    def drift(self, q: ca.MX, dq: ca.MX) -> ca.MX:
+        """Accelerations of the dependent coordinates at ddz = 0, Phi_d^-1 gamma, (n_d,)."""
+        return self.solve(q, self._gamma(q, dq))
+
+    def pulled(self, q: ca.MX, q_bar: ca.MX) -> ca.MX:
+        """R' q_bar: derivatives by all coordinates as ones by the independent ones, in columns."""
+        return q_bar[self._z, :] + self.tangent(q).T @ q_bar[self._d, :]
+
+    def _whole(self, dependent: Expression, independent: Expression) -> Expression:
+        """Put dependent and independent rows where they belong among the generalised ones."""
+        order = np.argsort([*self._d, *self._z]).tolist()
+        return ca.vertcat(dependent, independent)[order, :]
+
+    def distance(self, q: ca.MX) -> ca.MX:
+        """Distance to singularity n / (|Phi_q| |Phi_d^-1|) in Frobenius norms, n equations.
+
+        0 where the dependent coordinates are not determined, 1 at best; smooth.
+        """
+        jacobian = self._jacobian(q)
+        n = len(self._d)
+        inverse = self.solve(q, ca.MX(ca.DM.eye(n)))
+        return n / ca.sqrt(ca.sumsqr(jacobian) * ca.sumsqr(inverse))
+
+
+def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
+    return ca.Function(name, inputs, ca.cse(outputs))

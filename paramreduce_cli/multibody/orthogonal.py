@@ -1,0 +1,78 @@
+"""What is left of columns once their parts along others are taken out."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray, IntArray
+
+DEPENDENT = 1e-9
+"""A column is dependent on others when no more than this share of its length is left of it."""
+
+
+class Orthogonaliser:
+    """Columns of unit length, and a vector, without their parts along the columns taken.
+
+    Modified Gram-Schmidt: a column that is taken is orthogonalised once more, and its direction is
+    removed from all others.
+
+    Args:
+        X: Columns of unit length or zero, (k, n).
+        y: A vector that is taken along, (k,).
+        dependent: Share of its length of which a column counts as dependent.
+    """
+
+    def __init__(
+        self, X: FloatArray, y: FloatArray | None = None, dependent: float = DEPENDENT
+    ) -> None:
+        self.X: FloatArray = X.copy()
+        """What is left of the columns; nothing of those that were taken or tried."""
+        self.y: FloatArray = np.zeros(X.shape[0]) if y is None else y.copy()
+        """What is left of the vector."""
+        self._dependent = dependent
+        self._basis = np.empty(X.shape[::-1])
+        self._rank = 0
+
+    def squared_lengths(self) -> FloatArray:
+        """Of what is left of each column, zero where it is dependent, (n,)."""
+        squared = np.einsum("ij,ij->j", self.X, self.X)
+        squared[squared <= self._dependent**2] = 0.0
+        return squared
+
+    def take(self, column: int) -> bool:
+        """Take a column's direction out of all; whether there was one."""
+        direction = self.X[:, column].copy()
+        self.X[:, column] = 0.0
+        length = sqrt(direction @ direction)
+        if not length > self._dependent:
+            return False
+        basis = self._basis[: self._rank]
+        direction -= (basis @ direction) @ basis
+        direction /= sqrt(direction @ direction)
+        self.X -= direction[:, None] * (direction @ self.X)
+        self.y -= direction * (direction @ self.y)
+        self._basis[self._rank] = direction
+        self._rank += 1
+        return True
+
+
+def unit_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Columns divided by their lengths, (k, n), and the lengths, (n,), one for columns of zeros."""
+    lengths = np.linalg.norm(W, axis=0)
+    lengths = np.where(lengths > 0, lengths, 1.0)
+    return W / lengths, lengths
+
+
+def independent_columns(W: FloatArray, wanted: IntArray, dependent: float = DEPENDENT) -> list[int]:
+    """Take columns in the order wanted, leaving out those that depend on columns taken before.
+
+    Args:
+        W: (k, n)
+        wanted: Column indices.
+        dependent: A column depends on others when no more than this share of its length is
+            left of it.
+    """
+    rest = Orthogonaliser(unit_columns(W[:, wanted])[0], dependent=dependent)
+    return [int(column) for j, column in enumerate(wanted) if rest.take(j)]

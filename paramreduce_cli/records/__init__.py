@@ -1,0 +1,52 @@
+"""Frozen records that pass between stages, and the arrays they are made of.
+
+A record holds data and what follows from it directly; no numerics, no files.
+Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
+"""
+
+from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.mechanism import (
+    BASE,
+    JOINT_AXES,
+    JOINT_COORDINATES,
+    Body,
+    Closure,
+    Length,
+    Loops,
+    Mechanism,
+)
+from paramreduce_cli.records.model import BaseParameters, CountedDynamics, Formulations, Model
+from paramreduce_cli.records.parameters import INERTIAL, LAST, Kind, Parameter, preference_order
+from paramreduce_cli.records.reduction import (
+    NOT_KEPT,
+    BySize,
+    Columns,
+    ModelChoice,
+    Proofs,
+    ProofStatus,
+    ReducedModel,
+    Reduction,
+    SelectionMethod,
+    Subsets,
+)
+from paramreduce_cli.records.run import Progress, Provenance, Report, Run
+from paramreduce_cli.records.samples import Block, Recording, Recordings, Samples, SampleSet
+from paramreduce_cli.records.tracking import Paths, Tracking
+from paramreduce_cli.records.trajectories import (
+    DISTANCES,
+    Coefficients,
+    Constraint,
+    JointLimits,
+    Trajectories,
+    Trajectory,
+)
+from paramreduce_cli.records.validation import (
+    About,
+    DataChange,
+    DataVariant,
+    HeuristicValidation,
+    Remark,
+    Selected,
+    Stability,
+    Validation,
+)

@@ -1,0 +1,179 @@
+"""Mechanisms: bodies, joints, closures of loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Literal
+
+from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.parameters import Kind, Parameter, preference_order, subscript
+
+BASE = -1
+"""Index of the fixed base in :attr:`Body.parent`."""
+
+JOINT_COORDINATES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 3, "free": 6}
+"""How many coordinates each kind of joint has."""
+
+JOINT_AXES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 0, "free": 0}
+"""How many axes each kind of joint can be given."""
+
+
+@dataclass(frozen=True)
+class Body:
+    """A body and the joint that connects it to its parent.
+
+    Seen from the parent's frame, the body's frame is
+    ``parent_to_joint * motion * joint_to_body``; the motion is a rotation about z (revolute) or a
+    translation along z (prismatic).
+    """
+
+    name: str
+    parent: int
+    """Index of the parent body, :data:`BASE` for the base."""
+    joint: Literal["revolute", "prismatic"]
+    parent_to_joint: FloatArray
+    """Homogeneous transform of the joint's frame at rest in the parent's frame, (4, 4), m."""
+    joint_to_body: FloatArray
+    """Homogeneous transform of the body's frame in the moved joint's frame, (4, 4), m."""
+    coordinate: str
+    """Name of the joint's coordinate."""
+    offset: float = 0.0
+    """Added to the coordinate, rad or m."""
+    intermediate: bool = False
+    """Whether it is but a frame between the axes of one joint."""
+
+
+@dataclass(frozen=True)
+class Closure:
+    """What holds two bodies of the tree together and makes a loop of it.
+
+    With A and B the frames on the two bodies:
+
+    * ``point``: their origins coincide, three equations;
+    * ``planar``: the origin of B is on the z axis of A, two equations;
+    * ``revolute``: their origins and z axes coincide, five equations;
+    * ``distance``: their origins are ``length`` apart, one equation.
+    """
+
+    name: str
+    kind: Literal["point", "planar", "revolute", "distance"]
+    bodies: tuple[int, int]
+    """Indices of the two bodies, :data:`BASE` for the base."""
+    frames: tuple[FloatArray, FloatArray]
+    """Homogeneous transforms of A and B in the frames of their bodies, (4, 4), m."""
+    length: float = 0.0
+    """Of a ``distance``, m."""
+
+
+@dataclass(frozen=True)
+class Loops:
+    """How the loops of a mechanism are closed, and in which coordinates it is described."""
+
+    closures: tuple[Closure, ...]
+    independent: tuple[int, ...]
+    """Indices of the bodies whose coordinates are independent; these are actuated."""
+    assembly: FloatArray
+    """Generalised coordinates near which, or in which, the loops are closed, (n_q,)."""
+
+
+@dataclass(frozen=True)
+class Length:
+    """A length of the geometry, such as a_3 of a Denavit-Hartenberg table."""
+
+    symbol: str
+    owner: str
+    """Name of the body it is of."""
+    value: float
+    """m"""
+
+    @property
+    def name(self) -> str:
+        """Symbol and owner."""
+        return f"{self.symbol}_{self.owner}"
+
+    @property
+    def latex(self) -> str:
+        """The same as a formula."""
+        return f"{self.symbol}_{{{subscript(self.owner)}}}"
+
+
+@dataclass(frozen=True)
+class Mechanism:
+    """A tree of bodies on a fixed base, perhaps with loops; parents come before their children."""
+
+    robot: str
+    bodies: tuple[Body, ...]
+    parameters: tuple[Parameter, ...]
+    """The columns of its observation matrix, in order; (n_parameters,)."""
+    gravity: FloatArray
+    """Acceleration of gravity in the base frame, (3,), m/s^2."""
+    lengths: tuple[Length, ...]
+    """Named lengths of the geometry; relations between parameters are printed in them."""
+    table: tuple[tuple[str, ...], ...]
+    """The geometry as the user wrote it, a header row first; for people."""
+    loops: Loops | None = None
+    """None for an open tree, all of whose coordinates are independent."""
+
+    @property
+    def n_q(self) -> int:
+        """Number of generalised coordinates, one for every body."""
+        return len(self.bodies)
+
+    @property
+    def independent(self) -> tuple[int, ...]:
+        """Indices of the independent ones among the generalised coordinates."""
+        return self.loops.independent if self.loops is not None else tuple(range(self.n_q))
+
+    @property
+    def dependent(self) -> tuple[int, ...]:
+        """Indices of the generalised coordinates that the loops determine."""
+        return tuple(k for k in range(self.n_q) if k not in self.independent)
+
+    @property
+    def n_dof(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.independent)
+
+    @property
+    def n_parameters(self) -> int:
+        """Number of parameters."""
+        return len(self.parameters)
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        """Names of the parameters, in order."""
+        return tuple(parameter.name for parameter in self.parameters)
+
+    @property
+    def preference_order(self) -> IntArray:
+        """Parameters from the most to the least wanted as base parameters, (n_parameters,)."""
+        return preference_order([parameter.preference for parameter in self.parameters])
+
+    @property
+    def symbols(self) -> dict[str, str]:
+        """Formulas of parameters and lengths by their names."""
+        items: tuple[Parameter | Length, ...] = (*self.parameters, *self.lengths)
+        return {item.name: item.latex for item in items}
+
+    def columns(self, body: int) -> Mapping[Kind, int]:
+        """Columns of a body's parameters by kind; empty for a body without any."""
+        return self._columns.get(self.bodies[body].name, {})
+
+    @cached_property
+    def _columns(self) -> Mapping[str, Mapping[Kind, int]]:
+        columns: dict[str, dict[Kind, int]] = {}
+        for column, parameter in enumerate(self.parameters):
+            columns.setdefault(parameter.owner, {})[parameter.kind] = column
+        return columns
+
+    @property
+    def generalised_names(self) -> tuple[str, ...]:
+        """Names of the generalised coordinates."""
+        return tuple(body.coordinate for body in self.bodies)
+
+    @property
+    def coordinate_names(self) -> tuple[str, ...]:
+        """Names of the independent coordinates."""
+        return tuple(self.bodies[k].coordinate for k in self.independent)

@@ -1,0 +1,69 @@
+"""A model: a mechanism with values of its parameters, their base, and lean formulations."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.mechanism import Mechanism
+
+
+@dataclass(frozen=True)
+class BaseParameters:
+    """A choice of independent columns of W and the relations of the others to them."""
+
+    columns: IntArray
+    """Indices of the independent columns, (r,)."""
+    beta: FloatArray
+    """W[:, others] = W[:, columns] @ beta with the others in ascending order, (r, n - r)."""
+    singular_values: FloatArray
+    """Of W with its columns scaled to unit length, descending."""
+    rank_gap: float
+    """Last singular value kept over the first one dropped; infinite where none was dropped."""
+    expressions: tuple[str, ...] = ()
+    """Each base parameter in terms of standard ones, for people."""
+
+
+@dataclass(frozen=True)
+class Formulations:
+    """Lean ways to write a mechanism's dynamics: for each, what is chosen at every joint."""
+
+    inverse: tuple[tuple[Mapping[str, str | bool], ...], ...]
+    direct: tuple[tuple[Mapping[str, str | bool], ...], ...]
+
+
+@dataclass(frozen=True)
+class Model:
+    """A mechanism with its standard parameters and their base."""
+
+    mechanism: Mechanism
+    values: FloatArray
+    """Standard parameters, (n,), kg, kg m, kg m^2."""
+    affecting: BoolArray
+    """Which parameters change the torques at all, (n,)."""
+    base: BaseParameters
+    nominal_torque: FloatArray
+    """Characteristic size of each joint's torque or force, (n_dof,), N m or N."""
+    nominal_torque_given: bool
+    """Whether the config gave it; if not, the estimation set's replaces it from `sample` on."""
+    formulations: Formulations
+
+    @property
+    def base_values(self) -> FloatArray:
+        """Values of the base parameters, in the order of ``base.columns``, (r,)."""
+        others = np.setdiff1d(np.arange(self.values.size), self.base.columns)
+        result: FloatArray = self.values[self.base.columns] + self.base.beta @ self.values[others]
+        return result
+
+
+class CountedDynamics(StrEnum):
+    """Which functions of closed loops are counted; on an open tree they are the same."""
+
+    GENERALISED = "generalised"
+    """d_q and [M_qq | delta_q] of the open tree."""
+    INDEPENDENT = "independent"
+    """d_z and [M_zz | delta_z], with R and b handed in."""

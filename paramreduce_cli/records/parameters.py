@@ -1,0 +1,103 @@
+"""The dynamic parameters of a model: a list of things with a kind, an owner and a unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import IntArray
+
+
+class Kind(Enum):
+    """What a parameter measures: its symbol, its unit, its rank of preference in a base, its formula.
+
+    The smaller the rank, the more a kind is wanted among the base parameters. For revolute arms
+    these ranks yield Khalil's set [Khalil1987]: Izz of the first body and seven parameters of every
+    other one, with Iyy, mz and m regrouped. In formulas d is the first moment, as I is the tensor.
+    """
+
+    M = ("m", "kg", 9, "m", "")
+    MX = ("mx", "kg m", 5, "d", "x")
+    MY = ("my", "kg m", 6, "d", "y")
+    MZ = ("mz", "kg m", 8, "d", "z")
+    IXX = ("Ixx", "kg m^2", 1, "I", "xx")
+    IXY = ("Ixy", "kg m^2", 2, "I", "xy")
+    IXZ = ("Ixz", "kg m^2", 3, "I", "xz")
+    IYY = ("Iyy", "kg m^2", 7, "I", "yy")
+    IYZ = ("Iyz", "kg m^2", 4, "I", "yz")
+    IZZ = ("Izz", "kg m^2", 0, "I", "zz")
+
+    def __init__(self, symbol: str, unit: str, preference: int, letter: str, axes: str) -> None:
+        self.symbol = symbol
+        self.unit = unit
+        self.preference = preference
+        self.letter = letter
+        self.axes = axes
+
+    @classmethod
+    def of(cls, symbol: str) -> Kind:
+        """The kind with a symbol.
+
+        Raises:
+            KeyError: There is none.
+        """
+        return _BY_SYMBOL[symbol]
+
+
+_BY_SYMBOL = {kind.symbol: kind for kind in Kind}
+
+INERTIAL = (
+    Kind.M, Kind.MX, Kind.MY, Kind.MZ,
+    Kind.IXX, Kind.IXY, Kind.IXZ, Kind.IYY, Kind.IYZ, Kind.IZZ,
+)  # fmt: skip
+"""The standard parameters of a rigid body about its frame's origin: mass, first moments, inertia."""
+
+LAST = max(kind.preference for kind in Kind) + 1
+"""Rank of preference of columns of which nothing is known."""
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One dynamic parameter, and so one column of the observation matrix."""
+
+    kind: Kind
+    owner: str
+    """Name of the body it belongs to."""
+
+    @property
+    def name(self) -> str:
+        """Such as ``Izz_3``; the same in every file and table."""
+        return f"{self.kind.symbol}_{self.owner}"
+
+    @property
+    def latex(self) -> str:
+        """The symbol as a formula."""
+        place = [part for part in (self.kind.axes, subscript(self.owner)) if part]
+        return f"{self.kind.letter}_{{{','.join(place)}}}"
+
+    @property
+    def unit(self) -> str:
+        """SI, such as ``kg m^2``."""
+        return self.kind.unit
+
+    @property
+    def preference(self) -> int:
+        """Rank among base parameters, the smaller the more wanted."""
+        return self.kind.preference
+
+
+def subscript(name: str) -> str:
+    """A body's name as part of a formula."""
+    escaped = name.replace("_", r"\_")
+    return rf"\mathrm{{{escaped}}}"
+
+
+def preference_order(ranks: Sequence[int] | IntArray) -> IntArray:
+    """Columns from the most to the least preferred, by rank, then by position, (n,).
+
+    This order breaks every tie in the project.
+    """
+    return np.argsort(np.asarray(ranks), kind="stable").astype(np.int64)

@@ -1,0 +1,236 @@
+"""Subsets of parameters, how good they are proven to be, and the models they make."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cached_property
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+
+NOT_KEPT = -1
+"""Position of a standard parameter that a reduced model does without."""
+
+
+@dataclass(frozen=True)
+class SelectionMethod:
+    """A heuristic and the criterion it selects by, written ``HEURISTIC`` or ``HEURISTIC@CRITERION``."""
+
+    heuristic: str
+    criterion: str = "torque"
+
+    @classmethod
+    def parse(cls, text: str) -> SelectionMethod:
+        """Read what :meth:`__str__` writes; whether the names are known is not looked at."""
+        heuristic, _, criterion = text.partition("@")
+        return cls(heuristic, criterion or cls.criterion)
+
+    @property
+    def by_torque(self) -> bool:
+        """Whether the criterion is the torque error."""
+        return self.criterion == SelectionMethod.criterion
+
+    def __str__(self) -> str:
+        return self.heuristic if self.by_torque else f"{self.heuristic}@{self.criterion}"
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """A model that keeps some values: which standard parameter has which of them.
+
+    The full model, base parameters and every subset are of this form.
+    """
+
+    names: tuple[str, ...]
+    """Of the values, (n,)."""
+    values: FloatArray
+    """Approximate base parameters, (n,), SI."""
+    position: IntArray
+    """Position of each standard parameter's value, :data:`NOT_KEPT` for none, (n_standard,)."""
+    expressions: tuple[str, ...] = ()
+    """What each value stands for, in standard parameters; empty where that was not asked for."""
+
+    @property
+    def n(self) -> int:
+        """Number of values."""
+        return self.values.size
+
+    @cached_property
+    def kept(self) -> IntArray:
+        """Standard parameters that have a value, ascending."""
+        return np.flatnonzero(self.position != NOT_KEPT)
+
+    @property
+    def standard(self) -> FloatArray:
+        """Values of the standard parameters, zero where none is kept, (n_standard,)."""
+        result = np.zeros(self.position.size)
+        result[self.kept] = self.values[self.position[self.kept]]
+        return result
+
+    @property
+    def ties(self) -> dict[int, int]:
+        """For every parameter but the first of those with the same value, that first one."""
+        first: dict[int, int] = {}
+        for parameter in self.kept.tolist():
+            first.setdefault(int(self.position[parameter]), parameter)
+        owners = {
+            parameter: first[int(self.position[parameter])] for parameter in self.kept.tolist()
+        }
+        return {parameter: owner for parameter, owner in owners.items() if parameter != owner}
+
+    def restricted(self, affecting: BoolArray) -> ReducedModel:
+        """The same without parameters that change nothing, (n_standard,)."""
+        return replace(self, position=np.where(affecting, self.position, NOT_KEPT))
+
+
+@dataclass(frozen=True)
+class Columns:
+    """What is chosen among: standard parameters, or several with one value as one column."""
+
+    names: tuple[str, ...]
+    """Of the columns, (n,)."""
+    column: IntArray
+    """Column that each standard parameter belongs to, (n_standard,)."""
+
+    @property
+    def tied(self) -> bool:
+        """Whether a column stands for several parameters."""
+        return len(self.names) < self.column.size
+
+    @cached_property
+    def expansion(self) -> FloatArray:
+        """Standard parameters from values of the columns, ones and zeros, (n_standard, n)."""
+        return (self.column[:, None] == np.arange(len(self.names))).astype(float)
+
+    def model(self, subset: IntArray, values: FloatArray) -> ReducedModel:
+        """The model that keeps a subset of the columns, (n_kept,), with their values."""
+        position = np.full(len(self.names), NOT_KEPT)
+        position[subset] = np.arange(subset.size)
+        return ReducedModel(tuple(self.names[k] for k in subset), values, position[self.column])
+
+
+@dataclass(frozen=True)
+class BySize:
+    """Arrays with one row for every size of subset."""
+
+    n: IntArray
+    """Sizes of the subsets: 1, 2, ... unless columns are chosen in groups, (m,)."""
+
+    def row(self, n: int) -> int | None:
+        """Where the subset of size n stands in the arrays; None if there is none."""
+        rows = np.flatnonzero(self.n == n)
+        return int(rows[0]) if rows.size else None
+
+
+@dataclass(frozen=True)
+class Subsets(BySize):
+    """What one heuristic found: a subset of parameters for every n."""
+
+    heuristic: str
+    subsets: tuple[IntArray, ...]
+    """Column indices of each subset, in the order in which they were taken; (n,) each."""
+    torque_error: FloatArray
+    """Weighted Euclidean error on the estimation set of each subset, (m,)."""
+    torque_error_1: FloatArray
+    """The same in the 1-norm, (m,)."""
+    torque_error_inf: FloatArray
+    """The same in the infinity norm, (m,)."""
+    parameters: tuple[FloatArray, ...]
+    """Approximate base parameters of each subset, in its order; (n,) each."""
+    beta: tuple[FloatArray, ...]
+    """W_E ~ W_R beta, the other columns in ascending order; (n, n_all - n) each."""
+    minimum_norm: BoolArray
+    """Where the subset is beyond the rank and the fit is the minimum-norm one, (m,)."""
+    seconds: float
+
+    def subset(self, n: int) -> IntArray:
+        """The columns of the subset of size n, (n,)."""
+        row = self.row(n)
+        if row is None:
+            raise KeyError(n)
+        return self.subsets[row]
+
+    @property
+    def order(self) -> IntArray | None:
+        """Column indices, the first n of which are the subset of size n; None if not nested."""
+        longest = self.subsets[-1]
+        nested = all(np.array_equal(s, longest[: s.size]) for s in self.subsets)
+        return longest if nested else None
+
+
+class ProofStatus(StrEnum):
+    """What is known of the best subset of a size."""
+
+    OPTIMAL = "optimal"
+    BEST_FOUND = "best-found"
+    """The search has not ended: there is a lower bound."""
+    UNCERTIFIED = "uncertified"
+    """Double precision is not enough for a proof."""
+
+
+@dataclass(frozen=True)
+class Proofs(BySize):
+    """How far the best subset of at most each size is proven; arrays have one row per size."""
+
+    units: tuple[IntArray, ...]
+    """Columns that were chosen as one, the most wanted first."""
+    subsets: tuple[IntArray, ...]
+    """Column indices of the best subset found of at most each size."""
+    torque_error: FloatArray
+    """Of these, (m,)."""
+    lower_bound: FloatArray
+    """Torque error that no subset of the size is below, (m,)."""
+    status: tuple[ProofStatus, ...]
+    seconds: FloatArray
+    """Time spent on each size in all runs, (m,)."""
+    nodes: IntArray
+    """Nodes of the search tree that were visited, (m,)."""
+    logs: tuple[IntArray, ...]
+    """Where each unfinished search stopped, to go on from there."""
+
+
+@dataclass(frozen=True)
+class Reduction:
+    """The subsets of all heuristics on one estimation set."""
+
+    columns: Columns
+    nominal_torque: FloatArray
+    rank: int
+    factor: FloatArray
+    """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
+    heuristics: Mapping[str, Subsets]
+    """By the text of their :class:`SelectionMethod`."""
+    proofs: Proofs | None
+    """Of the best subsets by torque, where they were looked for."""
+
+    @property
+    def unfinished(self) -> bool:
+        """Whether more time could prove more."""
+        return self.proofs is not None and ProofStatus.BEST_FOUND in self.proofs.status
+
+    def model(self, heuristic: str, row: int) -> ReducedModel:
+        """The model of a heuristic's subset, by the row it stands in."""
+        found = self.heuristics[heuristic]
+        return self.columns.model(found.subsets[row], found.parameters[row])
+
+
+@dataclass(frozen=True)
+class ModelChoice:
+    """A model of a reduction, written ``HEURISTIC:N``."""
+
+    heuristic: str
+    n: int
+
+    @classmethod
+    def parse(cls, text: str) -> ModelChoice:
+        """Read the text; a size that is no number is none that there is."""
+        heuristic, _, number = text.partition(":")
+        return cls(heuristic, int(number) if number.isdecimal() else NOT_KEPT)
+
+    def row(self, reduction: Reduction) -> int | None:
+        """Where the heuristic has it; None if there is no such model."""
+        found = reduction.heuristics.get(self.heuristic)
+        return None if found is None else found.row(self.n)

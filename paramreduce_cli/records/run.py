@@ -1,0 +1,49 @@
+"""What a run lends its stages, and what it knows of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, MutableMapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from paramreduce_cli.records.trajectories import Trajectory
+
+
+@dataclass(frozen=True)
+class Report:
+    """The files of the report by their path below ``report/``."""
+
+    summary: Mapping[str, Any]
+    files: Mapping[str, bytes]
+
+
+@dataclass(frozen=True)
+class Progress:
+    """One step of a long piece of work, for whoever shows it."""
+
+    task: str
+    done: float
+    total: float
+    remark: str = ""
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where an artifact came from."""
+
+    robot: str
+    config_sha256: str
+    versions: Mapping[str, str]
+    seconds: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the caller lends a stage: workers, a place for finished parts, an audience."""
+
+    jobs: int = 1
+    parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
+    """Finished parts of an artifact that is not whole yet, kept across interruptions."""
+    progress: Callable[[Progress], None] = lambda _: None
+    interrupted: Callable[[], None] = lambda: None
+    """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""

@@ -1,0 +1,84 @@
+"""Samples: states, torques and observation matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+from paramreduce_cli.records.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """States, and perhaps measured torques, brought by the user; each (n_samples, n_dof)."""
+
+    source: str
+    time: FloatArray
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray | None
+
+
+@dataclass(frozen=True)
+class Recordings:
+    """What the user brought for either set."""
+
+    estimation: Recording | None
+    validation: Recording | None
+
+
+@dataclass(frozen=True)
+class Block:
+    """Consecutive samples of one trajectory."""
+
+    trajectory: int
+    time: FloatArray
+    """(n_samples,), s."""
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray
+    """Torques of the full model, or measured ones; like the states (n_samples, n_dof)."""
+    q: FloatArray
+    """Generalised coordinates, (n_samples, n_q); the independent ones where there are no loops."""
+    dq: FloatArray
+    ddq: FloatArray
+    W: FloatArray
+    """(n_samples * n_dof, n_parameters), sample-major."""
+
+
+class SampleSet(Protocol):
+    """A set of samples that is read block by block, so that memory stays flat."""
+
+    @property
+    def n_samples(self) -> int:
+        """Samples over all trajectories."""
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+
+    def factors(self) -> FloatArray:
+        """Triangular factors of [W | tau] per trajectory and joint.
+
+        Shape (n_trajectories, n_dof, n_parameters + 1, n_parameters + 1).
+        """
+
+
+@dataclass(frozen=True)
+class Samples:
+    """The estimation and validation sets with the scales their errors are measured in."""
+
+    names: tuple[str, ...]
+    """Of the columns of W."""
+    preference: IntArray
+    """Ranks of the columns among base parameters, the smaller the more wanted, (n,)."""
+    values: FloatArray | None
+    """Standard parameters, (n,), where they are known."""
+    nominal_torque: FloatArray | None
+    """(n_dof,); without it the standard deviation over the estimation set is meant."""
+    nominal_acceleration: FloatArray | None
+    """(n_dof,); without it the standard deviation over the estimation set is meant."""
+    estimation: SampleSet
+    validation: SampleSet | None

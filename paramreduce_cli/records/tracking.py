@@ -1,0 +1,45 @@
+"""What a reduced model costs a controller."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Paths:
+    """Motions at the times of a controller, each resting at its end while others still move.
+
+    States are (n_samples, n_paths, n_dof).
+    """
+
+    time: FloatArray
+    """(n_samples,), s."""
+    samples: IntArray
+    """After how many samples each path ends, (n_paths,)."""
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+
+
+@dataclass(frozen=True)
+class Tracking:
+    """How well a controller followed paths with each of several models."""
+
+    paths: Paths
+    errors: Mapping[str, FloatArray]
+    """By the model of the controller: z_d - z, (n_samples, n_paths, n_dof), rad or m."""
+    seconds: Mapping[str, float]
+    """Of one evaluation of the model, s."""
+    language: str
+    """In which it was evaluated."""
+
+    def rms(self, model: str) -> FloatArray:
+        """Root mean square error over time and joints, (n_paths,), rad or m."""
+        squares = self.errors[model] ** 2
+        own = [squares[:n, k].mean() for k, n in enumerate(self.paths.samples)]
+        return np.sqrt(own)

@@ -1,0 +1,112 @@
+"""Trajectories, and what they had to keep to."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from paramreduce_cli.records.arrays import FloatArray
+
+DISTANCES = frozenset({"distance", "distance-from-axis"})
+"""Kinds of constraints that are distances."""
+
+
+@dataclass(frozen=True)
+class Constraint:
+    """Bounds on a quantity of the mechanism along a trajectory.
+
+    What ``bodies`` and ``vectors`` mean depends on the kind:
+
+    * ``coordinate``: the body whose coordinate is bounded, rad or m;
+    * ``angle``: two bodies and a direction in the frame of each, rad;
+    * ``distance``: two bodies and a point in the frame of each, m;
+    * ``distance-from-axis``: a body and the body that carries the axis; a point in the frame of
+      the first, a point and the direction of the axis in the frame of the second, m;
+    * ``singularity``: none; distance to singularity of the loops, 0 to 1.
+    """
+
+    name: str
+    kind: Literal["coordinate", "angle", "distance", "distance-from-axis", "singularity"]
+    bodies: tuple[int, ...]
+    vectors: tuple[FloatArray, ...]
+    lower: float
+    """Minus infinity where there is none."""
+    upper: float
+
+
+@dataclass(frozen=True)
+class JointLimits:
+    """Limits of the independent coordinates, each (n_dof,), rad or m, per s, per s^2."""
+
+    lower: FloatArray
+    upper: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    """Infinite where there is none."""
+
+    @property
+    def middle(self) -> FloatArray:
+        """Of the position ranges."""
+        return (self.upper + self.lower) / 2
+
+    @property
+    def reach(self) -> FloatArray:
+        """Half the width of the position ranges."""
+        return (self.upper - self.lower) / 2
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One optimised finite Fourier series with what was asked of it and how it went."""
+
+    coefficients: FloatArray
+    """[q0, a1, b1, a2, b2, ...] per joint, (n_dof, 1 + 2 harmonics)."""
+    kappa: float
+    """Condition number in the scaling the config asked for."""
+    kappa_start: float
+    """The same at the random start it came from."""
+    kappa_variants: Mapping[str, float]
+    peak_position: FloatArray
+    """Largest distance from the middle of the position range, (n_dof,), rad or m."""
+    peak_velocity: FloatArray
+    """(n_dof,), rad/s or m/s."""
+    reach: FloatArray
+    """Largest share of half the position range, or of the velocity or acceleration limit, that the
+    motion about its offset uses, (n_dof,)."""
+    extremes: FloatArray
+    """Smallest and largest value of every bounded quantity, (n_constraints, 2), in its unit."""
+    cpu_seconds: float
+    iterations: int
+    status: str
+
+
+@dataclass(frozen=True)
+class Trajectories:
+    """The trajectories of the estimation and of the validation set."""
+
+    period: float
+    """s"""
+    points: int
+    """Of the grid on which they were optimised and kept to the limits."""
+    criterion: str
+    scaling: str
+    use_full_range: bool
+    """Whether every joint had to reach one of its limits."""
+    source: str
+    """The file they were brought in; empty where they were optimised."""
+    limits: JointLimits
+    constraints: tuple[Constraint, ...]
+    """What the trajectories had to keep to, besides the limits of the independent coordinates."""
+    estimation: tuple[Trajectory, ...]
+    validation: tuple[Trajectory, ...]
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """Fourier coefficients brought by the user, each (n_traj, n_dof, 1 + 2 harmonics)."""
+
+    source: str
+    period: float
+    estimation: FloatArray
+    validation: FloatArray

@@ -1,0 +1,128 @@
+"""What reduced models are worth, and which one was selected."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import StrEnum
+
+from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
+
+
+@dataclass(frozen=True)
+class HeuristicValidation(BySize):
+    """Errors and costs of one heuristic's subsets; every array has one row per subset."""
+
+    torque_error_estimation: FloatArray
+    torque_error_validation: FloatArray
+    torque_error_joint_estimation: FloatArray
+    """(m, n_dof)"""
+    torque_error_joint_validation: FloatArray
+    acceleration_error_estimation: FloatArray
+    acceleration_error_validation: FloatArray
+    acceleration_error_joint_estimation: FloatArray
+    acceleration_error_joint_validation: FloatArray
+    mass_matrix_condition: FloatArray
+    """Largest over the samples."""
+    mass_matrix_smallest_eigenvalue: FloatArray
+    """Smallest over the samples."""
+    operations_inverse: IntArray
+    operations_direct: IntArray
+    operations_inverse_plain: IntArray
+    operations_direct_plain: IntArray
+    operations_inverse_paper_rule: IntArray
+    operations_direct_paper_rule: IntArray
+
+
+@dataclass(frozen=True)
+class Selected:
+    """The model that the config asks for."""
+
+    heuristic: str
+    model: ReducedModel
+    """With expressions."""
+    reason: str
+    """One sentence that says why it was taken."""
+    missed: str
+    """What the tolerances asked for and no model has; empty where they are kept."""
+
+    @property
+    def n(self) -> int:
+        """Number of parameters."""
+        return self.model.n
+
+
+class DataChange(StrEnum):
+    """What other data a selection is repeated on."""
+
+    ALL = "all"
+    """The data as they are."""
+    WITHOUT_TRAJECTORY = "without-trajectory"
+    THINNED = "thinned"
+    """Every so many samples only."""
+
+
+@dataclass(frozen=True)
+class DataVariant:
+    """Data that a selection is repeated on."""
+
+    change: DataChange
+    number: int = 0
+    """Of the trajectory left out, from 1; or every how many samples one is kept."""
+
+    def __str__(self) -> str:
+        if self.change is DataChange.WITHOUT_TRAJECTORY:
+            return f"without trajectory {self.number}"
+        if self.change is DataChange.THINNED:
+            return f"every {self.number}{'nd' if self.number == 2 else 'th'} sample"
+        return "all"
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the selection would be on other data; arrays have one row per variant of the data."""
+
+    variants: tuple[DataVariant, ...]
+    chosen: BoolArray
+    """(n_variants, n_columns)"""
+    values: FloatArray
+    """Approximate base parameters, not a number where not chosen, (n_variants, n_columns)."""
+    torque_error: FloatArray
+    """Of each subset on its own data, (n_variants,)."""
+
+
+class About(StrEnum):
+    """What a remark is about."""
+
+    SELECTED = "selected"
+    """The selected model."""
+    HEURISTICS = "heuristics"
+    """Subsets of one or several heuristics."""
+
+
+@dataclass(frozen=True)
+class Remark:
+    """A reason not to trust a model everywhere."""
+
+    about: About
+    text: str
+
+
+@dataclass(frozen=True)
+class Validation:
+    """What the reduced models are worth, and whether the selected one is accepted."""
+
+    heuristics: Mapping[str, HeuristicValidation]
+    full: Mapping[str, float]
+    """Operation counts and mass-matrix figures of the full model, by name."""
+    nominal_acceleration: FloatArray
+    selected: Selected
+    pareto: tuple[ModelChoice, ...]
+    """By growing n."""
+    stability: Stability | None
+    """Of the selected subset, where it was asked for."""
+    accepted: bool
+    verdict: str
+    """One sentence that says why."""
+    remarks: tuple[Remark, ...]

@@ -1,0 +1,1 @@
+"""The best subset of every size, with proofs."""

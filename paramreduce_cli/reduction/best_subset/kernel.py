@@ -1,0 +1,562 @@
+"""Branch and bound over the columns of a least-squares problem, compiled by Numba.
+
+At every node some columns are included, some are free and the others excluded. Two forms are
+kept over the free columns, both brought up to date in O(n^2) when one is included or excluded:
+
+* what the included columns leave: the Gram matrix X'X and the moments X'e of the residuals, and
+  the squared error INSIDE of the included columns alone;
+* the fit with all included and free columns: the inverse (X'X)^+, the solution X^+ chi, an
+  orthonormal basis of the null space, and BOUND, the squared error it leaves. No subset below
+  the node has a smaller one.
+
+The search goes depth first and stops after a number of nodes; its state is all in arrays, and
+the log repeats the way to where it stands.
+
+A node is three arrays, which are handed from function to function because Numba copies the
+counters of every array in a tuple:
+
+* ``sheet``, one free column a column: n rows of the Gram matrix, n of the inverse, the basis of
+  the null space, then moments and solution;
+* ``numbers``: how many columns are FREE, the NULLITY, how many are INCLUDED, which unit was taken
+  (BRANCH) and the length of the log then (MARK), whether the included and free columns are
+  nearly dependent (NEAR), and from FIRST on which columns are free;
+* ``errors``: INSIDE and BOUND.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numba
+import numpy as np
+
+from paramreduce_cli.multibody.orthogonal import DEPENDENT
+from paramreduce_cli.records import FloatArray, IntArray
+
+GONE = 1e-13
+"""Squared share of a column's length below which nothing but round-off is left of it."""
+SURE = 1e-6
+"""Squared share from which on the Gram matrix is known well enough to go on with; below, it is
+calculated anew from the columns."""
+ROUND_OFF = 1e-13
+"""Of the entries of the Gram matrix, after steps with pivots of SURE and more."""
+APART = 1e-18
+"""Squared share in the null space below which a column takes no part in it."""
+REAL = 1e-6
+"""Share of a column's length from which on it is surely independent; between this and DEPENDENT
+nothing is certified."""
+INVOLVED = 1e-10
+"""Squared share from which on a column can be excluded by an update; below, those that stay are
+nearly dependent, and the fit is calculated anew."""
+NEARLY = 1e-5
+"""Smallest over largest singular value at which columns are called nearly dependent: then bounds
+are lowered by what is uncertain, and none is included by force."""
+
+FREE, NULLITY, INCLUDED, BRANCH, MARK, NEAR, FIRST = 0, 1, 2, 3, 4, 5, 6
+INSIDE, BOUND = 0, 1
+LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
+DONE, PAUSED = 0, 1
+
+
+class Data(NamedTuple):
+    """What does not change during a search; columns and chi have unit length."""
+
+    columns: FloatArray
+    """One column of W a row, (n_columns, k)."""
+    chi: FloatArray
+    """(k,)"""
+    unit: IntArray
+    """Which unit each column belongs to, (n_columns,)."""
+    first: IntArray
+    """First column of each unit, whose columns stand together, (n_units,)."""
+    size: IntArray
+    """Columns of each unit, (n_units,)."""
+    places: int
+    """Columns that may be included."""
+    factor: float
+    """Share of the best squared error that a subset must be below."""
+    uncertainty: float
+    """Of the square root of a bound."""
+    slack: float
+    """Uncertainty of INSIDE; what is within it is calculated anew."""
+
+
+class State(NamedTuple):
+    """Where a search stands; a level is a node on the way from the root, one per branch."""
+
+    sheets: FloatArray
+    """(n_levels, 2 n_columns + nullity + 2, n_columns)"""
+    numbers: IntArray
+    """(n_levels, FIRST + n_columns)"""
+    errors: FloatArray
+    """(n_levels, 2)"""
+    included: IntArray
+    """Columns of the current node, (n_columns,)."""
+    log: IntArray
+    """Decisions on the way here: 0 before a branch, unit + 1 included, -unit - 1 excluded."""
+    progress: IntArray
+    """LEVEL, whether to go back from it, length of the log, how many directions of the included
+    columns are known (SPANNED), and how often a column was neither surely dependent nor surely
+    not (DOUBTFUL), (5,)."""
+    basis: FloatArray
+    """Directions of the included columns, zero for those that depend on others, (n_columns, k)."""
+    best: FloatArray
+    """The smallest squared error found, (1,)."""
+    subset: IntArray
+    """Its columns, then -1, (n_columns,)."""
+
+
+@numba.njit(cache=True)
+def _position(numbers: IntArray, column: int) -> int:
+    for j in range(numbers[FREE]):
+        if numbers[FIRST + j] == column:
+            return j
+    return -1
+
+
+@numba.njit(cache=True)
+def _drop(sheet: FloatArray, numbers: IntArray, j: int) -> None:
+    """Put the last free column in place of column j."""
+    n, last = sheet.shape[1], numbers[FREE] - 1
+    numbers[FREE] = last
+    if j == last:
+        return
+    numbers[FIRST + j] = numbers[FIRST + last]
+    for start in (0, n):
+        for k in range(last + 1):
+            sheet[start + j, k] = sheet[start + last, k]
+        for i in range(last):
+            sheet[start + i, j] = sheet[start + i, last]
+    for row in range(2 * n, sheet.shape[0]):
+        sheet[row, j] = sheet[row, last]
+
+
+@numba.njit(cache=True)
+def _sweep(sheet: FloatArray, start: int, row: int, j: int, n: int) -> None:
+    """Take column j out of the matrix and the vector of one form."""
+    pivot = 1.0 / sheet[start + j, j]
+    step = sheet[row, j] * pivot
+    for i in range(n):
+        if i != j:
+            part = sheet[start + i, j] * pivot
+            for k in range(n):
+                sheet[start + i, k] -= part * sheet[start + j, k]
+    for k in range(n):
+        if k != j:
+            sheet[row, k] -= step * sheet[start + j, k]
+
+
+@numba.njit(cache=True)
+def _share(sheet: FloatArray, nullity: int, j: int) -> float:
+    """Squared share of a column in the null space of all included and free columns."""
+    start, share = 2 * sheet.shape[1], 0.0
+    for c in range(nullity):
+        share += sheet[start + c, j] * sheet[start + c, j]
+    return share
+
+
+@numba.njit(cache=True)
+def _exclude(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
+) -> None:
+    n, row = sheet.shape[1], sheet.shape[0] - 1
+    share = _share(sheet, numbers[NULLITY], j)
+    if numbers[NEAR] == 1 or APART < share < INVOLVED:
+        _drop(sheet, numbers, j)
+        _fit_anew(sheet, numbers, errors, s, data)
+        return
+    if share > APART:
+        _exclude_dependent(sheet, numbers, j, share)
+    else:
+        errors[BOUND] += sheet[row, j] ** 2 / sheet[n + j, j]
+        _sweep(sheet, n, row, j, numbers[FREE])
+    _drop(sheet, numbers, j)
+
+
+@numba.njit(cache=True)
+def _fit_anew(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
+) -> None:
+    """The fit with all included and free columns, from the columns themselves."""
+    n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
+    rows = np.empty((free + count, data.chi.size))
+    for j in range(free):
+        rows[j] = data.columns[numbers[FIRST + j]]
+    for k in range(count):
+        rows[free + k] = data.columns[s.included[k]]
+    left, values, right = np.linalg.svd(rows, full_matrices=True)
+    rank = 0
+    while rank < values.size and values[rank] > DEPENDENT * values[0]:
+        rank += 1
+    spanned = np.ascontiguousarray(right[:rank])
+    inner = spanned @ data.chi
+    rest = data.chi - inner @ spanned
+    own = np.ascontiguousarray(left[:free, :rank])
+    sheet[n : n + free, :free] = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
+    numbers[NULLITY] = min(free + count - rank, sheet.shape[0] - 2 * n - 2)
+    for c in range(numbers[NULLITY]):
+        sheet[2 * n + c, :free] = left[:free, rank + c]
+    sheet[sheet.shape[0] - 1, :free] = own @ (inner / values[:rank])
+    ratio = values[rank - 1] / values[0]
+    numbers[NEAR] = 1 if ratio < NEARLY else 0
+    length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
+    errors[BOUND] = max(errors[BOUND], max(length, 0.0) ** 2)
+
+
+@numba.njit(cache=True)
+def _exclude_dependent(sheet: FloatArray, numbers: IntArray, j: int, share: float) -> None:
+    """Move a column's part to the others along the null space: the fit stays the same."""
+    n, row = sheet.shape[1], sheet.shape[0] - 1
+    free, nullity, start = numbers[FREE], numbers[NULLITY], 2 * n
+    along = np.zeros(free)
+    for c in range(nullity):
+        for i in range(free):
+            along[i] += sheet[start + c, i] * sheet[start + c, j] / share
+    old = sheet[n + j, :free].copy()
+    amount, own = sheet[row, j], old[j]
+    for i in range(free):
+        sheet[row, i] -= along[i] * amount
+        for k in range(free):
+            sheet[n + i, k] += along[i] * along[k] * own - along[i] * old[k] - old[i] * along[k]
+    # A reflection turns the basis so that only its last vector has a part in column j.
+    mirror = sheet[start : start + nullity, j].copy()
+    mirror[nullity - 1] += np.sqrt(share) if mirror[nullity - 1] >= 0 else -np.sqrt(share)
+    squared = np.sum(mirror**2)
+    for i in range(free):
+        total = 0.0
+        for c in range(nullity):
+            total += sheet[start + c, i] * mirror[c]
+        for c in range(nullity):
+            sheet[start + c, i] -= 2 * total / squared * mirror[c]
+    numbers[NULLITY] = nullity - 1
+
+
+@numba.njit(cache=True)
+def _left(basis: FloatArray, count: int, column: FloatArray) -> FloatArray:
+    """What is left of a column without its parts along some directions."""
+    left: FloatArray = column.copy()
+    for _ in range(2):
+        for i in range(count):
+            left -= np.dot(basis[i], left) * basis[i]
+    return left
+
+
+@numba.njit(cache=True)
+def _span(s: State, data: Data, count: int) -> None:
+    """Find the directions of the first included columns, as far as they are not known."""
+    for k in range(s.progress[SPANNED], count):
+        left = _left(s.basis, k, data.columns[s.included[k]])
+        length = np.sqrt(np.dot(left, left))
+        if DEPENDENT < length < REAL:
+            s.progress[DOUBTFUL] += 1
+        s.basis[k] = left / length if length > DEPENDENT else 0.0 * left
+    s.progress[SPANNED] = max(s.progress[SPANNED], count)
+
+
+@numba.njit(cache=True)
+def _include(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
+) -> None:
+    own, row = sheet[j, j], sheet.shape[0] - 2
+    if own > SURE:
+        errors[INSIDE] -= sheet[row, j] ** 2 / own
+        _sweep(sheet, 0, row, j, numbers[FREE])
+    _drop(sheet, numbers, j)
+    if GONE < own <= SURE:
+        _calculate_anew(sheet, numbers, errors, s, data)
+
+
+@numba.njit(cache=True)
+def _calculate_anew(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
+) -> None:
+    """What the included columns leave, from the columns themselves."""
+    free, row = numbers[FREE], sheet.shape[0] - 2
+    count = numbers[INCLUDED]
+    _span(s, data, count)
+    left = _left(s.basis, count, data.chi)
+    rest = np.empty((free, left.size))
+    for j in range(free):
+        rest[j] = _left(s.basis, count, data.columns[numbers[FIRST + j]])
+        sheet[row, j] = np.dot(rest[j], left)
+        for i in range(j + 1):
+            sheet[i, j] = sheet[j, i] = np.dot(rest[i], rest[j])
+    errors[INSIDE] = np.dot(left, left)
+
+
+@numba.njit(cache=True)
+def _decide(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int,
+    include: bool,
+) -> None:  # fmt: skip
+    """Include or exclude all columns of a unit."""
+    progress = s.progress
+    s.log[progress[LOGGED]] = unit + 1 if include else -unit - 1
+    progress[LOGGED] += 1
+    first = data.first[unit]
+    for column in range(first, first + data.size[unit]):
+        j = _position(numbers, column)
+        if include:
+            s.included[numbers[INCLUDED]] = column
+            progress[SPANNED] = min(progress[SPANNED], numbers[INCLUDED])
+            numbers[INCLUDED] += 1
+            _include(sheet, numbers, errors, s, data, j)
+        else:
+            _exclude(sheet, numbers, errors, s, data, j)
+
+
+@numba.njit(cache=True)
+def _branch(s: State, data: Data, unit: int) -> None:
+    """Keep the node for later and go on with a copy of it that includes a unit."""
+    level = s.progress[LEVEL]
+    sheet, numbers = s.sheets[level], s.numbers[level]
+    numbers[BRANCH], numbers[MARK] = unit, s.progress[LOGGED]
+    s.log[s.progress[LOGGED]] = 0
+    s.progress[LOGGED] += 1
+    s.progress[LEVEL] = level + 1
+    deeper = s.sheets[level + 1]
+    n, free = sheet.shape[1], numbers[FREE]
+    for start in (0, n):
+        for i in range(free):
+            for k in range(free):
+                deeper[start + i, k] = sheet[start + i, k]
+    for row in range(2 * n, sheet.shape[0]):
+        for k in range(free):
+            deeper[row, k] = sheet[row, k]
+    s.numbers[level + 1] = numbers
+    s.errors[level + 1] = s.errors[level]
+    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, True)
+
+
+@numba.njit(cache=True)
+def _parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
+    """Whether the included columns leave of two others what is parallel to rounding."""
+    _span(s, data, count)
+    first = _left(s.basis, count, data.columns[one])
+    length = np.dot(first, first)
+    if length <= DEPENDENT**2:
+        return False
+    second = _left(s.basis, count, data.columns[other])
+    rest = second - np.dot(first, second) / length * first
+    return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
+
+
+@numba.njit(cache=True)
+def _exclude_parallel(
+    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
+) -> None:
+    """Exclude the columns that are parallel, in what is left of them, to that of a unit.
+
+    A subset with one of them explains no more than the same with the unit, which is searched.
+    """
+    own = _position(numbers, data.first[unit])
+    for j in range(numbers[FREE] - 1, -1, -1):
+        column = numbers[FIRST + j]
+        near = sheet[j, j] * sheet[own, own] - sheet[j, own] ** 2 <= GONE * sheet[own, own]
+        if j == own or not near or data.size[data.unit[column]] > 1:
+            continue
+        if _parallel(s, data, numbers[INCLUDED], data.first[unit], column):
+            _decide(sheet, numbers, errors, s, data, data.unit[column], False)
+            own = _position(numbers, data.first[unit])
+
+
+@numba.njit(cache=True)
+def _go_back(s: State, data: Data) -> None:
+    """Take the exclude branch of the level above."""
+    s.progress[LEVEL] -= 1
+    level = s.progress[LEVEL]
+    if level < 0:
+        return
+    sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
+    s.progress[LOGGED] = numbers[MARK]
+    unit = numbers[BRANCH]
+    if data.size[unit] == 1:
+        _exclude_parallel(sheet, numbers, errors, s, data, unit)
+    _decide(sheet, numbers, errors, s, data, unit, False)
+
+
+@numba.njit(cache=True)
+def _threshold(best: float, factor: float, uncertainty: float) -> float:
+    wanted: float = best * factor
+    return wanted + 2 * np.sqrt(wanted) * uncertainty
+
+
+@numba.njit(cache=True)
+def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
+    """Keep the included columns and two more if their squared error is the smallest.
+
+    It is calculated by orthogonalisation; -1 stands for no column.
+    """
+    subset = np.full(data.unit.size, -1, np.int64)
+    subset[:count] = s.included[:count]
+    _span(s, data, count)
+    basis = np.empty((count + 2, data.chi.size))
+    basis[:count] = s.basis[:count]
+    for column in (first, second):
+        if column >= 0:
+            subset[count] = column
+            direction = _left(basis, count, data.columns[column])
+            length = np.sqrt(np.dot(direction, direction))
+            basis[count] = direction / length if length > DEPENDENT else 0.0 * direction
+            count += 1
+    left = _left(basis, count, data.chi)
+    error = np.dot(left, left)
+    if error < s.best[0] * (1 - 1e-12):
+        s.best[0] = error
+        s.subset[:] = subset
+
+
+@numba.njit(cache=True)
+def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> bool:
+    """Decide what needs no branching at a node; False where it can be left.
+
+    Units that are explained already or have no place are excluded; those without which the
+    bound would pass the threshold are included.
+    """
+    while True:
+        threshold = _threshold(s.best[0], data.factor, data.uncertainty)
+        if errors[INSIDE] < threshold + data.slack:
+            _offer(s, data, numbers[INCLUDED], -1, -1)
+            threshold = _threshold(s.best[0], data.factor, data.uncertainty)
+        places = data.places - numbers[INCLUDED]
+        if errors[BOUND] >= threshold or places == 0 or numbers[FREE] == 0:
+            return False
+        room = threshold - errors[BOUND]
+        needed, must, useless = _needed_and_useless(
+            sheet, numbers, data.unit, data.size, places, room
+        )
+        if useless >= 0:
+            _decide(sheet, numbers, errors, s, data, useless, False)
+        elif needed > places:
+            return False
+        elif must < 0:
+            return True
+        else:
+            _decide(sheet, numbers, errors, s, data, must, True)
+
+
+@numba.njit(cache=True)
+def _needed(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
+    """Whether the bound rises by at least ``room`` when a column is excluded."""
+    own = sheet[sheet.shape[0] - 1, j]
+    if own * own < room * sheet[sheet.shape[1] + j, j]:
+        return False
+    return _share(sheet, nullity, j) <= APART
+
+
+@numba.njit(cache=True)
+def _needed_and_useless(
+    sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
+) -> tuple[int, int, int]:
+    """Places of the units that cannot be missed, one of them, and a useless unit; -1 for none."""
+    needed, must, nullity = 0, -1, numbers[NULLITY]
+    for j in range(numbers[FREE]):
+        own = unit[numbers[FIRST + j]]
+        if size[own] > places or (size[own] == 1 and sheet[j, j] <= GONE):
+            return needed, must, own
+        if numbers[NEAR] == 0 and _needed(sheet, nullity, j, room):
+            counted = False
+            for i in range(j if size[own] > 1 else 0):
+                same = unit[numbers[FIRST + i]] == own
+                counted = counted or (same and _needed(sheet, nullity, i, room))
+            if not counted:
+                needed += size[own]
+                must = own
+    return needed, must, -1
+
+
+@numba.njit(cache=True)
+def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data) -> None:
+    """Try every free column in the last place."""
+    row = sheet.shape[0] - 2
+    limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+    for j in range(numbers[FREE]):
+        part = abs(sheet[row, j]) + ROUND_OFF
+        if part * part > (inside - limit) * (sheet[j, j] - ROUND_OFF):
+            _offer(s, data, numbers[INCLUDED], numbers[FIRST + j], -1)
+            limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+
+
+@numba.njit(cache=True)
+def _last_two_places(
+    sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
+) -> None:
+    """Try every pair of free columns, each of its own unit, in the last two places."""
+    row = sheet.shape[0] - 2
+    limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+    for i in range(numbers[FREE]):
+        own = sheet[i, i]
+        step = sheet[row, i] / own
+        left = inside - sheet[row, i] * step
+        if left < limit:  # every pair may be dependent
+            _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], -1)
+            limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+        for j in range(i):
+            rest = sheet[j, j] - sheet[i, j] * sheet[i, j] / own
+            part = abs(sheet[row, j] - sheet[i, j] * step) + ROUND_OFF
+            if rest > GONE and part * part > (left - limit) * (rest - ROUND_OFF):
+                _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], numbers[FIRST + j])
+                limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+
+
+@numba.njit(cache=True)
+def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
+    """The free column to branch on: that of the largest moment^2 / gram^(3/2).
+
+    The power is between the gain itself (1) and what favours columns that are nearly explained
+    already; it was found by trying.
+    """
+    row = sheet.shape[0] - 2
+    best, chosen = -1.0, numbers[FIRST]
+    for j in range(numbers[FREE]):
+        own = sheet[j, j]
+        if own > GONE:
+            value = sheet[row, j] * sheet[row, j] / (own * np.sqrt(own))
+            if value > best:
+                best, chosen = value, numbers[FIRST + j]
+    return int(chosen)
+
+
+@numba.njit(cache=True, nogil=True)
+def search(s: State, data: Data, most: int) -> tuple[int, int]:
+    """Go on for at most so many nodes.
+
+    Returns:
+        DONE or PAUSED, and the number of nodes visited.
+    """
+    singles = data.size.max() == 1
+    for nodes in range(most):
+        if s.progress[GOING_BACK] == 1:
+            _go_back(s, data)
+            s.progress[GOING_BACK] = 0
+        level = s.progress[LEVEL]
+        if level < 0:
+            return DONE, nodes
+        sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
+        open_ = _settle(sheet, numbers, errors, s, data)
+        places = data.places - numbers[INCLUDED]
+        if open_ and places == 1:
+            _last_place(sheet, numbers, errors[INSIDE], s, data)
+            open_ = False
+        elif open_ and places == 2 and singles:
+            _last_two_places(sheet, numbers, errors[INSIDE], s, data)
+            open_ = False
+        if open_:
+            _branch(s, data, data.unit[_most_promising(sheet, numbers)])
+        else:
+            s.progress[GOING_BACK] = 1
+    return PAUSED, most
+
+
+@numba.njit(cache=True)
+def repeat(s: State, data: Data, log: IntArray) -> None:
+    """Go the way that another search has logged."""
+    for k in range(log.size):
+        decision, level = log[k], s.progress[LEVEL]
+        if decision == 0:
+            _branch(s, data, log[k + 1] - 1)
+        elif decision < 0 or k == 0 or log[k - 1] != 0:  # a branch has included its unit already
+            _decide(
+                s.sheets[level], s.numbers[level], s.errors[level], s, data,
+                abs(decision) - 1, decision > 0,
+            )  # fmt: skip

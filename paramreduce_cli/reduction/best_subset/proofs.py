@@ -1,0 +1,255 @@
+"""Searches for the best subsets of all sizes, and what they prove."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
+from paramreduce_cli.reduction.best_subset.search import (
+    Search,
+    UnitProblem,
+    compile_search,
+    unit_problem,
+)
+from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.problem import FULL_PRECISION
+from paramreduce_cli.reduction.task import SelectionTask
+
+_SLICE = 20_000
+"""Nodes between two looks at the clock."""
+_FIRST_ROUND, _GROWTH = 30_000, 8
+"""Nodes for each size in the first round, and how many times more in each further one."""
+_UNLIMITED = 10**15
+_SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
+"""Of the best error, that are tried as lower bounds where the optimum is not proven."""
+_NODES_PER_SHARE = 30_000
+_SHARE_OF_TIME, _LEAST_TIME = 0.1, 2.0
+"""Of the time limit, and s, that lower bounds may take after it."""
+
+
+@dataclass
+class _Proof:
+    """What is known of one size; errors are squared shares of chi."""
+
+    n: int
+    exact: IntArray
+    """A subset of just this size, for groups do not fill every size as well as a smaller one."""
+    subset: IntArray
+    """The best one of at most this size."""
+    squared_error: float
+    squared_bound: float = 0.0
+    status: ProofStatus = ProofStatus.BEST_FOUND
+    seconds: float = 0.0
+    nodes: int = 0
+    log: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+
+    def take(self, subset: IntArray, squared_error: float) -> None:
+        """Remember a better subset."""
+        self.subset, self.squared_error = subset, squared_error
+        if subset.size == self.n:
+            self.exact = subset
+
+
+class ProofSearch:
+    """Searches for the sizes one after the other, as many at a time as there are threads.
+
+    Args:
+        task: What is asked for.
+        starts: Subsets of columns to start from, one of every size.
+    """
+
+    def __init__(self, task: SelectionTask, starts: Iterable[IntArray]) -> None:
+        self._task = task
+        self._objective: Objective = task.objective
+        self._problem: UnitProblem = unit_problem(task.objective.problem)
+        self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
+        self._proofs: dict[int, _Proof] = {}
+        self._spent: dict[int, int] = {}
+        for columns in starts:
+            self._start(self._numbered(columns))
+        if task.previous is not None:
+            self._remember(task.previous)
+        self._spread()
+
+    def _numbered(self, columns: IntArray) -> IntArray:
+        return np.array([self._place[int(c)] for c in columns], dtype=np.int64)
+
+    def _squared_error(self, subset: IntArray) -> float:
+        return self._objective.score(self._units(subset)) ** 2
+
+    def _units(self, subset: IntArray) -> Units:
+        return self._objective.units_of(self._problem.columns[subset])
+
+    def _start(self, subset: IntArray) -> None:
+        error = self._squared_error(subset)
+        self._proofs[subset.size] = _Proof(subset.size, subset, subset, error)
+
+    def _remember(self, previous: Proofs) -> None:
+        """Take over what an earlier run has found and proven on the same units."""
+        same = len(previous.units) == len(self._objective.units) and all(
+            np.array_equal(a, b) for a, b in zip(previous.units, self._objective.units, strict=True)
+        )
+        for k, n in enumerate(previous.n.tolist() if same else []):
+            proof = self._proofs.get(n)
+            if proof is None:
+                continue
+            subset = self._numbered(previous.subsets[k])
+            error = self._squared_error(subset)
+            if error < proof.squared_error:
+                proof.take(subset, error)
+            proof.squared_bound = float(previous.lower_bound[k]) ** 2
+            proof.status, proof.log = previous.status[k], previous.logs[k]
+            proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
+
+    def run(self) -> None:
+        """Search until all is proven, or time or nodes run out, or the user has enough.
+
+        In rounds of growing effort, so that what is easily proven does not wait for the rest.
+        """
+        compile_search()
+        stop = threading.Event()
+        deadline = time.monotonic() + self._task.effort.time_limit
+        budget = _FIRST_ROUND
+        limit = self._task.effort.node_limit or _UNLIMITED
+        with ThreadPoolExecutor(self._task.effort.jobs) as pool:
+            try:
+                while time.monotonic() < deadline and self._open():
+                    self._round(pool, min(budget, limit), deadline, stop)
+                    if budget >= limit:
+                        break
+                    budget *= _GROWTH
+                more = max(_LEAST_TIME, _SHARE_OF_TIME * self._task.effort.time_limit)
+                self._raise_bounds(pool, time.monotonic() + more, stop)
+            except KeyboardInterrupt:
+                stop.set()
+                self._task.interrupted()
+        self._spread()
+
+    def _open(self) -> list[_Proof]:
+        return [
+            p
+            for _, p in sorted(self._proofs.items())
+            if p.status == ProofStatus.BEST_FOUND and p.squared_error > FULL_PRECISION**2
+        ]
+
+    def _round(
+        self, pool: ThreadPoolExecutor, budget: int, deadline: float, stop: threading.Event
+    ) -> None:
+        """Search for every size that is open up to a number of nodes in all."""
+
+        def work(proof: _Proof) -> None:
+            search = self._search(proof)
+            self._advance(search, budget - self._spent.get(proof.n, 0), deadline, stop)
+            self._spent[proof.n] = self._spent.get(proof.n, 0) + search.nodes
+            self._take_over(proof, search)
+
+        shown = -1
+        for future in as_completed([pool.submit(work, proof) for proof in self._open()]):
+            future.result()
+            done = len(self._proofs) - len(self._open())
+            if done != shown:
+                remark = f"{done} of {len(self._proofs)} sizes"
+                self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
+                shown = done
+
+    def _search(self, proof: _Proof, factor: float = 1.0) -> Search:
+        log = proof.log if factor == 1.0 else None
+        return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
+
+    def _advance(self, search: Search, nodes: int, deadline: float, stop: threading.Event) -> None:
+        started = time.perf_counter()
+        while not search.finished and search.nodes < nodes and not stop.is_set():
+            if time.monotonic() > deadline:
+                break
+            search.advance(min(_SLICE, nodes - search.nodes))
+        search.seconds = time.perf_counter() - started
+
+    def _raise_bounds(
+        self, pool: ThreadPoolExecutor, deadline: float, stop: threading.Event
+    ) -> None:
+        """Prove at least that the error cannot be a fraction of the best one.
+
+        A search for much smaller errors ends much sooner.
+        """
+
+        def work(proof: _Proof) -> None:
+            known = np.sqrt(proof.squared_bound / proof.squared_error)
+            for share in (share for share in _SHARES if share > known):
+                search = self._search(proof, factor=share**2)
+                self._advance(search, _NODES_PER_SHARE, deadline, stop)
+                proof.seconds += search.seconds
+                if not search.finished or not self._certain(search):
+                    return
+                proof.squared_bound = max(proof.squared_bound, search.bound)
+
+        list(pool.map(work, self._open()))
+
+    def _certain(self, search: Search) -> bool:
+        return self._problem.certifiable and not search.doubtful
+
+    def _take_over(self, proof: _Proof, search: Search) -> None:
+        """Note how far a search has come."""
+        if search.squared_error < proof.squared_error and search.subset.size:
+            better = self._filled(search.subset, proof.n)
+            proof.take(better, self._squared_error(better))
+        proof.nodes += search.nodes
+        proof.seconds += search.seconds
+        certain = self._certain(search)
+        if certain:
+            proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
+        proof.log = np.zeros(0, np.int64) if search.finished else search.log
+        if search.finished or not certain:
+            proof.status = ProofStatus.OPTIMAL if certain else ProofStatus.UNCERTIFIED
+        if proof.status == ProofStatus.OPTIMAL:
+            proof.squared_bound = proof.squared_error
+
+    def _filled(self, subset: IntArray, n: int) -> IntArray:
+        """A subset with further units, as long as there are places."""
+        kept = self._units(subset)
+        for unit in range(len(self._objective.units)):
+            longer = (*kept, unit)
+            if unit not in kept and self._objective.width(longer) <= n:
+                kept = longer
+        return self._numbered(self._objective.columns(kept))
+
+    def _spread(self) -> None:
+        """What holds for one size holds for its neighbours.
+
+        A subset may be used for all larger sizes, a bound for all smaller ones; and where nothing
+        is left to explain there is nothing to prove.
+        """
+        before: _Proof | None = None
+        for _, proof in sorted(self._proofs.items()):
+            if before is not None and before.squared_error < proof.squared_error:
+                proof.subset, proof.squared_error = before.subset, before.squared_error
+            before = proof
+        bound = 0.0
+        for _, proof in sorted(self._proofs.items(), reverse=True):
+            if proof.squared_error <= FULL_PRECISION**2:
+                proof.status = ProofStatus.OPTIMAL
+            proof.squared_bound = bound = max(bound, proof.squared_bound)
+
+    def subsets(self) -> list[Units]:
+        """The best subset found of just each size, after :meth:`run`."""
+        return [self._units(proof.exact) for proof in self._proofs.values()]
+
+    def record(self) -> Proofs:
+        """All proofs by size."""
+        proofs = [self._proofs[n] for n in sorted(self._proofs)]
+        return Proofs(
+            units=tuple(self._objective.units),
+            n=np.array([p.n for p in proofs]),
+            subsets=tuple(self._problem.columns[p.subset] for p in proofs),
+            torque_error=np.sqrt([p.squared_error for p in proofs]),
+            lower_bound=np.sqrt([p.squared_bound for p in proofs]),
+            status=tuple(p.status for p in proofs),
+            seconds=np.array([p.seconds for p in proofs]),
+            nodes=np.array([p.nodes for p in proofs], dtype=np.int64),
+            logs=tuple(p.log for p in proofs),
+        )

@@ -1,0 +1,209 @@
+"""The best subset of a size, with a proof: a search that can be stopped and continued."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from paramreduce_cli.multibody.orthogonal import DEPENDENT
+from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.reduction.problem import SelectionProblem
+
+if TYPE_CHECKING:
+    from paramreduce_cli.reduction.best_subset.kernel import State
+
+LARGEST_CONDITION = 1e5
+"""Condition number of the non-zero spectrum up to which the search can certify: it updates
+inverses of X'X, whose round-off grows with its square."""
+RESOLUTION = 1e-9
+"""Relative difference of squared errors that a proof does not resolve."""
+_UPDATES = 1e-14
+"""Round-off of the square root of a bound, for every unit of the condition number."""
+_SLACK = 1e-12
+"""Round-off of a squared error that is updated step by step; what is as near is calculated anew."""
+
+
+@dataclass(frozen=True)
+class UnitProblem:
+    """A selection problem with columns and chi of unit length, its columns numbered from zero.
+
+    Attributes:
+        X: (k, n_columns)
+        chi: (k,)
+        columns: Their numbers in the problem it was made from, units together.
+        unit: Which unit each column belongs to, (n_columns,).
+        condition: Largest over smallest non-zero singular value of X.
+        nearest: Smallest sine of the angle between two columns, those parallel to rounding aside.
+        rank: Of X.
+    """
+
+    X: FloatArray
+    chi: FloatArray
+    columns: IntArray
+    unit: IntArray
+    condition: float
+    nearest: float
+    rank: int
+
+    @property
+    def certifiable(self) -> bool:
+        """Whether double precision is enough for proofs."""
+        return self.condition <= LARGEST_CONDITION and self.nearest >= 1 / LARGEST_CONDITION
+
+
+def unit_problem(problem: SelectionProblem) -> UnitProblem:
+    """Scale the candidates' columns and chi to unit length; errors become shares of chi."""
+    units, columns = problem.units, problem.columns
+    X = problem.X[:, columns]
+    s = np.linalg.svd(X, compute_uv=False)
+    rank = int(np.sum(s > DEPENDENT * s[0]))
+    unit = np.repeat(np.arange(len(units)), [u.size for u in units])
+    return UnitProblem(X, problem.y, columns, unit, float(s[0] / s[rank - 1]), _nearest(X), rank)
+
+
+def _nearest(X: FloatArray) -> float:
+    sines = [1.0]
+    for j in range(1, X.shape[1]):
+        other = X[:, :j]
+        rest = X[:, [j]] - other * (X[:, j] @ other)
+        sines += np.linalg.norm(rest, axis=0).tolist()
+    return min(sine for sine in sines if sine > DEPENDENT)
+
+
+class Search:
+    """Branch and bound for the best subset of at most so many columns.
+
+    Args:
+        problem: The columns.
+        places: Columns that may be taken.
+        squared_error: Of the best subset known.
+        subset: That subset, numbered as the columns of ``problem``.
+        factor: Share of the best squared error that is searched for: below one, a finished
+            search proves that much as a lower bound.
+        log: Where an earlier search of the same kind has stopped.
+    """
+
+    def __init__(
+        self,
+        problem: UnitProblem,
+        places: int,
+        squared_error: float,
+        subset: IntArray,
+        factor: float = 1.0,
+        log: IntArray | None = None,
+    ) -> None:
+        from paramreduce_cli.reduction.best_subset import kernel
+
+        self._kernel = kernel
+        self._data = kernel.Data(
+            columns=np.ascontiguousarray(problem.X.T),
+            chi=problem.chi,
+            unit=problem.unit.astype(np.int64),
+            first=np.searchsorted(problem.unit, np.arange(problem.unit[-1] + 1)),
+            size=np.bincount(problem.unit).astype(np.int64),
+            places=places,
+            factor=factor * (1 - RESOLUTION),
+            uncertainty=_UPDATES * problem.condition,
+            slack=_SLACK,
+        )
+        self._state = self._root(problem, places, squared_error, subset)
+        self.finished = False
+        self.nodes = 0
+        self.seconds = 0.0
+        if log is not None and log.size:
+            kernel.repeat(self._state, self._data, log.astype(np.int64))
+
+    def _root(
+        self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
+    ) -> State:
+        kernel, X, chi, rank = self._kernel, problem.X, problem.chi, problem.rank
+        n, levels = X.shape[1], min(places, int(problem.unit[-1]) + 1) + 2
+        U, s, Vt = np.linalg.svd(X, full_matrices=True)
+        V, null = Vt[:rank].T, Vt[rank:]
+        solution = V @ ((U[:, :rank].T @ chi) / s[:rank])
+        left = chi - X @ solution
+        sheets = np.zeros((levels, 2 * n + len(null) + 2, n))
+        sheets[0] = np.vstack([X.T @ X, (V / s[:rank] ** 2) @ V.T, null, X.T @ chi, solution])
+        numbers = np.zeros((levels, kernel.FIRST + n), np.int64)
+        numbers[0, kernel.FREE], numbers[0, kernel.NULLITY] = n, len(null)
+        numbers[0, kernel.FIRST :] = np.arange(n)
+        errors = np.zeros((levels, 2))
+        errors[0] = chi @ chi, left @ left
+        found = np.full(n, -1, np.int64)
+        found[: subset.size] = subset
+        return kernel.State(
+            sheets=sheets,
+            numbers=numbers,
+            errors=errors,
+            included=np.zeros(n, np.int64),
+            log=np.zeros(3 * n + 10, np.int64),
+            progress=np.zeros(5, np.int64),
+            basis=np.zeros((n, chi.size)),
+            best=np.array([squared_error]),
+            subset=found,
+        )
+
+    def advance(self, nodes: int) -> None:
+        """Go on for at most so many nodes."""
+        status, visited = self._kernel.search(self._state, self._data, nodes)
+        self.nodes += visited
+        self.finished = status == self._kernel.DONE
+
+    @property
+    def squared_error(self) -> float:
+        """Of the best subset found, a share of that of chi."""
+        return float(self._state.best[0])
+
+    @property
+    def subset(self) -> IntArray:
+        """The best subset found, numbered as the columns of the problem."""
+        found: IntArray = self._state.subset[self._state.subset >= 0]
+        return found
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a column was neither surely dependent nor surely not, so that nothing is proven."""
+        return bool(self._state.progress[self._kernel.DOUBTFUL])
+
+    @property
+    def bound(self) -> float:
+        """Squared error that no subset is below, as far as the search has come, less round-off."""
+        bound = self._exact_bound()
+        return float(max(0.0, np.sqrt(bound) - self._data.uncertainty) ** 2)
+
+    def _exact_bound(self) -> float:
+        searched = self.squared_error * self._data.factor
+        if self.finished:
+            return searched
+        state = self._state
+        level = max(int(state.progress[self._kernel.LEVEL]), 0)
+        waiting = (self._bound_of_exclusion(k) for k in range(level))
+        return min(searched, float(state.errors[level, self._kernel.BOUND]), *waiting)
+
+    def _bound_of_exclusion(self, level: int) -> float:
+        """Of the branch that a level has still to take."""
+        kernel, state = self._kernel, self._state
+        sheet, numbers = state.sheets[level], state.numbers[level]
+        n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
+        free = numbers[kernel.FIRST : kernel.FIRST + numbers[kernel.FREE]]
+        own = np.flatnonzero(self._data.unit[free] == numbers[kernel.BRANCH])
+        if numbers[kernel.NEAR]:
+            return float(state.errors[level, kernel.BOUND])
+        apart = np.sum(sheet[2 * n : 2 * n + nullity, own] ** 2, axis=0) <= kernel.APART
+        rises = np.where(apart, sheet[-1, own] ** 2 / sheet[n + own, own], 0.0)
+        return float(state.errors[level, kernel.BOUND] + rises.max())
+
+    @property
+    def log(self) -> IntArray:
+        """Where the search stands, to go on from there another time."""
+        log: IntArray = self._state.log[: self._state.progress[self._kernel.LOGGED]].copy()
+        return log
+
+
+def compile_search() -> None:
+    """Compile the search, once for all runs, so that no time limit pays for it."""
+    X = np.linalg.qr(np.arange(1.0, 17.0).reshape(4, 4) ** 1.5)[0]
+    problem = UnitProblem(X, X.sum(axis=1) / 2, np.arange(4), np.arange(4), 1.0, 1.0, 4)
+    Search(problem, 3, 1.0, np.zeros(0, np.int64), log=np.array([0, 1])).advance(100)

@@ -1,0 +1,219 @@
+"""The acceleration error as a criterion: exact, with first-order proposals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.multibody.orthogonal import unit_columns
+from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.fitting import Fit, fit, relative_error
+from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
+from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.problem import SelectionProblem
+
+SEARCH_SAMPLES = 200
+"""Samples on which subsets are compared."""
+FIT_SAMPLES = 1500
+"""Samples on which the parameters of the subsets found are fitted."""
+_PROPOSALS = 6
+"""How many of the most promising subsets are evaluated exactly."""
+_STEPS = 8
+_SMALLEST_STEP = 0.1
+_SETTLED = 1e-3
+_HOPELESS = 1.0
+"""Errors from which on models have a mass matrix too far from the real one for a fit to settle;
+only the first order tells them apart, and their parameters are those of the torques."""
+
+
+@dataclass(frozen=True)
+class _Point:
+    """A fitted model of some columns."""
+
+    parameters: FloatArray
+    error: float
+    residual: FloatArray
+    """(z̈_R - z̈) / nom, (n_samples, n_dof)."""
+    ddz: FloatArray
+    inverse: FloatArray
+    """M_R^-1, rows divided by nom, (n_samples, n_dof, n_dof)."""
+
+
+class _Accelerations:
+    """Fits of the exact acceleration error on one set of samples.
+
+    With e = z̈_R - z̈ and M_R z̈_R + δ_R = τ the derivative of z̈_R by the parameters is
+    -M_R^-1 K(z, ż, z̈_R), K being the regressor at the predicted accelerations.
+    """
+
+    def __init__(self, data: AccelerationData, reference: FloatArray) -> None:
+        self.data = data
+        self._total = float(np.linalg.norm(data.ddz / data.nominal))
+        M = data.A @ reference
+        try:
+            weights = np.linalg.inv(M) / data.nominal[:, None]
+        except np.linalg.LinAlgError as error:
+            raise DataError(
+                "the mass matrix of the model fitted to the estimation set is singular, so that "
+                "nothing can be selected by accelerations; bring more exciting samples."
+            ) from error
+        K = np.einsum("sijp,sj->sip", data.A, data.ddz) + data.B
+        n = K.shape[2]
+        self._first = (weights @ K).reshape(-1, n)
+        self._first_right = np.einsum("sij,sj->si", weights, data.tau).ravel()
+
+    def start(self, columns: IntArray) -> FloatArray:
+        """Parameters to first order, with the reference's mass matrix."""
+        return _least_squares(self._first[:, columns], self._first_right)
+
+    def point(self, columns: IntArray, parameters: FloatArray) -> _Point | None:
+        """The accelerations of a model; None where its mass matrix is singular."""
+        d = self.data
+        M = d.A[..., columns] @ parameters
+        try:
+            inverse = np.linalg.inv(M)
+        except np.linalg.LinAlgError:
+            return None
+        ddz = np.einsum("sij,sj->si", inverse, d.tau - d.B[..., columns] @ parameters)
+        residual = (ddz - d.ddz) / d.nominal
+        error = float(np.linalg.norm(residual)) / self._total
+        if not np.isfinite(error):
+            return None
+        return _Point(parameters, error, residual, ddz, inverse / d.nominal[:, None])
+
+    def slope(self, point: _Point, columns: IntArray) -> FloatArray:
+        """Minus the derivative of the residual by the parameters, (n_samples n_dof, n)."""
+        d = self.data
+        K = np.einsum("sijp,sj->sip", d.A[..., columns], point.ddz) + d.B[..., columns]
+        return (point.inverse @ K).reshape(-1, columns.size)
+
+    def fit(self, columns: IntArray, start: FloatArray) -> _Point | None:
+        """Minimise the exact error by Gauss-Newton steps that are halved until they help."""
+        best = self.point(columns, start)
+        for _ in range(_STEPS if best is not None else 0):
+            assert best is not None
+            step = _least_squares(self.slope(best, columns), best.residual.ravel())
+            share, found = 1.0, None
+            while share > _SMALLEST_STEP:
+                found = self.point(columns, best.parameters + share * step)
+                if found is not None and found.error < best.error:
+                    break
+                share, found = share / 2, None
+            if found is None:
+                break
+            settled = found.error > best.error * (1 - _SETTLED)
+            best = found
+            if settled:
+                break
+        return best
+
+    def first_order_error(self, columns: IntArray) -> float:
+        """Error to first order."""
+        left = self._first_right - self._first[:, columns] @ self.start(columns)
+        return float(np.linalg.norm(left)) / self._total
+
+
+def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
+    scaled, lengths = unit_columns(X)
+    solution = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ y, rcond=1e-13)[0]
+    result: FloatArray = solution / lengths
+    return result
+
+
+class AccelerationObjective(Objective):
+    """The exact acceleration error; its linearisation at a subset proposes what to try."""
+
+    negligible = 1e-7
+
+    def __init__(
+        self, problem: SelectionProblem, search: AccelerationData, final: AccelerationData
+    ) -> None:
+        super().__init__(problem)
+        reference = np.zeros(problem.W.shape[1])
+        reference[problem.candidates] = fit(problem, problem.candidates).parameters
+        self._search = _Accelerations(search, reference)
+        self._final = _Accelerations(final, reference)
+        self._torque = TorqueObjective(problem)
+        self._known: dict[frozenset[int], tuple[float, _Point | None]] = {}
+
+    @property
+    def cheap(self) -> Objective:
+        """The torque error of the same subsets."""
+        return self._torque
+
+    def score(self, kept: Units) -> float:
+        """Acceleration error of the fit to the accelerations."""
+        return self._fitted(kept)[0]
+
+    def _fitted(self, kept: Units) -> tuple[float, _Point | None]:
+        key = frozenset(kept)
+        if key not in self._known:
+            columns = self._sorted_columns(kept)
+            point = self._search.fit(columns, self._search.start(columns))
+            if point is not None and point.error < _HOPELESS:
+                self._known[key] = (point.error, point)
+            else:
+                hopeless = _HOPELESS + self._search.first_order_error(columns)
+                self._known[key] = (hopeless, None)
+        return self._known[key]
+
+    def _sorted_columns(self, kept: Units) -> IntArray:
+        return self.columns(tuple(sorted(kept)))
+
+    def _linearised(self, kept: Units) -> TorqueObjective:
+        """The least-squares problem of the accelerations around a fitted subset."""
+        point = self._fitted(kept)[1]
+        everything = np.arange(self.problem.W.shape[1])
+        if point is None:
+            X, y = self._search._first, self._search._first_right
+        else:
+            columns = self._sorted_columns(kept)
+            X = self._search.slope(point, everything)
+            y = point.residual.ravel() + X[:, columns] @ point.parameters
+        factor: FloatArray = np.linalg.qr(np.column_stack([X, y]), mode="r")  # type: ignore[assignment]
+        return TorqueObjective(self.problem.on(factor))
+
+    def gains(self, kept: Units) -> FloatArray:
+        """By how much the error falls, for the units that promise most."""
+        promised = self._linearised(kept).gains(kept)
+        result = np.full(promised.size, -np.inf)
+        now = self.score(kept)
+        for unit in np.argsort(-promised, kind="stable")[:_PROPOSALS].tolist():
+            if promised[unit] > -np.inf:
+                result[unit] = (now - self.score((*kept, unit))) / self.widths[unit]
+        return result
+
+    def losses(self, kept: Units) -> FloatArray:
+        """By how much the error rises, for the units that promise to cost least."""
+        promised = self._linearised(kept).losses(kept)
+        result = np.full(promised.size, np.inf)
+        now = self.score(kept)
+        for unit in np.argsort(promised, kind="stable")[:_PROPOSALS].tolist():
+            if promised[unit] < np.inf:
+                rise = self.score(without(kept, unit)) - now if len(kept) > 1 else 0.0
+                result[unit] = rise / self.widths[unit]
+        return result
+
+    def exchanged(self, kept: Units) -> Units:
+        """The best of the exchanges that promise most."""
+        proposals = self._linearised(kept).promising_exchanges(kept, _PROPOSALS)
+        return min([kept, *proposals], key=self.score)
+
+    def fit(self, subset: IntArray) -> Fit:
+        """Parameters that minimise the exact acceleration error; beta is that of the torques."""
+        torque = fit(self.problem, subset)
+        point = self._final.fit(subset, self._final.start(subset))
+        if point is None or point.error >= _HOPELESS:
+            return torque
+        error = relative_error(self.problem, subset, point.parameters)
+        return Fit(point.parameters, torque.beta, error, torque.minimum_norm)
+
+
+def acceleration(problem: SelectionProblem, inputs: CriterionInputs) -> Objective:
+    """The exact error of the accelerations, parameters fitted for it."""
+    return AccelerationObjective(
+        problem, inputs.accelerations(SEARCH_SAMPLES), inputs.accelerations(FIT_SAMPLES)
+    )

@@ -1,0 +1,43 @@
+"""Sequential floating forward selection [Pudil1994]."""
+
+from __future__ import annotations
+
+from paramreduce_cli.reduction.objective import Units
+from paramreduce_cli.reduction.problem import TIE
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, completed
+
+
+def floating(task: SelectionTask) -> FoundSubsets:
+    """Add the best parameter, then remove as long as that leaves a better subset than before.
+
+    After every addition the parameter that costs least is taken out if the smaller subset is
+    better than the best one of its size so far, and again, until it is not.
+    """
+    objective = task.objective
+    best: dict[int, tuple[float, Units]] = {}
+    kept: Units = ()
+    while objective.width(kept) < task.limit:
+        longer = objective.with_best(kept, task.limit)
+        if longer == kept:
+            break
+        kept = longer
+        _keep_if_better(task, best, kept)
+        while len(kept) > 2:
+            shorter = objective.without_least(kept)
+            if not _keep_if_better(task, best, shorter):
+                break
+            kept = shorter
+        kept = best[objective.width(kept)][1]
+    rest = completed(objective, kept)
+    for k in range(len(kept) + 1, len(rest) + 1):
+        if objective.width(rest[:k]) <= task.limit:
+            best[objective.width(rest[:k])] = (0.0, rest[:k])
+    return by_size(objective, [units for n, (_, units) in best.items() if n <= task.limit])
+
+
+def _keep_if_better(task: SelectionTask, best: dict[int, tuple[float, Units]], kept: Units) -> bool:
+    n, score = task.objective.width(kept), task.objective.score(kept)
+    if n in best and not score < best[n][0] * (1 - TIE):
+        return False
+    best[n] = (score, kept)
+    return True

@@ -1,0 +1,114 @@
+"""Local search by exchanges from many starts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from paramreduce_cli.records import IntArray
+from paramreduce_cli.reduction.heuristics.backward_elimination import backward_elimination
+from paramreduce_cli.reduction.heuristics.forward_selection import forward_selection
+from paramreduce_cli.reduction.heuristics.forward_selection_2 import forward_selection_2
+from paramreduce_cli.reduction.heuristics.torque_only.qr import qr
+from paramreduce_cli.reduction.objective import Objective, Units
+from paramreduce_cli.reduction.problem import TIE
+from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, by_size
+
+_KICKED = 3
+"""Parameters that a random change replaces."""
+
+
+def swap(task: SelectionTask) -> FoundSubsets:
+    """Exchange one parameter for another as long as that helps, from many starts.
+
+    Starts are the subsets of forward selection, backward elimination and QR, those of the
+    neighbouring sizes with a parameter more or less, and random changes of the best subset. A
+    criterion that is costly to evaluate starts from what the swap search finds by torque, and
+    from its own forward selection.
+    """
+    search = _Exchanges(task.objective, task.smallest, task.limit)
+    cheap = task.objective.cheap
+    if cheap is None:
+        for start in (forward_selection, forward_selection_2, backward_elimination, qr):
+            search.offer_all(start(replace(task, effort=Effort())).subsets)
+    else:
+        search.offer_all(swap(replace(task, objective=cheap)).subsets)
+        search.offer_all(forward_selection(task).subsets)
+    search.neighbours()
+    if cheap is None:
+        search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed))
+    return by_size(task.objective, search.best.values())
+
+
+class _Exchanges:
+    """The best subset of each size so far.
+
+    Args:
+        objective: What is minimised.
+        smallest: Number of columns.
+        limit: Largest number of columns.
+    """
+
+    def __init__(self, objective: Objective, smallest: int, limit: int) -> None:
+        self.objective = objective
+        self.smallest, self.limit = smallest, limit
+        self.best: dict[int, Units] = {}
+        self._scores: dict[int, float] = {}
+        self._seen: set[frozenset[int]] = set()
+
+    def offer_all(self, subsets: tuple[IntArray, ...]) -> None:
+        """Improve subsets of columns and keep the best."""
+        for subset in subsets:
+            if self.smallest <= len(subset) <= self.limit:
+                self.offer(self.objective.units_of(subset))
+
+    def offer(self, kept: Units) -> bool:
+        """Improve a subset by exchanges; whether it is better than the best of its size."""
+        n = self.objective.width(kept)
+        known = self._scores.get(n, np.inf)
+        if known <= self.objective.negligible or frozenset(kept) in self._seen:
+            return False
+        self._seen.add(frozenset(kept))
+        kept, score = self.objective.improved(kept)
+        self._seen.add(frozenset(kept))
+        if n in self.best and not score < known * (1 - TIE):
+            return False
+        self.best[n], self._scores[n] = kept, score
+        return True
+
+    def neighbours(self) -> None:
+        """Add to and take from the subsets of the sizes around until none gets better."""
+        while True:
+            better = [self._offer_longer(n) for n in sorted(self.best)]
+            better += [self._offer_shorter(n) for n in sorted(self.best, reverse=True)]
+            if not any(better):
+                return
+
+    def _offer_longer(self, n: int) -> bool:
+        longer = self.objective.with_best(self.best[n], self.limit)
+        wide = self.objective.width(longer)
+        return n < wide <= self.limit and self.offer(longer)
+
+    def _offer_shorter(self, n: int) -> bool:
+        kept = self.best[n]
+        if len(kept) == 1:
+            return False
+        shorter = self.objective.without_least(kept)
+        return self.objective.width(shorter) >= self.smallest and self.offer(shorter)
+
+    def kick(self, times: int, random: np.random.Generator) -> None:
+        """Replace a few parameters by random ones and improve that."""
+        everything = np.arange(len(self.objective.units))
+        better = False
+        for n in sorted(self.best):
+            for _ in range(times):
+                kept = np.array(self.best[n])
+                rest = np.setdiff1d(everything, kept)
+                count = min(_KICKED, kept.size, rest.size)
+                out = random.choice(kept.size, count, replace=False)
+                kept[out] = random.choice(rest, count, replace=False)
+                same = self.objective.width(tuple(kept.tolist())) == n
+                better |= bool(same and self.offer(tuple(kept.tolist())))
+        if better:
+            self.neighbours()

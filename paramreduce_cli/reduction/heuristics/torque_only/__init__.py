@@ -1,0 +1,1 @@
+"""Heuristics that take no criterion: they are of the torques alone."""

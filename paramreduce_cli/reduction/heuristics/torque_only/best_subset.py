@@ -1,0 +1,18 @@
+"""The best subset of every size by branch and bound."""
+
+from __future__ import annotations
+
+from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
+from paramreduce_cli.reduction.heuristics.swap import swap
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size
+
+
+def best_subset(task: SelectionTask) -> FoundSubsets:
+    """Find the best subset of every size by branch and bound, and prove it.
+
+    Starts from what the swap search finds. When time or nodes run out, or on Ctrl-C, the best
+    subset found and a lower bound of the error stand; a later run goes on from there.
+    """
+    search = ProofSearch(task, swap(task).subsets)
+    search.run()
+    return FoundSubsets(by_size(task.objective, search.subsets()).subsets, search.record())

@@ -1,0 +1,30 @@
+"""QR decomposition with column pivoting [Ros2019], Sec. 2.3."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.multibody.orthogonal import Orthogonaliser
+from paramreduce_cli.reduction.problem import first_of_the_best
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
+
+
+def qr(task: SelectionTask) -> FoundSubsets:
+    """Order columns by how much of them is independent of those before.
+
+    Each step takes the column of which most is left, or the group with the most per column; it
+    looks at W alone, not at the torques. Dependent columns follow in order of preference.
+    """
+    objective, problem = task.objective, task.objective.problem
+    rest = Orthogonaliser(problem.X[:, problem.columns])
+    weights = problem.lengths[problem.columns] ** 2
+    order: tuple[int, ...] = ()
+    while len(order) < len(objective.units):
+        left = objective.per_unit(rest.squared_lengths() * weights)
+        if not left.any():
+            break
+        unit = first_of_the_best(left)
+        for column in np.flatnonzero(objective.owner == unit):
+            rest.take(int(column))
+        order = (*order, unit)
+    return nested(task, completed(objective, order))

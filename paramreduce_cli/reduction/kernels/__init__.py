@@ -1,1 +1,0 @@
-"""Compiled loops; imported only when they run, because the compiler takes a moment to load."""

@@ -1,0 +1,15 @@
+"""Acceleration error against n."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import error_figure
+
+
+@placed(PageSection.ACCELERATIONS, 1)
+def acceleration_error(data: ReportData) -> Figure:
+    """Acceleration error against the number of parameters, on both sets."""
+    return error_figure(data, "acceleration_error", r"$\varepsilon_{\ddot z}$")

@@ -1,0 +1,49 @@
+"""Torque error against operations."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import FUNCTIONS, WIDE, heuristic_style, legend_beside, visible
+
+
+@placed(PageSection.SAVINGS, 3)
+def error_vs_operations(data: ReportData) -> Figure:
+    """Torque error on the estimation set against the operations it costs."""
+    drawn = Figure(figsize=WIDE)
+    axes = drawn.subplots(1, 2, sharey=True)
+    for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
+        for name, result in data.validation.heuristics.items():
+            colour, marker = heuristic_style(data, name)
+            values = visible(result.torque_error_estimation)
+            one.semilogy(
+                getattr(result, f"operations_{key}"), values,
+                color=colour, marker=marker, markersize=3, linewidth=0.8, label=name,
+            )  # fmt: skip
+        front = [
+            (float(cost), float(error))
+            for r in data.validation.heuristics.values()
+            for cost, error in zip(
+                getattr(r, f"operations_{key}"), visible(r.torque_error_estimation), strict=True
+            )
+        ]
+        stairs = np.array(_staircase(front))
+        if stairs.size:
+            one.step(*stairs.T, where="post", color="#30363d", linewidth=1.2, label="best known")
+        one.set_xlabel(f"operations of {label}")
+    axes[0].set_ylabel(r"$\varepsilon_\tau$, estimation")
+    legend_beside(axes[1])
+    return drawn
+
+
+def _staircase(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Of points (cost, error) those that no cheaper one beats, by cost."""
+    best, kept = np.inf, []
+    for cost, error in sorted(points):
+        if error < best:
+            best = error
+            kept.append((cost, error))
+    return kept

@@ -1,0 +1,42 @@
+"""Health of the mass matrix."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import (
+    WIDE,
+    heuristic_style,
+    legend_beside,
+    mark_selected,
+    visible,
+)
+
+
+@placed(PageSection.ACCELERATIONS, 2)
+def mass_matrix_condition(data: ReportData) -> Figure:
+    """Largest condition number of the mass matrix over the samples; hollow where it is indefinite."""
+    drawn = Figure(figsize=WIDE)
+    axes = drawn.subplots()
+    for name, result in data.validation.heuristics.items():
+        colour, marker = heuristic_style(data, name)
+        condition = visible(result.mass_matrix_condition)
+        positive = result.mass_matrix_smallest_eigenvalue > 0
+        axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=name)
+        for chosen, fill in ((positive, colour), (~positive, "white")):
+            axes.semilogy(
+                result.n[chosen], condition[chosen], linestyle="none", marker=marker,
+                markersize=4, markerfacecolor=fill, color=colour,
+            )  # fmt: skip
+    full = data.validation.full["mass_matrix_condition"]
+    axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
+    axes.annotate("full model", (1.0, full), xycoords=("axes fraction", "data"), ha="right",
+                  va="bottom", fontsize=8, color="#57606a")  # fmt: skip
+    axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
+    mark_selected(axes, data)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel("largest κ(M) over the samples")
+    legend_beside(axes)
+    return drawn

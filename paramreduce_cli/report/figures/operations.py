@@ -1,0 +1,43 @@
+"""Operations against n."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import (
+    FUNCTIONS,
+    WIDE,
+    heuristic_style,
+    legend_beside,
+    mark_selected,
+)
+
+
+@placed(PageSection.SAVINGS, 2)
+def operations(data: ReportData) -> Figure:
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: the full model."""
+    drawn = Figure(figsize=WIDE)
+    axes = drawn.subplots()
+    for name, result in data.validation.heuristics.items():
+        colour, marker = heuristic_style(data, name)
+        for key, _, line in FUNCTIONS:
+            values = getattr(result, f"operations_{key}")
+            axes.plot(
+                result.n, values, line, color=colour, marker=marker, markersize=2.5,
+                label=name if line == "-" else None,
+            )  # fmt: skip
+    for key, _, line in FUNCTIONS:
+        axes.axhline(
+            data.validation.full[f"operations_{key}"],
+            color="#57606a", linewidth=0.8, linestyle=":" if line == "-" else "-.",
+        )  # fmt: skip
+    mark_selected(axes, data)
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("number of parameters n")
+    axes.set_ylabel("operations")
+    for _, label, line in FUNCTIONS:
+        axes.plot([], [], line, color="#57606a", label=label)
+    legend_beside(axes)
+    return drawn

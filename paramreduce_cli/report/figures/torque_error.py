@@ -1,0 +1,15 @@
+"""Torque error against n."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import error_figure
+
+
+@placed(PageSection.ANSWER, 2)
+def torque_error(data: ReportData) -> Figure:
+    """Torque error against the number of parameters, on both sets."""
+    return error_figure(data, "torque_error", r"$\varepsilon_\tau$")

@@ -1,0 +1,45 @@
+"""Control with the exported models."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import joint_label, joint_style, legend_beside
+
+
+@placed(PageSection.TRACKING, 1)
+def tracking(data: ReportData) -> Figure | None:
+    """Computed-torque control on paths that are in neither set: the first of them, and how far each joint is off it with the full and with the selected model in the controller; errors over all paths, and what one evaluation of the exported model takes."""
+    result = data.tracking
+    if result is None:
+        return None
+    drawn = Figure(figsize=(8.4, 4.6))
+    top, *below = drawn.subplots(
+        1 + len(result.errors), 1, sharex=True, height_ratios=[1.2] + [1] * len(result.errors)
+    )
+    count = int(result.paths.samples[0])
+    time = result.paths.time[:count]
+    for j in range(result.paths.z.shape[2]):
+        colour, style = joint_style(j)
+        label = joint_label(data, j)
+        top.plot(time, result.paths.z[:count, 0, j], color=colour, linestyle=style, label=label)
+        for axes, errors in zip(below, result.errors.values(), strict=True):
+            off = 1e3 * errors[:count, 0, j]
+            axes.plot(time, off, color=colour, linestyle=style, linewidth=1.0)
+    top.set_ylabel("path, rad or m")
+    legend_beside(top)
+    for axes, (name, errors) in zip(below, result.errors.items(), strict=True):
+        rms = 1e3 * result.rms(name)
+        axes.set_ylabel("off, mrad or mm")
+        axes.set_title(
+            f"{name}: {np.median(rms):.2g} mrad rms ({rms.min():.2g} to {rms.max():.2g} over {rms.size} "
+            f"paths), at most {1e3 * float(np.abs(errors).max()):.2g}; "
+            f"{1e9 * result.seconds[name]:.3g} ns a step in {result.language}",
+            fontsize=9.5,
+            loc="left",
+        )
+    below[-1].set_xlabel("time, s")
+    return drawn

@@ -1,0 +1,33 @@
+"""The states along the first trajectory of the validation set."""
+
+from __future__ import annotations
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import joint_label, joint_style
+
+
+@placed(PageSection.TRAJECTORIES, 1)
+def trajectory(data: ReportData) -> Figure:
+    """A characteristic trajectory of the validation set: positions, velocities, accelerations."""
+    drawn = Figure(figsize=(7.2, 5.4))
+    motion = data.motion
+    rows = (
+        (motion.z, "z  (rad, m)"),
+        (motion.dz, "ż  (rad/s, m/s)"),
+        (motion.ddz, "z̈  (rad/s², m/s²)"),
+    )
+    all_axes = drawn.subplots(3, 1, sharex=True)
+    for axes, (values, title) in zip(all_axes, rows, strict=True):
+        for j in range(values.shape[1]):
+            colour, style = joint_style(j)
+            label = joint_label(data, j)
+            axes.plot(motion.time, values[:, j], color=colour, linestyle=style, label=label)
+        axes.set_ylabel(title)
+    all_axes[0].legend(
+        ncols=min(values.shape[1], 7), fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0)
+    )
+    all_axes[-1].set_xlabel("t (s)")
+    return drawn

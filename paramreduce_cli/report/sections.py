@@ -1,0 +1,90 @@
+"""The sections of the page, and where on it figures and tables stand."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, TypeVar
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+class PageSection(Enum):
+    """A heading and what is said under it, a template over the summary ``s``; in this order."""
+
+    ANSWER = ("", "")
+    SELECTED = (
+        "The selected model",
+        "Each parameter below stands for itself and takes over a share of those that were dropped.",
+    )
+    PROOFS = (
+        "How good it could be",
+        "No subset of n parameters has a torque error below the bound; where the bound meets a "
+        "heuristic, that is the best there is.",
+    )
+    STABILITY = (
+        "How much it depends on the data",
+        "The selection repeated by torque with each trajectory left out and with fewer samples. Blue: "
+        "chosen with all data; bars of the values run from the smallest to the largest that came out.",
+    )
+    SAVINGS = (
+        "What it saves",
+        "Non-repeated sums, products and function calls, parameters as run-time inputs. <b>Lean</b>: of "
+        "the leanest formulation found, as <code>paramreduce export</code> writes it; all other counts "
+        "on this page are of this kind. <b>Plain recursion</b>: Newton-Euler as in a textbook, with "
+        "common subexpressions. <b>The paper's rule</b>: plain recursion with sign changes counted. "
+        "{{ 'With loops, d and [M, δ] are those of the open tree; exported functions, which also "
+        "project, say their own count.' if loops }}",
+    )
+    TRACKING = (
+        "What it is for",
+        "The arm follows the full model; the controller evaluates exported code, whose torques are held "
+        "for one period.",
+    )
+    ACCELERATIONS = ("Accelerations", "")
+    MECHANISM = ("The mechanism", "")
+    BASE = (
+        "Base parameters",
+        "Rank {{ s.model.n_base }}; the singular values drop by a factor of "
+        "{{ '%.2g'|format(s.model.rank_gap) if s.model.rank_gap else '∞' }} after it.",
+    )
+    TRAJECTORIES = ("Exciting trajectories", "")
+    ORDERING = ("Parameter ordering", "")
+
+    def __init__(self, title: str, text: str) -> None:
+        self.title = title
+        self.text = text
+
+
+@dataclass(frozen=True)
+class PagePlace:
+    """Where on the page something stands."""
+
+    section: PageSection
+    order: int
+    """Within the section, figures and tables together."""
+    tall: bool = False
+    """Whether a table scrolls in a box of its own."""
+
+
+def placed(section: PageSection, order: int, *, tall: bool = False) -> Callable[[F], F]:
+    """Declare where a figure or a table stands on the page."""
+
+    def declare(function: F) -> F:
+        function.place = PagePlace(section, order, tall)  # type: ignore[attr-defined]
+        return function
+
+    return declare
+
+
+def place_of(function: Callable[..., Any]) -> PagePlace:
+    """Where a figure or a table stands.
+
+    Raises:
+        TypeError: It does not say so.
+    """
+    place = getattr(function, "place", None)
+    if not isinstance(place, PagePlace):
+        raise TypeError(f"{function.__name__} has no place on the page; decorate it with @placed")
+    return place

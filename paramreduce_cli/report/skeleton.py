@@ -1,0 +1,76 @@
+"""A mechanism in one pose, for drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.records import BASE, Body, FloatArray, Kind, Mechanism, Model
+
+
+@dataclass(frozen=True)
+class Skeleton:
+    """A mechanism in one pose, for drawing."""
+
+    z: FloatArray
+    poses: FloatArray
+    """Frames of the bodies, (n_bodies, 4, 4)."""
+    joints: FloatArray
+    """Frames of the joints, before their motion, (n_bodies, 4, 4)."""
+    masses: FloatArray
+    """Centres of mass, NaN for bodies without mass, (n_bodies, 3), m."""
+    parents: tuple[int, ...]
+    kinds: tuple[str, ...]
+    closures: tuple[FloatArray, ...]
+    """From one body's origin over the closure to the other's, for each loop, (n_points, 3), m."""
+
+
+def skeleton(model: Model, q: FloatArray) -> Skeleton:
+    """The pose at generalised coordinates q, (n_q,)."""
+    mechanism = model.mechanism
+    poses = body_poses(mechanism, q)
+    joints = [
+        body.parent_to_joint if body.parent == BASE else poses[body.parent] @ body.parent_to_joint
+        for body in mechanism.bodies
+    ]
+    return Skeleton(
+        z=q[list(mechanism.independent)],
+        poses=poses,
+        masses=np.array([_centre(model, k, pose) for k, pose in enumerate(poses)]),
+        joints=np.array(joints),
+        parents=tuple(body.parent for body in mechanism.bodies),
+        kinds=tuple(_drawn_as(body) for body in mechanism.bodies),
+        closures=tuple(_closure_path(mechanism, poses)),
+    )
+
+
+def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
+    """Centre of mass in the base frame, not a number for a body without mass, (3,), m."""
+    columns = model.mechanism.columns(body)
+    m, *moment = (
+        model.values[columns[kind]] if kind in columns else 0.0
+        for kind in (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
+    )
+    if not m > 0:
+        return np.full(3, np.nan)
+    return pose[:3, 3] + pose[:3, :3] @ (np.array(moment) / m)
+
+
+def _drawn_as(body: Body) -> str:
+    """How a joint is drawn; slides inside a free joint are no parts of the mechanism."""
+    return "hidden" if body.intermediate and body.joint == "prismatic" else body.joint
+
+
+def _closure_path(mechanism: Mechanism, poses: FloatArray) -> Iterator[FloatArray]:
+    """From body to body by way of each closure; ends on the base are left out."""
+    for closure in mechanism.loops.closures if mechanism.loops is not None else ():
+        points: list[FloatArray] = []
+        for body, frame in zip(closure.bodies, closure.frames, strict=True):
+            pose = np.eye(4) if body == BASE else poses[body]
+            way = [pose[:3, 3], (pose @ frame)[:3, 3]]
+            ends = way[1:] if body == BASE else way
+            points += ends if not points else ends[::-1]
+        yield np.array(points)

@@ -1,0 +1,22 @@
+"""The selected model."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.SELECTED, 1, tall=True)
+def approximate_base_parameters(data: ReportData) -> Table:
+    """The parameters of the selected model: value, and what they take over from the others."""
+    selected = data.validation.selected
+    model = selected.model
+    rows = [
+        (str(k + 1), name, f"{value:.6g}", expression)
+        for k, (name, value, expression) in enumerate(
+            zip(model.names, model.values, model.expressions, strict=True)
+        )
+    ]
+    title = f"Approximate base parameters: {selected.heuristic}, n = {selected.n}"
+    return Table(title, ("no.", "parameter", "φ' value", "made of"), tuple(rows))

@@ -1,0 +1,20 @@
+"""The base parameters."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.BASE, 1, tall=True)
+def base_parameters(data: ReportData) -> Table:
+    """The base parameters with the relations that regroup the others."""
+    base = data.model.base
+    rows = [
+        (str(k + 1), expression, f"{value:.6g}")
+        for k, (expression, value) in enumerate(
+            zip(base.expressions, data.model.base_values, strict=True)
+        )
+    ]
+    return Table("Base parameters", ("no.", "expression", "value"), tuple(rows))

@@ -1,0 +1,14 @@
+"""The geometry of the mechanism, as its config gives it."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.MECHANISM, 2)
+def kinematics(data: ReportData) -> Table:
+    """The geometry as the config gives it."""
+    header, *rows = data.model.mechanism.table
+    return Table("Kinematic parameters (m, rad)", header, tuple(rows))

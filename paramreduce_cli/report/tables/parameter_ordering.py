@@ -1,0 +1,21 @@
+"""The orders of the heuristics."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.ORDERING, 1, tall=True)
+def parameter_ordering(data: ReportData) -> Table:
+    """The order in which each heuristic takes the parameters."""
+    found = data.reduction.heuristics
+    orders = {name: f.order for name, f in found.items() if f.order is not None}
+    names = data.reduction.columns.names
+    longest = max((order.size for order in orders.values()), default=0)
+    rows = [
+        (str(k + 1), *(names[order[k]] if k < order.size else "" for order in orders.values()))
+        for k in range(longest)
+    ]
+    return Table("Parameter ordering", ("no.", *orders), tuple(rows))

@@ -1,0 +1,33 @@
+"""How far the best subset of every size is proven."""
+
+from __future__ import annotations
+
+from paramreduce_cli.records import ProofStatus
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts import share
+
+
+@placed(PageSection.PROOFS, 2, tall=True)
+def proofs(data: ReportData) -> Table:
+    """How good the best subsets are proven to be, for every number of parameters."""
+    found = data.reduction.proofs
+    header = ("n", "ε_τ", "no subset below", "gap", "status", "nodes", "s")
+    if found is None:
+        return Table("Proofs: best-subset was not run", header, ())
+    rows = []
+    for k, n in enumerate(found.n):
+        error, bound = float(found.torque_error[k]), float(found.lower_bound[k])
+        gap = (
+            "0"
+            if found.status[k] is ProofStatus.OPTIMAL
+            else share(1 - bound / error if error else 0.0)
+        )
+        rows.append(
+            (
+                str(n), share(error), share(bound), gap, str(found.status[k]),
+                str(found.nodes[k]), f"{found.seconds[k]:.2f}",
+            )
+        )  # fmt: skip
+    return Table("Proofs of the best subsets", header, tuple(rows))

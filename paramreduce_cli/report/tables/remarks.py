@@ -1,0 +1,14 @@
+"""What to watch."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.ACCELERATIONS, 3)
+def remarks(data: ReportData) -> Table:
+    """Where models should not be trusted."""
+    rows = [(str(remark.about), remark.text) for remark in data.validation.remarks]
+    return Table("Remarks", ("about", "remark"), tuple(rows))

@@ -1,0 +1,21 @@
+"""The subsets of one size."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts import share
+
+
+@placed(PageSection.PROOFS, 3)
+def selected_subsets(data: ReportData) -> Table:
+    """What every heuristic takes at the selected number of parameters."""
+    n, names = data.validation.selected.n, data.reduction.columns.names
+    rows = []
+    for name, found in data.reduction.heuristics.items():
+        row = found.row(n)
+        if row is not None:
+            kept = " ".join(names[k] for k in sorted(found.subsets[row]))
+            rows.append((name, share(float(found.torque_error[row])), kept))
+    return Table(f"Subsets of {n} parameters", ("heuristic", "ε_τ E", "parameters"), tuple(rows))

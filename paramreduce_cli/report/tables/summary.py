@@ -1,0 +1,31 @@
+"""What each heuristic reaches at the selected number of parameters."""
+
+from __future__ import annotations
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.overview import HEADER, function_cells
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.ANSWER, 1)
+def summary(data: ReportData) -> Table:
+    """Every heuristic at the selected number of parameters, both functions."""
+    n = data.validation.selected.n
+    full = data.validation.full
+    model = (str(int(data.model.affecting.sum())), str(data.reduction.rank), str(n))
+    rows = []
+    for name, r in data.validation.heuristics.items():
+        k = r.row(n)
+        if k is not None:
+            d, M = (
+                function_cells(
+                    int(full[f"operations_{key}"]),
+                    getattr(r, f"operations_{key}")[k],
+                    getattr(r, f"{error}_error_estimation")[k],
+                    getattr(r, f"{error}_error_validation")[k],
+                )
+                for key, error in (("inverse", "torque"), ("direct", "acceleration"))
+            )
+            rows.append((name, *model, *d, *M))
+    return Table(f"Reduced models with {n} parameters", HEADER, tuple(rows))

@@ -1,0 +1,48 @@
+"""How every trajectory of both sets excites the parameters, and what it took to find."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.records import Trajectory
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.TRAJECTORIES, 3, tall=True)
+def trajectories(data: ReportData) -> Table:
+    """What every trajectory reached."""
+    found = data.trajectories
+    if found is None:
+        return Table("Trajectories: recorded states were used", ("set",), ())
+    variants = tuple(found.estimation[0].kappa_variants)
+    header = (
+        "trajectory", *(f"κ {name}" for name in variants), "κ at start",
+        "peak |z - middle|", "peak speed", "share of limits",
+        *(f"{c.name}" for c in found.constraints), "CPU s", "iterations", "status",
+    )  # fmt: skip
+    rows = [
+        _trajectory_row(f"{name} {k + 1}", t)
+        for name in ("estimation", "validation")
+        for k, t in enumerate(getattr(found, name))
+    ]
+    return Table("Trajectories", header, tuple(rows))
+
+
+def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
+    def spread(values: np.ndarray) -> str:
+        return " ".join(f"{value:.3g}" for value in values)
+
+    return (
+        label,
+        *(f"{value:.4g}" for value in t.kappa_variants.values()),
+        f"{t.kappa_start:.3g}",
+        spread(t.peak_position),
+        spread(t.peak_velocity),
+        spread(t.reach),
+        *(f"{low:.3g} ... {high:.3g}" for low, high in t.extremes),
+        f"{t.cpu_seconds:.2f}",
+        str(t.iterations),
+        t.status.replace("_", " "),
+    )

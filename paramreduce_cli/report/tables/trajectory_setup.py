@@ -1,0 +1,51 @@
+"""What the trajectories had to be like."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.TRAJECTORIES, 2)
+def trajectory_setup(data: ReportData) -> Table:
+    """What was asked of the trajectories."""
+    t = data.trajectories
+    title, header = "Trajectory setup", ("setting", "value")
+    if t is None:
+        return Table(title, header, ())
+    n_dof, columns = t.estimation[0].coefficients.shape
+    limits = t.limits
+    rows = [
+        ("criterion", f"{t.criterion}, {t.scaling}"),
+        ("actuated joints", str(n_dof)),
+        ("harmonics", str((columns - 1) // 2)),
+        ("trajectory parameters", str(n_dof * columns)),
+        ("grid points", str(t.points)),
+        ("period, s", f"{t.period:.6g}"),
+        ("position limits, rad or m", _each(np.column_stack([limits.lower, limits.upper]))),
+        ("velocity limits, rad/s or m/s", _each(limits.velocity[:, None])),
+        ("estimation trajectories", str(len(t.estimation))),
+        ("validation trajectories", str(len(t.validation))),
+        ("every joint uses its range", "yes" if t.use_full_range else "no"),
+    ]
+    if np.isfinite(limits.acceleration).any():
+        rows.append(("acceleration limits, rad/s² or m/s²", _each(limits.acceleration[:, None])))
+    for c in t.constraints:
+        low = "" if np.isinf(c.lower) else f"{c.lower:.4g} ≤ "
+        high = "" if np.isinf(c.upper) else f" ≤ {c.upper:.4g}"
+        rows.append((f"{c.kind} {c.name}", f"{low}{c.name}{high}"))
+    if data.symmetries:
+        rows.append(("estimation set completed by symmetries", str(data.symmetries)))
+    if t.source:
+        rows.append(("coefficients brought in", t.source))
+    return Table(title, header, tuple(rows))
+
+
+def _each(values: FloatArray) -> str:
+    """Limits of each joint; once where they are the same for all."""
+    different = values[:1] if (values == values[0]).all() else values
+    return "; ".join(" ".join(f"{value:.4g}" for value in row) for row in different)

@@ -1,0 +1,112 @@
+"""A robot as its YAML describes it: the mechanism, its parameters, the size of its torques."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from paramreduce_cli.fields.numbers import Number
+from paramreduce_cli.fields.section import NAME, PositivePerJoint, Section, Triple, per_joint
+from paramreduce_cli.records import INERTIAL, FloatArray, Mechanism, Parameter
+from paramreduce_cli.robots.bodies import BodiesDescription
+from paramreduce_cli.robots.dh import DHDescription
+from paramreduce_cli.robots.inertia import BodyParameters
+from paramreduce_cli.robots.tree import TreeDescription
+
+
+class Description(Section):
+    """The mechanism on a fixed base: a Denavit-Hartenberg table, or bodies with joints and loops."""
+
+    dh: DHDescription | None = None
+    """Denavit-Hartenberg table of an open tree; or give tree."""
+    tree: TreeDescription | None = None
+    """Bodies, joints and loop closures; or give dh."""
+    gravity: Triple = [0.0, 0.0, -9.81]
+    """Acceleration of gravity in the base frame, m/s^2."""
+
+    @model_validator(mode="after")
+    def _one_way_only(self) -> Description:
+        if len(self._given()) != 1:
+            raise ValueError("give dh or tree, one of them")
+        return self
+
+    def _given(self) -> dict[str, BodiesDescription]:
+        values = ((name, getattr(self, name)) for name in type(self).model_fields)
+        return {name: value for name, value in values if isinstance(value, BodiesDescription)}
+
+    @property
+    def way(self) -> str:
+        """Key of the way in which the bodies are described."""
+        return next(iter(self._given()))
+
+    @property
+    def bodies(self) -> BodiesDescription:
+        """The bodies, in the way they are described."""
+        return self._given()[self.way]
+
+    def parameters(self) -> tuple[Parameter, ...]:
+        """All parameters of the mechanism, body by body."""
+        return tuple(
+            Parameter(kind, name) for name in self.bodies.inertial_names() for kind in INERTIAL
+        )
+
+
+class Robot(Section):
+    """What a robot is, whatever is done with it."""
+
+    robot: Annotated[str, Field(pattern=NAME)]
+    """Name of the robot; results go to results/ROBOT."""
+    constants: dict[str, Number] = {}
+    """Named numbers, such as lengths in m, that all other numbers may be written with; each may use those above it."""
+    description: Description
+    """The mechanism."""
+    parameter_sets: Annotated[dict[str, dict[str, BodyParameters]], Field(min_length=1)]
+    """Named sets of standard parameters: for each set, for each body."""
+    parameters: str | None = None
+    """Name of the set that is used; the first one if left out."""
+    nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
+    """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
+
+    @property
+    def n_dof(self) -> int:
+        """Number of independent coordinates."""
+        return len(self.description.bodies.independent_names())
+
+    def mechanism(self) -> Mechanism:
+        """The mechanism as it is described; loops are not assembled yet."""
+        bodies = self.description.bodies
+        return Mechanism(
+            robot=self.robot,
+            bodies=bodies.rigid_bodies(),
+            parameters=self.description.parameters(),
+            gravity=np.array(self.description.gravity, dtype=float),
+            lengths=bodies.lengths(),
+            table=bodies.table(),
+            loops=bodies.loops(),
+        )
+
+    def stretched(self, stretch: Callable[[float], float]) -> Robot:
+        """The same structure with other lengths, as far as these have names."""
+        old = self.description
+        changed = old.model_copy(update={old.way: old.bodies.stretched(stretch)})
+        return self.model_copy(update={"description": changed})
+
+    def body_parameters(self) -> dict[str, BodyParameters]:
+        """The chosen set, by body."""
+        chosen = self.parameter_sets[self.parameters or next(iter(self.parameter_sets))]
+        names = self.description.bodies.inertial_names()
+        return {name: chosen.get(name, BodyParameters()) for name in names}
+
+    def parameter_values(self) -> FloatArray:
+        """Values of all parameters, (n_parameters,), SI."""
+        values = {name: body.values() for name, body in self.body_parameters().items()}
+        return np.array([values[p.owner][p.kind] for p in self.description.parameters()])
+
+    def given_nominal_torque(self) -> FloatArray | None:
+        """The characteristic torques where they are given, (n_dof,), N m or N."""
+        if self.nominal_torque == "standard-deviation":
+            return None
+        return per_joint(self.nominal_torque, self.n_dof)

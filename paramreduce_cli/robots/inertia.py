@@ -1,0 +1,82 @@
+"""The standard parameters of a body as a YAML gives them."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from paramreduce_cli.fields.numbers import Number
+from paramreduce_cli.fields.section import Section, Triple
+from paramreduce_cli.records import INERTIAL, FloatArray, Kind
+
+_FIRST_MOMENTS = (Kind.MX, Kind.MY, Kind.MZ)
+_TENSOR = (Kind.IXX, Kind.IXY, Kind.IXZ, Kind.IYY, Kind.IYZ, Kind.IZZ)
+
+
+class BodyParameters(Section):
+    """Standard parameters of one body about its frame's origin; what is left out is zero."""
+
+    m: Number = 0.0
+    """Mass, kg."""
+    mx: Number = 0.0
+    """First moment m x, kg m."""
+    my: Number = 0.0
+    """First moment m y, kg m."""
+    mz: Number = 0.0
+    """First moment m z, kg m."""
+    Ixx: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    Ixy: Number = 0.0
+    """Tensor element (not the product of inertia with the other sign), kg m^2."""
+    Ixz: Number = 0.0
+    """Tensor element, kg m^2."""
+    Iyy: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    Iyz: Number = 0.0
+    """Tensor element, kg m^2."""
+    Izz: Number = 0.0
+    """Inertia about the frame's origin, kg m^2."""
+    com: Triple | None = None
+    """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
+    inertia_com: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
+    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
+
+    @model_validator(mode="after")
+    def _one_way_only(self) -> BodyParameters:
+        if self.com is not None and self._gives(_FIRST_MOMENTS):
+            raise ValueError("give com or mx, my, mz, not both")
+        if self.inertia_com is not None and self.com is None:
+            raise ValueError("inertia_com needs com")
+        if self.inertia_com is not None and self._gives(_TENSOR):
+            raise ValueError("give inertia_com or Ixx ... Izz, not both")
+        return self
+
+    def _gives(self, kinds: tuple[Kind, ...]) -> bool:
+        return any(kind.symbol in self.model_fields_set for kind in kinds)
+
+    def values(self) -> dict[Kind, float]:
+        """Standard parameters by kind, kg, kg m, kg m^2."""
+        values = {kind: float(getattr(self, kind.symbol)) for kind in INERTIAL}
+        if self.com is not None:
+            c = np.array(self.com)
+            values |= zip(_FIRST_MOMENTS, (self.m * c).tolist(), strict=True)
+            if not self._gives(_TENSOR):
+                shift = self.m * (c @ c * np.eye(3) - np.outer(c, c))
+                tensor = np.array(self.inertia_com or [0.0] * 6) + shift[np.triu_indices(3)]
+                values |= zip(_TENSOR, tensor.tolist(), strict=True)
+        return values
+
+
+def pseudo_inertia(values: dict[Kind, float]) -> FloatArray:
+    """The pseudo-inertia matrix of a body, (4, 4) [Wensing2018]; some mass distribution has it if it is positive semidefinite.
+
+    Args:
+        values: All ten standard parameters by kind.
+    """
+    m, mx, my, mz, xx, xy, xz, yy, yz, zz = (values[kind] for kind in INERTIAL)
+    moment = np.array([[mx, my, mz]])
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    second_moments = np.trace(tensor) / 2 * np.eye(3) - tensor
+    return np.block([[second_moments, moment.T], [moment, np.array([[m]])]])

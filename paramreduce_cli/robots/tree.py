@@ -1,0 +1,319 @@
+"""Bodies and joints in frames of their own choice, with closures that make loops of them.
+
+A joint of several axes becomes a chain of joints of one axis with frames between.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, ClassVar, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
+
+from paramreduce_cli.errors import Key
+from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.numbers import Number
+from paramreduce_cli.fields.section import ONE_OR_MORE_NAMES, Name, Positive, Section, as_list
+from paramreduce_cli.records import (
+    BASE,
+    JOINT_AXES,
+    JOINT_COORDINATES,
+    Body,
+    Closure,
+    FloatArray,
+    Loops,
+)
+from paramreduce_cli.robots.bodies import BodiesDescription
+from paramreduce_cli.robots.frames import rotation_vector
+from paramreduce_cli.robots.placement import DIRECTION, Direction, Placement, transform
+
+JointMotion = tuple[Literal["revolute", "prismatic"], FloatArray]
+"""A kind of motion and the direction of its axis, (3,)."""
+
+_X, _Y, _Z = np.eye(3)
+_NO_TURN = 1e-12
+"""What is printed as zero, rad or m."""
+
+
+def _as_directions(value: Any) -> Any:
+    plain = isinstance(value, list) and value and isinstance(value[0], int | float)
+    return [value] if plain or not isinstance(value, list) else value
+
+
+_ONE_OR_MORE_DIRECTIONS = WithJsonSchema(
+    {"anyOf": [DIRECTION, {"type": "array", "items": DIRECTION}]}
+)
+
+JointKind = Literal["revolute", "prismatic", "universal", "spherical", "free"]
+
+
+def joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[JointMotion]:
+    """The motions of a joint, one after the other.
+
+    Args:
+        kind: ``revolute``, ``prismatic``, ``universal``, ``spherical`` or ``free``.
+        axes: Directions of its axes, as many as :data:`JOINT_AXES` says; if empty, z for one axis,
+            x then y for a universal joint. Spherical joints turn about x, y and z, free ones
+            slide along them first.
+    """
+    if kind == "spherical":
+        return [("revolute", axis) for axis in (_X, _Y, _Z)]
+    if kind == "free":
+        slides: list[JointMotion] = [("prismatic", axis) for axis in (_X, _Y, _Z)]
+        return slides + joint_motions("spherical", [])
+    if kind == "universal":
+        first, second = axes or (_X, _Y)
+        return [("revolute", np.asarray(first)), ("revolute", np.asarray(second))]
+    (axis,) = axes or (_Z,)
+    return [("revolute" if kind == "revolute" else "prismatic", np.asarray(axis, dtype=float))]
+
+
+def rotation_to(axis: FloatArray) -> FloatArray:
+    """A rotation that takes z to a direction, (3, 3); without rounding for the six axes."""
+    unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
+    for k, direction in enumerate(np.eye(3)):
+        if np.array_equal(np.abs(unit), direction):
+            cyclic = np.roll(np.eye(3), k + 1, axis=0)
+            return cyclic if unit[k] > 0 else cyclic @ np.diag([1.0, -1.0, -1.0])
+    if unit[2] < 0:
+        return rotation_to(-unit) @ np.diag([1.0, -1.0, -1.0])
+    x, y, c = unit
+    skew = np.array([[0, 0, x], [0, 0, y], [-x, -y, 0]])  # of z cross the axis
+    result: FloatArray = np.eye(3) + skew + skew @ skew / (1 + c)
+    return result
+
+
+class TreeBody(Section):
+    """A body and the joint that carries it."""
+
+    name: Name
+    """Name of the body; parameters are called after it: m_NAME."""
+    parent: Name = "base"
+    """Body it is mounted on."""
+    joint: JointKind = "revolute"
+    """`universal` turns about two axes, `spherical` about x, y and z, `free` slides along x, y and z, then turns about them."""
+    axes: Annotated[list[Direction], BeforeValidator(_as_directions), _ONE_OR_MORE_DIRECTIONS] = []
+    """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
+    at: Placement = []
+    """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""
+    coordinates: Annotated[list[Name], BeforeValidator(as_list), ONE_OR_MORE_NAMES] = []
+    """Names of the joint's coordinates; if left out q_NAME, or q_NAME_1, q_NAME_2, ..."""
+    massless: bool = False
+    """Whether the body has no mass and so no parameters."""
+
+    @model_validator(mode="after")
+    def _counts(self) -> TreeBody:
+        axes, coordinates = JOINT_AXES[self.joint], JOINT_COORDINATES[self.joint]
+        if self.axes and len(self.axes) != axes:
+            raise ValueError(f"a {self.joint} joint takes {axes} axes, not {len(self.axes)}")
+        if self.coordinates and len(self.coordinates) != coordinates:
+            raise ValueError(
+                f"a {self.joint} joint has {coordinates} coordinates, not {len(self.coordinates)}"
+            )
+        return self
+
+    def motions(self) -> list[JointMotion]:
+        """The motions of the joint, one after the other."""
+        return joint_motions(self.joint, self.axes)
+
+    def chain(self, parent: int, start: int) -> list[Body]:
+        """The bodies of one joint: frames between its axes, the named one at its end.
+
+        Args:
+            parent: Index of the body it is mounted on.
+            start: Index of the first of them.
+        """
+        motions, coordinates = self.motions(), self.coordinate_names()
+        chain = []
+        placement = transform(self.at)
+        for k, (kind, axis) in enumerate(motions):
+            last = k == len(motions) - 1
+            turn = np.eye(4)
+            turn[:3, :3] = rotation_to(axis)
+            chain.append(
+                Body(
+                    name=self.name if last else f"{self.name}:{k + 1}",
+                    parent=parent if k == 0 else start + k - 1,
+                    joint=kind,
+                    parent_to_joint=placement @ turn,
+                    joint_to_body=turn.T,
+                    coordinate=coordinates[k],
+                    intermediate=not last,
+                )
+            )
+            placement = np.eye(4)
+        return chain
+
+    def row(self) -> tuple[str, ...]:
+        """Of the table for people."""
+        axes = [axis for _, axis in self.motions()]
+        return (
+            self.name + (" (massless)" if self.massless else ""),
+            self.parent,
+            self.joint,
+            "; ".join(_numbers(axis) for axis in axes) if len(axes) < 3 else "x y z",
+            _placement_text(transform(self.at)),
+            " ".join(self.coordinate_names()),
+        )
+
+    def coordinate_names(self) -> list[str]:
+        """Names of the joint's coordinates."""
+        count = JOINT_COORDINATES[self.joint]
+        if self.coordinates:
+            return list(self.coordinates)
+        if count == 1:
+            return [f"q_{self.name}"]
+        return [f"q_{self.name}_{k + 1}" for k in range(count)]
+
+
+class ClosureSection(Section):
+    """What holds two bodies of the tree together, so that a loop is closed."""
+
+    name: Name | None = None
+    """Name for messages; `loop_1`, `loop_2`, ... if left out."""
+    type: Literal["point", "planar", "revolute", "distance"] = "point"
+    """`point`: two points coincide (3 equations); `planar`: the second is on the z axis of the first (2); `revolute`: origins and z axes coincide (5); `distance`: two points keep a distance (1)."""
+    bodies: Annotated[list[Name], Field(min_length=2, max_length=2)]
+    """The two bodies, `base` for the base."""
+    at: Annotated[list[Placement], Field(min_length=2, max_length=2)]
+    """Where on each of them: a point or steps."""
+    length: Positive | None = None
+    """Of a distance, m."""
+
+    @model_validator(mode="after")
+    def _length(self) -> ClosureSection:
+        if (self.type == "distance") != (self.length is not None):
+            raise ValueError("length belongs to a closure of type distance, and only there")
+        return self
+
+    def closure(self, number: int, index: Mapping[str, int]) -> Closure:
+        """The closure as a record.
+
+        Args:
+            number: Of the closure, for its name if it has none.
+            index: Of the bodies and the base, by name.
+        """
+        (one, other), (first, second) = self.bodies, self.at
+        return Closure(
+            self.name or f"loop_{number}",
+            self.type,
+            (index[one], index[other]),
+            (transform(first), transform(second)),
+            self.length or 0.0,
+        )
+
+
+class TreeDescription(BodiesDescription):
+    """Bodies and joints in frames of one's own choice, with closures that make loops of them."""
+
+    ROWS: ClassVar[str] = "bodies"
+
+    bodies: Annotated[list[TreeBody], Field(min_length=1)]
+    """One item per body, parents above their children."""
+    closures: list[ClosureSection] = []
+    """What closes the loops; none for an open tree."""
+    independent: list[Name] = []
+    """Coordinates that are actuated and determine all others; only with closures."""
+    guess: dict[str, Number] = {}
+    """Values of coordinates near a closed assembly, rad or m; zero for those left out. Independent ones keep them."""
+
+    @model_validator(mode="after")
+    def _with_closures(self) -> TreeDescription:
+        if bool(self.closures) != bool(self.independent):
+            raise ValueError("closures and independent belong together; give both or neither")
+        if self.guess and not self.closures:
+            raise ValueError("a guess is for closing loops, but there are no closures")
+        return self
+
+    def body_names(self) -> list[str]:
+        """Names of all bodies, in order."""
+        return [body.name for body in self.bodies]
+
+    def inertial_names(self) -> list[str]:
+        """Names of the bodies that have inertia."""
+        return [body.name for body in self.bodies if not body.massless]
+
+    def parents(self) -> list[str | None]:
+        """Names of the parents as they are given."""
+        return [body.parent for body in self.bodies]
+
+    def generalised_names(self) -> list[str]:
+        """Names of all coordinates, body by body."""
+        return [name for body in self.bodies for name in body.coordinate_names()]
+
+    @property
+    def closed(self) -> bool:
+        """Whether there are loops."""
+        return bool(self.closures)
+
+    def independent_names(self) -> list[str]:
+        """Names of the independent coordinates."""
+        return list(self.independent) or self.generalised_names()
+
+    def rigid_bodies(self) -> tuple[Body, ...]:
+        """The bodies with their joints of one axis each."""
+        bodies: list[Body] = []
+        index = {"base": BASE}
+        for row in self.bodies:
+            bodies += row.chain(index[row.parent], len(bodies))
+            index[row.name] = len(bodies) - 1
+        return tuple(bodies)
+
+    def loops(self) -> Loops | None:
+        """How the loops are closed; not yet assembled. None for an open tree."""
+        if not self.closures:
+            return None
+        index = {"base": BASE} | {body.name: k for k, body in enumerate(self.rigid_bodies())}
+        names = self.generalised_names()
+        return Loops(
+            tuple(closure.closure(k + 1, index) for k, closure in enumerate(self.closures)),
+            tuple(names.index(name) for name in self.independent),
+            np.array([float(self.guess.get(name, 0.0)) for name in names]),
+        )
+
+    def problems(self) -> Iterator[tuple[Key, str]]:
+        """What does not fit together, by the keys below this section."""
+        bodies, coordinates = ["base", *self.body_names()], self.generalised_names()
+        for k, body in enumerate(self.bodies):
+            for name in body.coordinate_names():
+                if coordinates.count(name) > 1:
+                    yield ("bodies", k), f"coordinate {name!r} belongs to several joints"
+        for k, closure in enumerate(self.closures):
+            for j, name in enumerate(closure.bodies):
+                if name not in bodies:
+                    yield ("closures", k, "bodies", j), unknown("body", name, bodies)
+            if closure.name is not None and closure.name in {c.name for c in self.closures[:k]}:
+                yield ("closures", k, "name"), f"{closure.name!r} is taken"
+            if closure.bodies[0] == closure.bodies[1]:
+                yield ("closures", k, "bodies"), f"ties {closure.bodies[0]!r} to itself"
+        for k, name in enumerate(self.independent):
+            if name not in coordinates:
+                yield ("independent", k), unknown("coordinate", name, coordinates)
+            elif name in self.independent[:k]:
+                yield ("independent", k), f"{name} stands there twice"
+        for name in self.guess:
+            if name not in coordinates:
+                yield ("guess", name), unknown("coordinate", name, coordinates)
+
+    def table(self) -> tuple[tuple[str, ...], ...]:
+        """The geometry for people, a header row first."""
+        table: list[tuple[str, ...]] = [("body", "on", "joint", "axes", "at", "coordinates")]
+        table += [body.row() for body in self.bodies]
+        for k, section in enumerate(self.closures):
+            kind = f"{section.type} {section.length:g}" if section.length else section.type
+            places = "; ".join(_placement_text(transform(frame)) for frame in section.at)
+            name, bodies = section.name or f"loop_{k + 1}", " - ".join(section.bodies)
+            table.append((name, bodies, f"closure: {kind}", "", places, ""))
+        return tuple(table)
+
+
+def _placement_text(placement: FloatArray) -> str:
+    """Where a frame is, and about which axis and by how much it is turned."""
+    text = _numbers(placement[:3, 3])
+    angle, axis = rotation_vector(placement[:3, :3])
+    return text if angle < _NO_TURN else f"{text}, turned {angle:.4g} about {_numbers(axis)}"
+
+
+def _numbers(values: Sequence[float] | FloatArray) -> str:
+    return " ".join(f"{value:.4g}" for value in np.where(np.abs(values) < _NO_TURN, 0.0, values))

@@ -1,0 +1,63 @@
+"""How numbers and symbols are written for people, everywhere alike."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+EXACT = 1e-10
+"""Error below which a model is exact: round-off of the samples and of a fit together."""
+_FAR_OFF = 10.0
+
+_ESCAPES = {
+    "\\": r"\textbackslash{}", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{",
+    "}": r"\}", "~": r"\textasciitilde{}", "^": r"\^{}", "_": r"\_",
+}  # fmt: skip
+
+
+def share(value: float | None) -> str:
+    """A share in per cent; None stands for an infinite one."""
+    if value is None or not math.isfinite(value):
+        return "∞"
+    if value >= _FAR_OFF:
+        return "> 1000 %"
+    return f"{100 * value:.3g} %" if value >= EXACT else "0 %"
+
+
+def latex(text: str, symbols: Mapping[str, str]) -> str:
+    """Text for LaTeX, numbers and symbols as formulas.
+
+    Args:
+        text: Words, numbers and names with spaces between.
+        symbols: Formulas by the names they stand for.
+    """
+    return " ".join(_latex_word(word, symbols) for word in text.split(" "))
+
+
+def _latex_word(word: str, symbols: Mapping[str, str]) -> str:
+    if word in ("+", "-"):
+        return f"${word}$"
+    core = word.removeprefix("(").removesuffix(")").removesuffix("^2")
+    if core in symbols:
+        before, _, after = word.partition(core)
+        return f"${before}{symbols[core]}{after}$"
+    mantissa, e, exponent = word.partition("e")
+    if e and exponent.lstrip("+-").isdecimal() and mantissa.replace(".", "").isdecimal():
+        return rf"${mantissa} \cdot 10^{{{int(exponent)}}}$"
+    for symbol, formula in _FORMULAS.items():
+        word = word.replace(symbol, formula)
+    return "".join(_ESCAPES.get(character, character) for character in word).translate(_UNMASKED)
+
+
+_GREEK = {
+    "n_φ": r"$n_\varphi$",
+    "κ": r"$\kappa$",
+    "ε_τ": r"$\varepsilon_\tau$",
+    "ε_z̈": r"$\varepsilon_{\ddot z}$",
+    "δ": r"$\delta$",
+    "φ'": r"$\varphi'$",
+    "²": r"$^2$",
+}
+_FORMULAS = {symbol: chr(0xE000 + k) for k, symbol in enumerate(_GREEK)}
+"""Characters of private use that stand for formulas while text is escaped."""
+_UNMASKED = {0xE000 + k: formula for k, formula in enumerate(_GREEK.values())}

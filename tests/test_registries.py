@@ -1,0 +1,89 @@
+"""What every entry of a registry must be, so that a new file is all it takes to add one."""
+
+import inspect
+import subprocess
+import sys
+
+import pytest
+
+from paramreduce_cli.config import config_schema
+from paramreduce_cli.excitation.criteria import criteria as excitation_criteria
+from paramreduce_cli.excitation.scalings import scalings
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.reduction.criteria import criteria
+from paramreduce_cli.reduction.heuristics import heuristics
+from paramreduce_cli.registry import Registry, offered
+from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.sections import place_of
+from paramreduce_cli.report.tables import tables
+from paramreduce_cli.stages import stages
+
+ROOMS = {
+    "stages": stages,
+    "excitation/criteria": excitation_criteria,
+    "excitation/scalings": scalings,
+    "reduction/criteria": criteria,
+    "reduction/heuristics": heuristics,
+    "export/languages": languages,
+    "report/figures": figures,
+    "report/tables": tables,
+}
+SIGNATURES = {
+    "excitation/criteria": 2,
+    "excitation/scalings": 3,
+    "reduction/criteria": 2,
+    "reduction/heuristics": 1,
+    "export/languages": 1,
+    "report/figures": 1,
+    "report/tables": 1,
+}
+ENTRIES = [(room, name) for room, registry in ROOMS.items() for name in registry]
+
+
+@pytest.mark.parametrize(("room", "name"), ENTRIES)
+def test_a_file_holds_the_function_of_its_name_and_says_what_it_does(room, name):
+    function = ROOMS[room][name]
+    assert function.__name__ == name.replace("-", "_")
+    assert inspect.getdoc(function)
+    if room in SIGNATURES:
+        assert len(inspect.signature(function).parameters) == SIGNATURES[room]
+
+
+@pytest.mark.parametrize("room", list(ROOMS))
+def test_names_are_listed_without_importing(room):
+    script = f"import sys; from paramreduce_cli.registry import offered; print(len(offered({room!r})), *sys.modules)"
+    listed = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    count, *modules = listed.stdout.split()
+    assert int(count) == len(ROOMS[room]) >= 2
+    assert not [m for m in modules if m.startswith(f"paramreduce_cli.{room.replace('/', '.')}.")]
+
+
+@pytest.mark.parametrize("name", [*figures, *tables])
+def test_figures_and_tables_have_places_of_their_own(name):
+    registry = figures if name in figures else tables
+    place = place_of(registry[name])
+    others = [place_of(f) for r in (figures, tables) for _, f in r.items()]
+    assert [(p.section, p.order) for p in others].count((place.section, place.order)) == 1
+
+
+def test_the_schema_offers_them():
+    definitions = config_schema()["$defs"]
+    trajectories = definitions["TrajectoriesSection"]["properties"]
+    assert set(trajectories["criterion"]["enum"]) == {"condition-number", "d-optimality"}
+    assert {"weighted", "full"} < set(trajectories["scaling"]["enum"])
+    listed = definitions["ReductionSection"]["properties"]["heuristics"]["items"]["enum"]
+    assert {"qr", "swap", "swap@operations", "floating@acceleration"} < set(listed)
+    assert "qr@operations" not in listed
+
+
+def test_rooms_that_offer_nothing_are_a_mistake():
+    with pytest.raises(ValueError, match="nowhere offers nothing"):
+        offered("nowhere")
+
+
+def test_unknown_names_are_key_errors():
+    with pytest.raises(KeyError):
+        heuristics["guessing"]
+    assert "guessing" not in Registry("heuristic", "paramreduce_cli.reduction.heuristics")
