@@ -5,8 +5,6 @@ what of it stands in their way they name as a :class:`Concern`, and
 :mod:`paramreduce_cli.config.concerns` says which key that is.
 """
 
-from __future__ import annotations
-
 from enum import Enum, auto
 
 Key = tuple[str | int, ...]

@@ -1,7 +1,5 @@
 """The declared stages as their signatures describe them, and the order that follows."""
 
-from __future__ import annotations
-
 import inspect
 import types
 import typing

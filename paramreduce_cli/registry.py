@@ -5,8 +5,6 @@ What a room offers are the files in its folder: ``forward_selection.py`` holds t
 and names can be listed without importing what they stand for.
 """
 
-from __future__ import annotations
-
 import importlib
 from collections.abc import Callable, Iterator
 from pathlib import Path

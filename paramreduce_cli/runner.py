@@ -4,8 +4,6 @@ All it knows of a stage is its signature: a parameter's type says where the valu
 from, the return type which artifact is written.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import time

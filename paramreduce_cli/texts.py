@@ -1,7 +1,5 @@
 """How numbers and symbols are written for people, everywhere alike."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,7 +1,5 @@
 """The declared stages as rules for other tools."""
 
-from __future__ import annotations
-
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.pipeline import Stage, pipeline
 

@@ -1,5 +1,6 @@
 """Mechanisms and finished runs that several tests look at."""
 
+import json
 import shutil
 import sys
 from pathlib import Path
@@ -18,6 +19,7 @@ from paramreduce_cli.stages.build_model import build_model
 
 ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"
+TWO_LINK = CONFIGS / "two_link.yaml"
 
 CLOSED_LOOPS = ["four_bar", "five_bar", "rssr", "hexaglide"]
 
@@ -79,12 +81,20 @@ def config_of(robot, *overrides):
 
 def model_of(robot, *overrides):
     """The model of one of the configs that ship."""
+    return config_and_model(robot, *overrides)[1]
+
+
+def config_and_model(robot, *overrides):
     config = config_of(robot, *overrides)
-    return build_model(config, config.model)
+    return config, build_model(config, config.model)
 
 
 def constraints_of(config, mechanism):
     return tuple(entry.constraint(mechanism) for entry in config.trajectories.constraints)
+
+
+def summary_of(folder):
+    return json.loads((folder / "report" / "summary.json").read_text())
 
 
 def whole(mechanism, kept, values=None):
@@ -110,15 +120,42 @@ def random_states(mechanism, count, seed=0):
     return tuple(rng.uniform(-2, 2, size=(count, mechanism.n_dof)) for _ in range(3))
 
 
+def run_stages(folder, *overrides):
+    """Run the small case; returns which stages had nothing to do."""
+    config = config_of("two_link", *overrides)
+    runner = Runner(config, Store(folder), jobs=2)
+    return {stage.name: runner.run(stage).current for stage in stages_to_run(config)}
+
+
+def slope(function, arguments, direction, which=0, step=1e-6):
+    """The derivative of a function along a direction of one argument, by central differences."""
+    ahead, behind = list(arguments), list(arguments)
+    ahead[which] = ahead[which] + step * direction
+    behind[which] = behind[which] - step * direction
+    return (function(*ahead) - function(*behind)) / (2 * step)
+
+
+@pytest.fixture(scope="session")
+def puma():
+    return model_of("puma560")
+
+
+@pytest.fixture(scope="session")
+def hexaglide():
+    return model_of("hexaglide")
+
+
 @pytest.fixture(scope="session")
 def two_link_results(tmp_path_factory):
     """A finished run of the small case; look, do not touch."""
     folder = tmp_path_factory.mktemp("two_link")
-    config = load_config(CONFIGS / "two_link.yaml")
-    runner = Runner(config, Store(folder), jobs=2)
-    for stage in stages_to_run(config):
-        runner.run(stage)
+    run_stages(folder)
     return folder
+
+
+@pytest.fixture
+def summary(two_link_results):
+    return summary_of(two_link_results)
 
 
 @pytest.fixture
@@ -131,28 +168,30 @@ def two_link_copy(two_link_results, tmp_path):
 
 @pytest.fixture
 def invoke(monkeypatch, capsys):
-    """Call the command line; returns (exit code, standard output, standard error)."""
+    """Call the command line with settings; returns what it prints if the exit code is right."""
 
-    def call(*arguments):
-        monkeypatch.setattr(sys, "argv", ["paramreduce", *map(str, arguments)])
+    def call(*arguments, settings=(), code=0):
+        changes = [part for setting in settings for part in ("--set", setting)]
+        monkeypatch.setattr(sys, "argv", ["paramreduce", *map(str, [*arguments, *changes])])
         with pytest.raises(SystemExit) as stopped:
             main()
         captured = capsys.readouterr()
-        return stopped.value.code, captured.out, captured.err
+        assert stopped.value.code == code, captured
+        return captured
 
     return call
 
 
 @pytest.fixture
 def write_config(tmp_path):
-    """Write a variant of the small case's config; returns its path."""
+    """Write a variant of a config that ships, the small case's; returns its path."""
 
-    def write(*replacements, name="two_link.yaml"):
-        text = (CONFIGS / "two_link.yaml").read_text()
+    def write(*replacements, robot="two_link"):
+        text = (CONFIGS / f"{robot}.yaml").read_text()
         for old, new in replacements:
             assert old in text, old
             text = text.replace(old, new)
-        path = tmp_path / name
+        path = tmp_path / f"{robot}.yaml"
         path.write_text(text)
         return path
 

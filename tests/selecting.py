@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from paramreduce_cli.records import Block
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.problem import SelectionProblem
@@ -23,13 +24,24 @@ def order(name, problem):
 
 def problem(W, chi, groups=(), preference=None, candidates=None):
     columns = np.arange(W.shape[1])
-    return SelectionProblem(
-        W,
-        chi,
-        columns if candidates is None else np.asarray(candidates),
-        columns if preference is None else np.asarray(preference),
-        tuple(np.asarray(g) for g in groups),
-    )
+    chosen, wanted = (columns if x is None else np.asarray(x) for x in (candidates, preference))
+    return SelectionProblem(W, chi, chosen, wanted, tuple(map(np.asarray, groups)))
 
 
-__all__ = ["Effort", "found", "order", "problem", "subsets"]
+def dependent_problem(seed, rows=60, rank=8, columns=12, **changes):
+    """Columns of some rank; the torques are not reached by any proper subset of that size."""
+    rng = np.random.default_rng(seed)
+    W = rng.normal(size=(rows, rank)) @ rng.normal(size=(rank, columns))
+    return problem(W, W @ rng.normal(size=columns), **changes)
+
+
+def blocks_of(W, tau, trajectory, size):
+    """Samples in blocks of some size, without states."""
+    n_dof = tau.shape[1]
+    for start in range(0, len(tau), size):
+        part, rows = tau[start : start + size], W[start * n_dof : (start + size) * n_dof]
+        states = [np.zeros_like(part)] * 3
+        yield Block(trajectory, states[0][:, 0], *states, part, *states, rows)
+
+
+__all__ = ["Effort", "blocks_of", "dependent_problem", "found", "order", "problem", "subsets"]

@@ -4,11 +4,9 @@ import json
 
 import numpy as np
 import pytest
-from conftest import CONFIGS, ROOT
+from conftest import ROOT, config_and_model
 
-from paramreduce_cli.config import load_config
 from paramreduce_cli.records import Recordings, Run, Trajectories, Trajectory
-from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.reduce import reduce
 from paramreduce_cli.stages.sample import sample
 
@@ -28,15 +26,12 @@ QUICK = [
 @pytest.mark.parametrize("robot", list(TARGETS))
 def test_selection_on_the_committed_trajectories(robot):
     summary = json.loads((ROOT / "results" / "reference" / f"{robot}.json").read_text())
-    config = load_config(CONFIGS / f"{robot}.yaml", QUICK)
-    model = build_model(config, config.model)
-    empty = np.zeros(0)
+    config, model = config_and_model(robot, *QUICK)
 
     def series(name):
-        return tuple(
-            Trajectory(np.array(t["coefficients"]), 0, 0, {}, *[empty] * 4, 0, 0, "")
-            for t in summary["trajectories"][name]
-        )
+        empty = ({}, *[np.zeros(0)] * 4, 0, 0, "")
+        found = summary["trajectories"][name]
+        return tuple(Trajectory(np.array(t["coefficients"]), 0, 0, *empty) for t in found)
 
     wanted = config.trajectories
     trajectories = Trajectories(
@@ -44,11 +39,10 @@ def test_selection_on_the_committed_trajectories(robot):
         wanted.limits(config.n_dof), (), series("estimation"), series("validation"),
     )  # fmt: skip
     samples = sample(config.sampling, model, trajectories, Recordings(None, None))
-    reduction = reduce(
-        config.reduction, config.validation.operations, model, samples, None, Run(jobs=2)
-    )
+    counted = config.validation.operations
+    reduction = reduce(config.reduction, counted, model, samples, None, Run(jobs=2))
     found = reduction.heuristics
-    qr, forward, backward, best, greedy, optimal, missed = TARGETS[robot]
+    *full, greedy, optimal, missed = TARGETS[robot]
 
     def full_precision(name):
         return int(found[name].n[np.argmax(found[name].torque_error < FULL)])
@@ -56,10 +50,8 @@ def test_selection_on_the_committed_trajectories(robot):
     def error(name, n):
         return found[name].torque_error[found[name].row(n)]
 
-    assert full_precision("qr") == qr
-    assert full_precision("forward-selection") == forward
-    assert full_precision("backward-elimination") == backward
-    assert full_precision("best-subset") == best
+    names = ("qr", "forward-selection", "backward-elimination", "best-subset")
+    assert [full_precision(name) for name in names] == full
     assert error("forward-selection", greedy[0]) == pytest.approx(greedy[1], rel=1e-4)
     assert error("best-subset", optimal[0]) == pytest.approx(optimal[1], rel=1e-4)
     proofs = reduction.proofs

@@ -1,29 +1,23 @@
 import h5py
 import pytest
-from conftest import CONFIGS
+from conftest import config_of, run_stages
 
 from paramreduce_cli.artifacts.store import Store, file_of
-from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.runner import Runner
 
 ORDER = ["build-model", "optimize-trajectories", "sample", "reduce", "validate", "report"]
-
-
-def states(folder, *overrides):
-    config = load_config(CONFIGS / "two_link.yaml", overrides)
-    runner = Runner(config, Store(folder), jobs=2)
-    return {stage.name: runner.run(stage).current for stage in stages_to_run(config)}
+STAGES = {stage.name: stage for stage in pipeline()}
 
 
 def test_order_follows_from_the_signatures():
-    assert [stage.name for stage in pipeline()] == ORDER
+    assert list(STAGES) == ORDER
 
 
 def test_nothing_is_done_twice(two_link_copy):
     before = {p: p.stat().st_mtime_ns for p in two_link_copy.glob("*.h5")}
-    assert all(states(two_link_copy).values())
+    assert all(run_stages(two_link_copy).values())
     assert all(p.stat().st_mtime_ns > t for p, t in before.items())  # touched, so that Make agrees
 
 
@@ -38,18 +32,18 @@ def test_nothing_is_done_twice(two_link_copy):
     ],
 )
 def test_a_change_redoes_what_depends_on_it(two_link_copy, override, redone):
-    current = states(two_link_copy, override)
+    current = run_stages(two_link_copy, override)
     again = [name for name, is_current in current.items() if not is_current]
     # What was rebuilt to the same content stops the chain, so a superset may be left alone.
     assert set(again) <= set(redone)
     assert again[0] == redone[0]
-    assert all(states(two_link_copy, override).values())
+    assert all(run_stages(two_link_copy, override).values())
 
 
 def test_a_lost_or_foreign_artifact_is_made_again(two_link_copy):
     (two_link_copy / "samples.h5").unlink()
     (two_link_copy / "model.h5").write_bytes(b"garbage")
-    current = states(two_link_copy)
+    current = run_stages(two_link_copy)
     assert not current["build-model"]
     assert not current["sample"]
     assert current["optimize-trajectories"]
@@ -59,43 +53,37 @@ def test_a_lost_or_foreign_artifact_is_made_again(two_link_copy):
 def test_another_version_or_schema_is_made_again_by_run(two_link_copy, attribute, value):
     with h5py.File(two_link_copy / "model.h5", "a") as file:
         file.attrs[attribute] = value
-    assert not states(two_link_copy)["build-model"]
+    assert not run_stages(two_link_copy)["build-model"]
 
 
 def test_a_stage_that_fails_leaves_everything_as_it_was(two_link_copy):
-    before = {
-        stage.output: (two_link_copy / file_of(stage.output)).read_bytes() for stage in pipeline()
-    }
-    config = load_config(CONFIGS / "two_link.yaml", ["selected.n=20"])
-    validate = next(stage for stage in pipeline() if stage.name == "validate")
+    paths = [two_link_copy / file_of(stage.output) for stage in pipeline()]
+    before = [path.read_bytes() for path in paths]
+    config = config_of("two_link", "selected.n=20")
     with pytest.raises(Exception, match=r"selected\.n is 20"):
-        Runner(config, Store(two_link_copy)).run(validate)
-    for record, content in before.items():
-        assert (two_link_copy / file_of(record)).read_bytes() == content
+        Runner(config, Store(two_link_copy)).run(STAGES["validate"])
+    assert [path.read_bytes() for path in paths] == before
 
 
 def test_what_is_not_this_robots_is_never_overwritten(two_link_copy):
-    config = load_config(CONFIGS / "puma560.yaml")
     before = {p: p.read_bytes() for p in two_link_copy.glob("*.h5")}
     with pytest.raises(ArtifactError, match="belongs to the robot two_link"):
-        Runner(config, Store(two_link_copy)).run(pipeline()[0])
+        Runner(config_of("puma560"), Store(two_link_copy)).run(STAGES["build-model"])
     own = two_link_copy / "samples.h5"
-    own.unlink()
     with h5py.File(own, "w") as file:
         file["estimation/W"] = [[1.0]]
-    sample = next(stage for stage in pipeline() if stage.name == "sample")
     with pytest.raises(ArtifactError, match="was not made by paramreduce"):
-        Runner(load_config(CONFIGS / "two_link.yaml"), Store(two_link_copy)).run(sample)
+        Runner(config_of("two_link"), Store(two_link_copy)).run(STAGES["sample"])
     assert all(p.read_bytes() == content for p, content in before.items() if p != own)
 
 
 def test_a_report_with_a_file_missing_is_made_again(two_link_copy):
     (two_link_copy / "report" / "index.html").unlink()
-    assert not states(two_link_copy)["report"]
+    assert not run_stages(two_link_copy)["report"]
     assert (two_link_copy / "report" / "index.html").exists()
 
 
 def test_files_of_a_former_report_are_removed(two_link_copy):
-    states(two_link_copy, "report.formats=[png]")
+    run_stages(two_link_copy, "report.formats=[png]")
     kinds = {p.suffix for p in (two_link_copy / "report" / "figures").iterdir()}
     assert kinds == {".png"}

@@ -1,7 +1,5 @@
 """Files that are replaced whole or not at all, whatever the disk does."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

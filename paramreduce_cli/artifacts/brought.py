@@ -1,7 +1,5 @@
 """Files that users bring: Fourier coefficients, and recorded states and torques."""
 
-from __future__ import annotations
-
 import array
 import csv
 import gzip

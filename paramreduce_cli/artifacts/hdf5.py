@@ -1,7 +1,5 @@
 """HDF5 files with where they came from: written whole, read with clear refusals."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import hashlib

@@ -1,7 +1,5 @@
 """What is in an artifact and where it came from, as plain data."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import h5py

@@ -4,8 +4,6 @@ A field is a dataset of its name, a record in a field a group. What is called ot
 is listed here; docs/artifacts.md describes the same for people, with shapes and units.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import types

@@ -1,7 +1,5 @@
 """Finished parts of an artifact that is not whole yet."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator, MutableMapping
 from pathlib import Path

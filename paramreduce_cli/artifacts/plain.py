@@ -1,7 +1,5 @@
 """Records as plain data, such as JSON can hold, and back by their types."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import types

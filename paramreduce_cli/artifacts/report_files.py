@@ -1,7 +1,5 @@
 """The report's folder, and JSON."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

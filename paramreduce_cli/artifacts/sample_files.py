@@ -1,7 +1,5 @@
 """samples.h5, the project's own or one that a user brings: written and read block by block."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterator
 from pathlib import Path

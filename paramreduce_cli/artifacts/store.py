@@ -1,7 +1,5 @@
 """A results folder: which record is in which file, and which files are up to date."""
 
-from __future__ import annotations
-
 import contextlib
 import hashlib
 import os

@@ -1,7 +1,5 @@
 """The command line: the only place that prints, reads flags and sets exit codes."""
 
-from __future__ import annotations
-
 import os
 import sys
 import warnings

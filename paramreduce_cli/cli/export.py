@@ -1,7 +1,5 @@
 """The command that writes a reduced model as code."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Commands that look at files or write new ones: no stage is run here."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

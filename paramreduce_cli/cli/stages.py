@@ -1,7 +1,5 @@
 """Commands that run stages; derived from their signatures, nothing about a stage is written here."""
 
-from __future__ import annotations
-
 import os
 import statistics
 from collections.abc import Callable

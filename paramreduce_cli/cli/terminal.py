@@ -1,7 +1,5 @@
 """What goes to the terminal: text, warnings, progress, and Ctrl-C coming from it."""
 
-from __future__ import annotations
-
 import signal
 import threading
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """What the parts of a config must say about each other."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator
 

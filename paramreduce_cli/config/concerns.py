@@ -1,7 +1,5 @@
 """Which key of a config a numerical error is about, and what can be done there."""
 
-from __future__ import annotations
-
 from paramreduce_cli.errors import Concern, ConcernError, ConfigError, Key
 
 _TREE: Key = ("description", "tree")

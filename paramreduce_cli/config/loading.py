@@ -1,7 +1,5 @@
 """From a YAML file to a Config, with every error of the file reported at once."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """YAML with the line of every key, so that errors can point at them."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -5,8 +5,6 @@ A section is a part of the schema with a type of its own: ``validation`` is the
 stands at the top level itself.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """A commented config for a new arm that validates as it is."""
 
-from __future__ import annotations
-
 _HEAD = """\
 # {name}: fill in what is marked TODO. Units are SI; numbers may be written as 1e-3 or pi/2.
 # `paramreduce schema` lists every key with its meaning, unit and default.

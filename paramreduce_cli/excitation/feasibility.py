@@ -4,8 +4,6 @@ Bounds are checked on a grid finer than the one optimised on; what they miss by 
 points is mended by drawing the motion together towards a resting position inside.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.optimize
 

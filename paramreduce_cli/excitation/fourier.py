@@ -4,8 +4,6 @@ z(t) = q0 + sum_l a_l / (w l) sin(w l t) - b_l / (w l) cos(w l t), with w = 2 pi
 the coefficients of one joint are [q0, a1, b1, a2, b2, ...].
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

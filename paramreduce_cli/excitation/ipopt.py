@@ -6,8 +6,6 @@ limited-memory update. Value and gradient come from one call and are kept for th
 last asked.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ shares of the limits that their motion uses on the grid:
 Limits are tightened by the grid's margin, so that they hold between its points too.
 """
 
-from __future__ import annotations
-
 from typing import Literal
 
 import numpy as np

@@ -5,8 +5,6 @@ and so dW = 2 W dG; one reverse sweep through the regressor takes that to the st
 series' transposed basis to the coefficients.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

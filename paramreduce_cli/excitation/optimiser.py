@@ -9,8 +9,6 @@ left to themselves, some combinations of slides of a parallel robot would turn i
 ten times as far as others, and neither random starts nor the solver would find their way.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from dataclasses import dataclass

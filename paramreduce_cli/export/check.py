@@ -1,7 +1,5 @@
 """Whether exported functions compute what plain recursion does."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

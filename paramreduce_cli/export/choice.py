@@ -1,7 +1,5 @@
 """Which model is exported, and what it is called."""
 
-from __future__ import annotations
-
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import Model, ModelChoice, ReducedModel, Reduction, Validation
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model

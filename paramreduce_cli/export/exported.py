@@ -1,7 +1,5 @@
 """What every exporter is given, and what texts of all languages share."""
 
-from __future__ import annotations
-
 import keyword
 import re
 import sys

@@ -1,7 +1,5 @@
 """Straight-line functions as text: what differs between languages, and what does not."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 

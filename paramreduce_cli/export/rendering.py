@@ -1,7 +1,5 @@
 """Exported files from the templates that say what is the same in all of them."""
 
-from __future__ import annotations
-
 from functools import cache
 from importlib.resources import files
 

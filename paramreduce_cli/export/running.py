@@ -1,7 +1,5 @@
 """Exported inverse dynamics, run here: what a controller would call, and how long it takes."""
 
-from __future__ import annotations
-
 import ctypes
 import time
 

@@ -1,7 +1,5 @@
 """A reduced model as files in some language, checked before they are written."""
 
-from __future__ import annotations
-
 import warnings
 from enum import StrEnum
 

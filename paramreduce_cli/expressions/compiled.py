@@ -6,8 +6,6 @@ second run starts at once. Without a compiler CasADi's own virtual machine does 
 work, slower; :class:`BatchFunction` warns of that once per process.
 """
 
-from __future__ import annotations
-
 import ctypes
 import hashlib
 import os

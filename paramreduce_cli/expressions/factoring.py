@@ -5,8 +5,6 @@ common to terms of a sum are taken out of it, pairs that several sums (or produc
 computed once [Breuer1969], and all is put together again. Results differ by rounding only.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence

@@ -5,8 +5,6 @@ way they were built. A value is a signed reference to a node, as one integer: tw
 number, plus one if it is negated. Constants are folded, zeros and ones vanish as they are met.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 ZERO = 0

@@ -5,8 +5,6 @@ more; that different nodes may then compute the same, and that sums and products
 rearranged, is not looked at. It takes microseconds and is meant for comparing many subsets.
 """
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 

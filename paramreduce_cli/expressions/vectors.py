@@ -4,8 +4,6 @@ The scalars may be CasADi's or those of an expression graph: products with the z
 a geometry vanish as they are formed, instead of being simplified afterwards.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

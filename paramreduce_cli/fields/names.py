@@ -1,7 +1,5 @@
 """Names that must be known, and the nearest known one to a name that is not."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 from typing import Any

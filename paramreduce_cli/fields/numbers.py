@@ -3,8 +3,6 @@
 The constants of a config reach the numbers as pydantic's validation context.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

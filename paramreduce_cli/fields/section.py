@@ -1,7 +1,5 @@
 """Sections, and the names, numbers and lists of numbers in them."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import numpy as np

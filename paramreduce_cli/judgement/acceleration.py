@@ -1,7 +1,5 @@
 """Errors of the accelerations that reduced models predict, and the health of their mass matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Which of many judged models to take, and which of them are worth a look."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np

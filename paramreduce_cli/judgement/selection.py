@@ -1,7 +1,5 @@
 """Which reduced model the config asks for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from paramreduce_cli.config.schema import SelectedSection

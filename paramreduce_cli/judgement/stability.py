@@ -1,7 +1,5 @@
 """How much a selection depends on the data: which parameters other data would choose."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Errors of the torques that reduced models predict, in three norms."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

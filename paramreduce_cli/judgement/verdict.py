@@ -1,7 +1,5 @@
 """Whether the selected model is accepted, and what the user should know of the others."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether lean models compute what the straightforward ones do."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

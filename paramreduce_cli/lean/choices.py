@@ -1,7 +1,5 @@
 """What can be chosen at every joint without changing what a model computes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """Operation counts of reduced models."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 from paramreduce_cli.lean.model import LeanModels

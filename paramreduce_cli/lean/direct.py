@@ -1,7 +1,5 @@
 """The mass matrix of a tree by composite bodies [Walker1982], as the choices at its joints say."""
 
-from __future__ import annotations
-
 from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.inverse import (

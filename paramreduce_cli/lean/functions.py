@@ -1,7 +1,5 @@
 """The functions that a model consists of, for a set of parameters, ready for export."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import casadi as ca

@@ -9,8 +9,6 @@ inertia beyond it, the wrenches of the bodies from j on are
 At the joints that hand it on, only the moment about z of w(U; J) is needed.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from paramreduce_cli.expressions.vectors import dot

@@ -1,7 +1,5 @@
 """The motion of every frame of a tree, as the choices at its joints say."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 

@@ -156,6 +156,5 @@ class LeanModels:
                 return graph.input(ties.get(position, position))
 
             outputs = program.rebuilt(graph, substitute)
-            candidates.append((graph.count(outputs), graph, outputs))
-        _, graph, outputs = min(candidates, key=lambda candidate: candidate[0])
-        return Program.of_graph(*least(graph, outputs))
+            candidates.append(Program.of_graph(*least(graph, outputs)))
+        return min(candidates, key=lambda program: program.n_operations)

@@ -4,8 +4,6 @@ U = skew(w') + skew(w)^2 gives the acceleration of a point at r as a + U r [Khal
 about an axis does not change U's column along it, so that column is turned instead of w'.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from enum import StrEnum
 

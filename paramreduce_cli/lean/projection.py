@@ -5,8 +5,6 @@ d_z = R' d_q, M_zz = R' M_qq R and delta_z = R' (delta_q + M_qq b) as in
 and of b zero.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from paramreduce_cli.expressions.graph import Graph

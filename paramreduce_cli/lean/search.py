@@ -7,8 +7,6 @@ the base parameters and for the few that matter most: masses, first moments and 
 inertia about the joints' own axes.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import replace
 

@@ -6,8 +6,6 @@ motion. Frames are free up to a turn about their own z and the direction of z, s
 parallel to the one before gets no turn at all: its angle just adds to that one's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Turns of vectors and inertias: by a joint's angle about z, and by constant rotations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Found from random states, as in [Gautier1991], with ranks decided relative to th
 singular value of W with its columns scaled to unit length.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg
 

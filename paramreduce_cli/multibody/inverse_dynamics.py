@@ -5,8 +5,6 @@ origins, so that the torques are linear in the standard parameters [Khosla1985].
 in a textbook: what has few operations is made by :mod:`paramreduce_cli.lean`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

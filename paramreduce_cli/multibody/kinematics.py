@@ -1,7 +1,5 @@
 """Rotations and positions along the tree, symbolically and in numbers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import casadi as ca

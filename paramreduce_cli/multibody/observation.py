@@ -5,8 +5,6 @@ one is kept for every trajectory and joint, so that any weighting of joints and 
 of trajectories follows from the factors alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 

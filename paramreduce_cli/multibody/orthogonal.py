@@ -1,7 +1,5 @@
 """What is left of columns once their parts along others are taken out."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

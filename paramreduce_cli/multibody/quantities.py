@@ -4,8 +4,6 @@ The rows are made so that they are smooth where the quantities are not (an angle
 point on the axis), without unit, and about as large as the share by which a bound is missed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """Random states of a mechanism, on which ranks are decided."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.multibody.kinematics import body_poses

@@ -4,8 +4,6 @@ A coefficient that is a simple function of the geometry is printed as such, but 
 function still fits when the geometry is changed; everything else stays a number.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable, Mapping, Sequence
 

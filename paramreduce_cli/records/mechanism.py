@@ -1,7 +1,5 @@
 """Mechanisms: bodies, joints, closures of loops."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

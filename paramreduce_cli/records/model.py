@@ -1,7 +1,5 @@
 """A model: a mechanism with values of its parameters, their base, and lean formulations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """What a run lends its stages, and what it knows of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any

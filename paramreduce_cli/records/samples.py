@@ -1,7 +1,5 @@
 """Samples: states, torques and observation matrices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """What a reduced model costs a controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Trajectories, and what they had to keep to."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal

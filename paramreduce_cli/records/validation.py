@@ -1,7 +1,5 @@
 """What reduced models are worth, and which one was selected."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum

@@ -1,7 +1,5 @@
 """Approximate base parameters of a subset and the torque error they leave."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

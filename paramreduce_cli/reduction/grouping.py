@@ -4,8 +4,6 @@ A tied group has one value for all its parameters: its columns of W add up to on
 parameters of an untied group keep a value each, and are chosen or left out together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

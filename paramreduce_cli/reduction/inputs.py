@@ -1,7 +1,5 @@
 """What criteria may need besides the least-squares problem."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """The models that parameters make: the full one, base parameters, and every subset found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

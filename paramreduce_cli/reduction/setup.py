@@ -1,7 +1,5 @@
 """What a config asks of a selection: columns and groups, effort, and the problem of an estimation set."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection

@@ -1,7 +1,5 @@
 """What a heuristic is asked for, and what it answers."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache, cached_property

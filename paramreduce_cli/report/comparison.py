@@ -1,7 +1,5 @@
 """Compare two summaries: what differs, by how much, and whether that is tolerable."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Everything a figure or a table may show, gathered once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

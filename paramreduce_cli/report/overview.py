@@ -1,7 +1,5 @@
 """One table over several robots: what their selected models are worth [Ros2019], Table 13."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

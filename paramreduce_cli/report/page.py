@@ -1,7 +1,5 @@
 """The self-contained page for people."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Mapping
 from dataclasses import dataclass

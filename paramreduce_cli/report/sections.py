@@ -1,7 +1,5 @@
 """The sections of the page, and where on it figures and tables stand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum

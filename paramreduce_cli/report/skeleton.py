@@ -1,7 +1,5 @@
 """A mechanism in one pose, for drawing."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """How all figures are drawn, and what several of them have in common."""
 
-from __future__ import annotations
-
 import io
 from collections.abc import Callable
 

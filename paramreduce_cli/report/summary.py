@@ -1,7 +1,5 @@
 """summary.json: the numbers that a regression job compares."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 from typing import Any
 

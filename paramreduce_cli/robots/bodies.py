@@ -1,7 +1,5 @@
 """What every way of describing bodies says of them."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import ClassVar, Self

@@ -1,7 +1,5 @@
 """Denavit-Hartenberg descriptions: modified as in [Khalil2002] and [Craig2005], and standard."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Annotated, ClassVar, Literal, Self
 

@@ -3,8 +3,6 @@
 What counts as a quarter turn, or as an entry of 0 or 1, is decided here for all of the package.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.records import FloatArray

@@ -1,7 +1,5 @@
 """build-model: from the description to parameters and their base."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """optimize-trajectories: exciting trajectories for both sets."""
 
-from __future__ import annotations
-
 import warnings
 
 import numpy as np

@@ -1,7 +1,5 @@
 """reduce: select parameters with each heuristic, and prove how good that is."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from dataclasses import dataclass

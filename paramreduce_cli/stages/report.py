@@ -1,7 +1,5 @@
 """report: figures, tables, the page and summary.json."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.config.schema import ReportSection, SamplingSection

@@ -1,7 +1,5 @@
 """sample: states, torques and observation matrices of both sets."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """validate: what every reduced model is worth, and whether the selected one is accepted."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -4,8 +4,6 @@ The torques tau = d(z, dz, ddz_d + 2 w (dz_d - dz) + w^2 (z_d - z)) come from th
 and are held for a control period; the arm follows the full one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

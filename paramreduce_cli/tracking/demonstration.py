@@ -1,7 +1,5 @@
 """Control of an arm with several models in the controller."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Protocol
 

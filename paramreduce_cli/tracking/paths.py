@@ -1,7 +1,5 @@
 """Moves from rest to rest between random poses."""
 
-from __future__ import annotations
-
 from itertools import pairwise
 
 import numpy as np

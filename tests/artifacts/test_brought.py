@@ -1,4 +1,3 @@
-import gzip
 import json
 
 import h5py
@@ -17,11 +16,7 @@ def table(rows=20, columns=9):
 
 def write_csv(path, header=HEADER, data=None):
     data = table() if data is None else data
-    text = "\n".join([header, *(",".join(repr(float(x)) for x in row) for row in data)]) + "\n"
-    if path.suffix == ".gz":
-        path.write_bytes(gzip.compress(text.encode()))
-    else:
-        path.write_text(text)
+    np.savetxt(path, data, delimiter=",", header=header, comments="")
     return path
 
 
@@ -67,12 +62,22 @@ def test_csv_that_does_not_fit_is_refused(tmp_path, header, data, says):
         load_recording(write_csv(tmp_path / "x.csv", header, data), 2)
 
 
-def test_text_among_the_numbers_is_named_by_line(tmp_path):
-    path = write_csv(tmp_path / "x.csv")
-    lines = path.read_text().splitlines()
-    lines[4] = lines[4].replace(lines[4].split(",")[2], "n/a")
-    path.write_text("\n".join(lines))
-    with pytest.raises(DataError, match="line 5: 'n/a' is not a number"):
+@pytest.mark.parametrize(
+    ("name", "change", "error", "says"),
+    [
+        ("x.csv", lambda b: b.replace(b"%.18e" % table()[3, 2], b"n/a"), DataError,
+         "line 5: 'n/a' is not a number"),
+        ("x.csv", lambda b: b.replace(b",", b";"), DataError, "separated by commas"),
+        ("x.csv", lambda b: b.replace(b"dz2", b"z2", 1), DataError, "z2 stands there twice"),
+        ("x.csv", lambda b: b"", DataError, "line 1"),
+        ("x.csv", lambda b: b"\xff\xfe\x00\x01" * 10, ArtifactError, "cannot be read"),
+        ("x.csv.gz", lambda b: b[:-40], ArtifactError, "cannot be read"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_with_a_table_is_said(tmp_path, name, change, error, says):
+    path = write_csv(tmp_path / name)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(error, match=says):
         load_recording(path, 2)
 
 
@@ -83,23 +88,8 @@ def test_files_that_are_not_there(tmp_path, name):
 
 
 def test_tables_as_spreadsheets_write_them(tmp_path):
-    path = write_csv(tmp_path / "x.csv")
-    text = path.read_text()
-    path.write_text("\ufeff" + text)
+    path = write_csv(tmp_path / "x.csv", f"\ufeff{HEADER}")
     assert np.array_equal(load_recording(path, 2).time, table()[:, 0])
-    path.write_text(text.replace(",", ";"))
-    with pytest.raises(DataError, match="separated by commas"):
-        load_recording(path, 2)
-    path.write_text(text.replace("dz2", "z2", 1))
-    with pytest.raises(DataError, match="z2 stands there twice"):
-        load_recording(path, 2)
-
-
-def test_a_compressed_file_that_is_cut_off(tmp_path):
-    path = write_csv(tmp_path / "x.csv.gz")
-    path.write_bytes(path.read_bytes()[:-40])
-    with pytest.raises(ArtifactError, match="cannot be read"):
-        load_recording(path, 2)
 
 
 @pytest.mark.parametrize(("key", "shape"), [("time", (14,)), ("time", (15, 3)), ("z", ())])
@@ -108,20 +98,10 @@ def test_datasets_of_another_shape_are_refused(tmp_path, key, shape):
     with h5py.File(path, "w") as file:
         for name in ("z", "dz", "ddz"):
             file[name] = table(15, 3)
-        if key in file:
-            del file[key]
+        file.pop(key, None)
         file[key] = np.zeros(shape)
     with pytest.raises(DataError, match=key):
         load_recording(path, 3)
-
-
-def test_empty_and_binary_files(tmp_path):
-    (tmp_path / "x.csv").write_text("")
-    with pytest.raises(DataError, match="line 1"):
-        load_recording(tmp_path / "x.csv", 2)
-    (tmp_path / "y.csv").write_bytes(b"\xff\xfe\x00\x01" * 10)
-    with pytest.raises(ArtifactError, match="cannot be read"):
-        load_recording(tmp_path / "y.csv", 2)
 
 
 def test_coefficients_from_a_summary_and_from_hdf5_are_the_same(two_link_results):

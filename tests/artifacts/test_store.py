@@ -5,11 +5,12 @@ import resource
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import TWO_LINK
 
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
 from paramreduce_cli.artifacts.parts import Parts
@@ -18,11 +19,9 @@ from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Mechanism, Model, Reduction, Samples, Trajectories, Validation
 
-
-def stamp(robot="arm", stage="build-model", **changes):
-    versions = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
-    made = Stamp(SCHEMA, robot, stage, versions, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)
-    return dataclasses.replace(made, **changes)
+VERSIONS = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
+STAMP = Stamp(SCHEMA, "arm", "build-model", VERSIONS, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)
+SAMPLE = [sys.executable, "-m", "paramreduce_cli", "sample", TWO_LINK, "--force", "--quiet"]
 
 
 def same(a, b):
@@ -31,7 +30,7 @@ def same(a, b):
     if isinstance(a, np.ndarray):
         return np.array_equal(a, b, equal_nan=True)
     if isinstance(a, dict):
-        return list(a) == list(b) and all(same(a[k], b[k]) for k in a)
+        return same(tuple(a.items()), tuple(b.items()))
     if isinstance(a, tuple):
         return len(a) == len(b) and all(map(same, a, b))
     return a == b
@@ -59,9 +58,8 @@ def test_samples_are_what_the_layout_says(two_link_results):
         with h5py.File(two_link_results / "trajectories.h5") as series:
             q0, a1, b1, a2, b2 = series["estimation/coefficients"][0, 1]
         t = t[:40]
-        expected = (
-            q0 + a1 * np.sin(t) - b1 * np.cos(t) + a2 / 2 * np.sin(2 * t) - b2 / 2 * np.cos(2 * t)
-        )
+        expected = q0 + a1 * np.sin(t) - b1 * np.cos(t)
+        expected += a2 / 2 * np.sin(2 * t) - b2 / 2 * np.cos(2 * t)
         assert z[:40, 1] == pytest.approx(expected)
 
 
@@ -98,7 +96,7 @@ def test_names_relied_on_outside(two_link_results):
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
     path = tmp_path / "x.h5"
-    write(path, stamp(), lambda w: w.dataset("a", 1))
+    write(path, STAMP, lambda w: w.dataset("a", 1))
     before = path.read_bytes()
 
     def fail(writer: Writer) -> None:
@@ -106,7 +104,7 @@ def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
         raise OSError(28, "No space left on device")
 
     with pytest.raises(ArtifactError, match="disk is full"):
-        write(path, stamp(), fail)
+        write(path, STAMP, fail)
     assert path.read_bytes() == before
     assert [p.name for p in tmp_path.iterdir()] == ["x.h5"]
 
@@ -115,16 +113,12 @@ def test_a_disk_that_fills_up(two_link_copy):
     """A limit on file size stands in for a full disk; the old samples must survive."""
     samples = two_link_copy / "samples.h5"
     before = samples.read_bytes()
-    from conftest import CONFIGS
 
     def limit():
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
-    done = subprocess.run(
-        [sys.executable, "-m", "paramreduce_cli", "sample", CONFIGS / "two_link.yaml",
-         "--results", two_link_copy, "--force", "--quiet"],
-        capture_output=True, text=True, preexec_fn=limit, check=False,
-    )  # fmt: skip
+    command = [*SAMPLE, "--results", two_link_copy]
+    done = subprocess.run(command, capture_output=True, text=True, preexec_fn=limit, check=False)
     assert done.returncode == 2
     assert "samples.h5: cannot be written" in done.stderr
     assert "Traceback" not in done.stderr
@@ -132,46 +126,50 @@ def test_a_disk_that_fills_up(two_link_copy):
     assert not list(two_link_copy.glob(".*.tmp"))
 
 
-@pytest.mark.parametrize("damage", ["missing", "truncated", "foreign", "text", "empty"])
+def make_foreign(path):
+    with h5py.File(path, "w") as file:
+        file["something"] = 1.0
+
+
+DAMAGES = {
+    "missing": Path.unlink,
+    "truncated": lambda path: path.write_bytes(path.read_bytes()[:1000]),
+    "foreign": make_foreign,
+    "text": lambda path: path.write_text("z1,z2\n1,2\n"),
+    "empty": lambda path: path.write_bytes(b""),
+}
+
+
+@pytest.mark.parametrize("damage", list(DAMAGES))
 @pytest.mark.parametrize("record", list(LAYOUTS))
 def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy):
-    store = Store(two_link_copy)
-    path = store.path(record)
-    if damage == "missing":
-        path.unlink()
-    elif damage == "truncated":
-        path.write_bytes(path.read_bytes()[:1000])
-    elif damage == "foreign":
-        path.unlink()
-        with h5py.File(path, "w") as file:
-            file["something"] = 1.0
-    elif damage == "text":
-        path.write_text("z1,z2\n1,2\n")
-    else:
-        path.write_bytes(b"")
-    with pytest.raises(ArtifactError, match=path.name):
-        load_file(store.path(record), record, "two_link", "make-it")
-
-
-@pytest.mark.parametrize("record", list(LAYOUTS))
-def test_a_file_without_one_of_its_datasets_is_refused(record, two_link_copy):
     path = Store(two_link_copy).path(record)
-    victims = {Model: "base/beta", Trajectories: "validation/coefficients", Samples: "estimation/W",
-               Reduction: "qr/n", Validation: "qr/n"}  # fmt: skip
+    DAMAGES[damage](path)
+    with pytest.raises(ArtifactError, match=path.name):
+        load_file(path, record, "two_link", "make-it")
+
+
+@pytest.mark.parametrize(
+    ("record", "dataset"),
+    [(Model, "base/beta"), (Trajectories, "validation/coefficients"), (Samples, "estimation/W"),
+     (Reduction, "qr/n"), (Validation, "qr/n")],
+)  # fmt: skip
+def test_a_file_without_one_of_its_datasets_is_refused(record, dataset, two_link_copy):
+    path = Store(two_link_copy).path(record)
     with h5py.File(path, "a") as file:
-        del file[victims[record]]
-    with pytest.raises(ArtifactError, match=victims[record]):
+        del file[dataset]
+    with pytest.raises(ArtifactError, match=dataset):
         load_file(path, record, "two_link", "")
 
 
 def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
-    store = Store(two_link_copy)
+    path = Store(two_link_copy).path(Model)
     with pytest.raises(ArtifactError, match="belongs to the robot two_link, not to other"):
-        load_file(store.path(Model), Model, "other", "")
-    with h5py.File(store.path(Model), "a") as file:
+        load_file(path, Model, "other", "")
+    with h5py.File(path, "a") as file:
         file.attrs["schema"] = SCHEMA - 1
     with pytest.raises(ArtifactError, match=r"older layout.*paramreduce run"):
-        load_file(store.path(Model), Model, "two_link", "")
+        load_file(path, Model, "two_link", "")
 
 
 def test_one_run_at_a_time(tmp_path):
@@ -183,13 +181,13 @@ def test_one_run_at_a_time(tmp_path):
 
 
 def test_parts_belong_to_one_origin(two_link_results, tmp_path):
-    trajectories, _ = load_file(
-        Store(two_link_results).path(Trajectories), Trajectories, "two_link", ""
-    )
-    parts = Parts(tmp_path / "parts", stamp())
+    path = Store(two_link_results).path(Trajectories)
+    trajectories, _ = load_file(path, Trajectories, "two_link", "")
+    parts = Parts(tmp_path / "parts", STAMP)
     parts["a"] = trajectories.estimation[0]
     assert same(parts["a"], trajectories.estimation[0])
-    assert "a" not in Parts(tmp_path / "parts", stamp(sections={"model": "changed"}))
+    other = dataclasses.replace(STAMP, sections={"model": "changed"})
+    assert "a" not in Parts(tmp_path / "parts", other)
     (tmp_path / "parts" / "a.h5").write_bytes(b"cut off")
     assert "a" not in parts
     parts.clear()
@@ -197,26 +195,18 @@ def test_parts_belong_to_one_origin(two_link_results, tmp_path):
 
 
 def test_stamp_survives(tmp_path):
-    made = write(tmp_path / "x.h5", stamp(), lambda w: w.dataset("a", [1.0, 2.0]))
+    made = write(tmp_path / "x.h5", STAMP, lambda w: w.dataset("a", [1.0, 2.0]))
     assert read_stamp(tmp_path / "x.h5") == made
     assert made.digest
 
 
 def test_digests_do_not_depend_on_the_order_of_sets(two_link_results, tmp_path):
     """The same samples written under two hash seeds have one digest."""
-    script = (
-        "import sys; from paramreduce_cli.__main__ import main; "
-        "sys.argv = ['paramreduce', 'sample', sys.argv[1], '--results', sys.argv[2], '--force', "
-        "'--quiet']; main()"
-    )
     digests = set()
     for seed in ("1", "2"):
         copy = tmp_path / seed
         shutil.copytree(two_link_results, copy)
-        subprocess.run(
-            [sys.executable, "-c", script, str(CONFIGS / "two_link.yaml"), str(copy)],
-            env={**os.environ, "PYTHONHASHSEED": seed},
-            check=True,
-        )
+        seeded = {**os.environ, "PYTHONHASHSEED": seed}
+        subprocess.run([*SAMPLE, "--results", copy], env=seeded, check=True)
         digests.add(read_stamp(copy / "samples.h5").digest)
     assert len(digests) == 1

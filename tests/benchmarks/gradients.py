@@ -1,22 +1,18 @@
 """One descent through IPOPT with exact gradients against finite differences, in CPU time."""
 
 import time
-from pathlib import Path
 
 import numpy as np
 import scipy.linalg
 
-from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.ipopt import minimise
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE, settings_basis
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.follower import Follower
-from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import _settings
-
-CONFIG = Path(__file__).resolve().parents[2] / "configs" / "puma560.yaml"
+from tests.conftest import config_and_model
 
 
 class Differences:
@@ -49,8 +45,7 @@ def descend(make, start):
 
 
 def rows():
-    config = load_config(CONFIG)
-    model = build_model(config, config.model)
+    config, model = config_and_model("puma560")
     wanted = config.trajectories
     excitation = excitation_of(
         model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling

@@ -20,12 +20,8 @@ from tests.conftest import model_of, whole
 
 DRIVER = Path(__file__).with_suffix(".cpp")
 FLAGS = ["-O3", "-march=native", "-DNDEBUG"]
-DEFINITIONS = [
-    "BOOST_MPL_LIMIT_LIST_SIZE=30",
-    "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
-    "BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS",
-    "BOOST_FUSION_INVOKE_MAX_ARITY=12",
-]
+DEFINITIONS = ["BOOST_MPL_LIMIT_LIST_SIZE=30", "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
+               "BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "BOOST_FUSION_INVOKE_MAX_ARITY=12"]  # fmt: skip
 """Of Pinocchio's headers, as its CMake targets say."""
 FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
 DYNAMIC = [Kind.of(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
@@ -39,11 +35,8 @@ def sources():
         model = model_of("puma560")
     names = model.mechanism.parameter_names
     kept = [names.index(name) for name in FS_18.split()]
-    chosen = {
-        "full": chosen_model("full", model, None, None)[0],
-        "base": chosen_model("base", model, None, None)[0],
-        "fs18": whole(model.mechanism, kept, model.values[kept]),
-    }
+    chosen = {name: chosen_model(name, model, None, None)[0] for name in ("full", "base")}
+    chosen["fs18"] = whole(model.mechanism, kept, model.values[kept])
     files = {"lean_code.cpp": DRIVER.read_bytes(), "arm.h": arm(model).encode()}
     for name, one in chosen.items():
         for what, robot in ((Exported.BOTH, name), (Exported.REGRESSOR, f"{name}_K")):
@@ -95,12 +88,9 @@ def driver():
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
-    objects = []
-    for name in sorted(files):
-        if name.endswith(".c"):
-            command = ["gcc", "-std=gnu99", *FLAGS, "-c", name, "-o", f"{name}.o"]
-            subprocess.run(command, cwd=folder, check=True)
-            objects.append(f"{name}.o")
+    c_files = sorted(name for name in files if name.endswith(".c"))
+    subprocess.run(["gcc", "-std=gnu99", *FLAGS, "-c", *c_files], cwd=folder, check=True)
+    objects = [name.replace(".c", ".o") for name in c_files]
     includes = [f"-I{path}" for path in headers()]
     defined = [f"-D{one}" for one in DEFINITIONS]
     command = ["g++", "-std=c++17", "-w", *FLAGS, *defined, *includes, "lean_code.cpp", *objects]
@@ -122,11 +112,9 @@ def rows():
     t = measured()
     if not t["difference"] < 1e-9:
         raise SystemExit(f"Pinocchio and the exported model differ by {t['difference']}")
-    for name in ("full", "base", "fs18"):
-        at_most = 1 / 6 if name == "fs18" else 1 / 4
-        yield f"{name} d / rnea", t[f"{name}_idm"] / t["rnea"], at_most
-        at_most = 1 / 8 if name == "fs18" else 1 / 6
-        yield f"{name} [M, delta] / crba + bias", t[f"{name}_ddm"] / t["crba_bias"], at_most
+    for name, inverse, direct in (("full", 4, 6), ("base", 4, 6), ("fs18", 6, 8)):
+        yield f"{name} d / rnea", t[f"{name}_idm"] / t["rnea"], 1 / inverse
+        yield f"{name} [M, delta] / crba + bias", t[f"{name}_ddm"] / t["crba_bias"], 1 / direct
         yield f"{name} [M, delta] / aba", t[f"{name}_ddm"] / t["aba"], 1.0
         yield f"{name} regressor / Pinocchio's", t[f"{name}_regressor"] / t["regressor"], 1.0
         for kind, what in (("idm", "d"), ("ddm", "[M, delta]")):

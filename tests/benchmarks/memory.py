@@ -6,10 +6,10 @@ W grows from 5 MB to 960 MB.
 import subprocess
 import sys
 import tempfile
-from pathlib import Path
 
-CONFIG = Path(__file__).resolve().parents[2] / "configs" / "puma560.yaml"
-REFERENCE = Path(__file__).resolve().parents[2] / "results" / "reference" / "puma560.json"
+from tests.conftest import CONFIGS, ROOT
+
+COEFFICIENTS = f"trajectories.file={ROOT / 'results' / 'reference' / 'puma560.json'}"
 _MEASURE = """
 import resource, subprocess, sys
 subprocess.run(sys.argv[1:], check=True)
@@ -27,25 +27,14 @@ def peak(*arguments):
 def rows():
     peaks = {}
     with tempfile.TemporaryDirectory() as folder:
-        common = [
-            str(CONFIG),
-            "--results",
-            folder,
-            "--quiet",
-            "--set",
-            f"trajectories.file={REFERENCE}",
-        ]
+        config = str(CONFIGS / "puma560.yaml")
+        common = [config, "--results", folder, "--quiet", "--set", COEFFICIENTS]
         for stage in ("build-model", "optimize-trajectories"):
             peak(stage, *common)
         for total in (10_000, 2_000_000):
-            points = total // (10 * 6)
-            grown = [*common, "--set", f"sampling.points={points}"]
+            grown = [*common, "--set", f"sampling.points={total // (10 * 6)}"]
             for stage in ("sample", "reduce"):
                 peaks[stage, total] = peak(stage, *grown)
     for stage in ("sample", "reduce"):
-        ratio = peaks[stage, 2_000_000] / peaks[stage, 10_000]
-        yield (
-            f"{stage}, peak memory: 2e6 rows / 1e4 rows ({peaks[stage, 10_000]:.0f} MiB)",
-            ratio,
-            1.1,
-        )
+        least, most = peaks[stage, 10_000], peaks[stage, 2_000_000]
+        yield f"{stage}, peak memory: 2e6 rows / 1e4 rows ({least:.0f} MiB)", most / least, 1.1

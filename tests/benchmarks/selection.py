@@ -5,7 +5,7 @@ ours is), and orthogonal least squares in ten lines of NumPy. The row with raw d
 shows what compressing them first is worth.
 """
 
-import time
+import timeit
 
 import numpy as np
 from sklearn.feature_selection import SequentialFeatureSelector
@@ -13,8 +13,8 @@ from sklearn.linear_model import LinearRegression
 
 from paramreduce_cli.multibody.observation import append_rows
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
-from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import SelectionTask, run
+from tests.selecting import problem
 
 RANK, COLUMNS = 36, 60
 
@@ -33,9 +33,7 @@ def compressed(W, chi):
 
 
 def ours(W, chi):
-    columns = np.arange(COLUMNS)
-    problem = SelectionProblem(W, chi, columns, columns)
-    return run("forward-selection", SelectionTask(TorqueObjective(problem))).subsets[-1]
+    return run("forward-selection", SelectionTask(TorqueObjective(problem(W, chi)))).subsets[-1]
 
 
 def orthogonal_least_squares(W, chi):
@@ -52,23 +50,18 @@ def orthogonal_least_squares(W, chi):
     return order
 
 
-def scikit_learn(W, chi, folds):
-    """One run of its forward search passes through every n up to 59."""
+def scikit_learn(W, chi, folds, n=COLUMNS - 1):
+    """One run of its forward search passes through every number of columns up to n."""
     selector = SequentialFeatureSelector(
-        LinearRegression(fit_intercept=False), n_features_to_select=COLUMNS - 1,
-        direction="forward", scoring="neg_mean_squared_error", cv=folds,
+        LinearRegression(fit_intercept=False), n_features_to_select=n,
+        scoring="neg_mean_squared_error", cv=folds,
     )  # fmt: skip
     return selector.fit(W, chi)
 
 
 def seconds(function, *arguments, times=1):
     """The least of several runs."""
-    spent = []
-    for _ in range(times):
-        started = time.perf_counter()
-        function(*arguments)
-        spent.append(time.perf_counter() - started)
-    return min(spent)
+    return min(timeit.repeat(lambda: function(*arguments), number=1, repeat=times))
 
 
 def rows():

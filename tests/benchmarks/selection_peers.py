@@ -5,9 +5,6 @@
 """
 
 import os
-
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-
 import time
 import warnings
 
@@ -16,39 +13,32 @@ import numpy as np
 import rich.box
 import rich.console
 import rich.table
-from sklearn.feature_selection import SequentialFeatureSelector
-from sklearn.linear_model import LinearRegression
 
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
-from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort, SelectionTask, run
+from tests.benchmarks.selection import scikit_learn
 from tests.conftest import ROOT
+from tests.selecting import problem
 
 SIZES = {"puma560": (12, 18, 24), "hexaglide": (12, 15, 17, 20)}
 OURS = ("forward-selection", "forward-selection-2", "floating", "backward-elimination", "swap",
         "best-subset")  # fmt: skip
 
 
-def problem(robot):
+def problem_of(robot):
     """The weighted factor of the estimation set, its columns of unit length."""
     with h5py.File(ROOT / "results" / robot / "reduction.h5") as file:
         factor = file["factor"][:]
     W, chi = factor[:, :-1], factor[:, -1]
     lengths = np.linalg.norm(W, axis=0)
     kept = np.flatnonzero(lengths > 1e-11 * lengths.max())
-    X = W[:, kept] / lengths[kept]
-    columns = np.arange(kept.size)
-    return SelectionProblem(X, chi / np.linalg.norm(chi), columns, columns)
+    return problem(W[:, kept] / lengths[kept], chi / np.linalg.norm(chi))
 
 
 def sequential_feature_selector(X, y, n):
     # Without folds its score is that of the whole matrix, as ours is.
     everything = [(np.arange(len(y)), np.arange(len(y)))]
-    selector = SequentialFeatureSelector(
-        LinearRegression(fit_intercept=False), n_features_to_select=n,
-        scoring="neg_mean_squared_error", cv=everything,
-    )  # fmt: skip
-    return np.flatnonzero(selector.fit(X, y).get_support())
+    return np.flatnonzero(scikit_learn(X, y, everything, n).get_support())
 
 
 def abess(X, y, n):
@@ -73,11 +63,10 @@ PEERS = {"scikit-learn SequentialFeatureSelector": sequential_feature_selector, 
 
 def main():
     warnings.simplefilter("ignore")
-    table = rich.table.Table(box=rich.box.MARKDOWN)
-    for heading in ("system", "method", "time, all sizes", "torque error, %", "sizes"):
-        table.add_column(heading)
+    headings = ("system", "method", "time, all sizes", "torque error, %", "sizes")
+    table = rich.table.Table(*headings, box=rich.box.MARKDOWN)
     for robot, sizes in SIZES.items():
-        p = problem(robot)
+        p = problem_of(robot)
         objective = TorqueObjective(p)
 
         def error(subset, objective=objective):

@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import CONFIGS, constraints_of
+from conftest import config_and_model, constraints_of, slope
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
@@ -21,8 +21,7 @@ from paramreduce_cli.stages.optimize_trajectories import _settings
 
 @pytest.fixture(scope="module", params=["five_bar", "hexaglide"])
 def case(request):
-    config = load_config(CONFIGS / f"{request.param}.yaml")
-    model = build_model(config, config.model)
+    config, model = config_and_model(request.param)
     wanted = config.trajectories
     constraints = constraints_of(config, model.mechanism)
     excitation = excitation_of(
@@ -44,13 +43,9 @@ def test_gradient_with_the_barrier_against_finite_differences(case):
     value, gradient = objective(x)
     assert np.isfinite(value)
     rng = np.random.default_rng(0)
-    for _ in range(3):
-        direction = rng.normal(size=x.size)
-        step = 1e-5
-        slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
-            2 * step
-        )
-        assert slope == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-2)
+    for direction in rng.normal(size=(3, x.size)):
+        found = slope(lambda x: objective(x)[0], [x], direction, step=1e-5)
+        assert found == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-2)
 
 
 def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
@@ -66,9 +61,8 @@ def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
     values = Quantities(excitation.coordinates.mechanism, constraints).values(q)
     assert (values >= [c.lower for c in constraints]).all()
     assert (values <= [c.upper for c in constraints]).all()
-    assert found.extremes == pytest.approx(
-        np.column_stack([values.min(axis=0), values.max(axis=0)]), rel=1e-9
-    )
+    extremes = np.column_stack([values.min(axis=0), values.max(axis=0)])
+    assert found.extremes == pytest.approx(extremes, rel=1e-9)
 
 
 def test_outside_the_bounds_there_is_no_value(case):
@@ -77,26 +71,24 @@ def test_outside_the_bounds_there_is_no_value(case):
     limits = LimitMap(settings.limits, basis, settings.mapping)
     positions = Follower(excitation.coordinates)
     n = limits.n_dof
-    objective = FreeObjective(
-        excitation, basis, limits, Level(4, 40, 50, 0.1), positions, np.eye(n)
-    )
+    level = Level(4, 40, 50, 0.1)
+    objective = FreeObjective(excitation, basis, limits, level, positions, np.eye(n))
     far = np.random.default_rng(1).normal(size=n * limits.n_columns) * 10
     value, gradient = objective(far)
     assert np.isnan(value)
     assert np.isnan(gradient).all()
 
 
-def test_a_crank_that_turns_fully_is_followed_all_the_way(tmp_path):
+def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
     """A massless coupler: one equation, whole turns, and many random starts far apart."""
-    text = (CONFIGS / "four_bar.yaml").read_text()
-    kept = [line for line in text.splitlines() if "{name: coupler," not in line]
-    text = "\n".join(line for line in kept if not line.strip().startswith("coupler: {m:"))
-    text = text.replace(
-        "type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]",
-        "type: distance, length: coupler, bodies: [crank, rocker], at: [[crank, 0, 0], [rocker, 0, 0]]",
-    ).replace("q_coupler: -pi/3, ", "")
-    path = tmp_path / "distance.yaml"
-    path.write_text(text)
+    path = write_config(
+        ("      - {name: coupler, parent: crank, at: [crank, 0, 0], coordinates: q_coupler}\n", ""),
+        ("    coupler: {m: 2.0, com: [0.45, 0.02, 0], inertia_com: [2e-4, 0, 0, 0.135, 0, 0.135]}\n", ""),
+        ("type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], ",
+         "type: distance, length: coupler, bodies: [crank, rocker], at: [[crank, 0, 0], "),
+        ("q_coupler: -pi/3, ", ""),
+        robot="four_bar",
+    )  # fmt: skip
     config = load_config(path)
     model = build_model(config, config.model)
     excitation = excitation_of(

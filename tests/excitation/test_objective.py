@@ -1,17 +1,18 @@
+import dataclasses
+
 import numpy as np
 import pytest
-from conftest import puma_mechanism
+from conftest import puma_mechanism, slope
 
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
+from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.scalings import scalings
+from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
-from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import JointLimits
 
 NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
@@ -24,28 +25,13 @@ def parts():
     rng = np.random.default_rng(0)
     K = dynamics.regressor(*(rng.normal(size=(100, 6)) for _ in range(3)))
     base = base_parameters(K.reshape(-1, 60), mechanism.preference_order, 1e-9)
-    return dynamics, base
-
-
-def excitation(parts, criterion="condition-number", scaling="column-normalised"):
-    dynamics, base = parts
-    observation = dynamics.observation(base.columns)
-    return Excitation(
-        observation,
-        Coordinates(dynamics.mechanism),
-        Quantities(dynamics.mechanism, ()),
-        base.beta,
-        NOMINAL,
-        criteria[criterion],
-        scalings[scaling],
-    )
+    excitation = excitation_of(mechanism, base, NOMINAL, "condition-number", "column-normalised")
+    return dynamics, base, excitation
 
 
 def basis_and_limits(mapping="gauge", acceleration=np.inf):
     basis = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 100))
-    limits = JointLimits(
-        np.full(6, -1.2), np.full(6, 1.6), np.full(6, 1.45), np.full(6, acceleration)
-    )
+    limits = JointLimits(*(np.full(6, limit) for limit in (-1.2, 1.6, 1.45, acceleration)))
     return basis, LimitMap(limits, basis, mapping), limits
 
 
@@ -54,24 +40,21 @@ def basis_and_limits(mapping="gauge", acceleration=np.inf):
 @pytest.mark.parametrize("criterion", list(criteria))
 def test_gradients_against_finite_differences(parts, criterion, scaling, mapping):
     basis, limits, _ = basis_and_limits(mapping)
-    measured = excitation(parts, criterion, scaling)
+    chosen = {"criterion": criteria[criterion], "scaling": scalings[scaling]}
+    measured = dataclasses.replace(parts[2], **chosen)
     follower = Follower(measured.coordinates)
     objective = FreeObjective(measured, basis, limits, Level(4, 30, 30), follower, np.eye(6))
     rng = np.random.default_rng(1)
     x = rng.normal(size=54) * 0.5
     _, gradient = objective(x)
-    for _ in range(4):
-        direction = rng.normal(size=54)
-        step = 1e-5
-        slope = (objective(x + step * direction)[0] - objective(x - step * direction)[0]) / (
-            2 * step
-        )
-        assert slope == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-4)
+    for direction in rng.normal(size=(4, 54)):
+        found = slope(lambda x: objective(x)[0], [x], direction, step=1e-5)
+        assert found == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-4)
 
 
 @pytest.mark.parametrize("scaling", list(scalings))
 def test_sharp_objective_is_the_logarithm_of_the_condition_number(parts, scaling):
-    measured = excitation(parts, scaling=scaling)
+    measured = dataclasses.replace(parts[2], scaling=scalings[scaling])
     basis, limits, _ = basis_and_limits()
     coefficients = limits.scaled(np.random.default_rng(2).normal(size=(6, 9)))
     follower = Follower(measured.coordinates)
@@ -82,7 +65,7 @@ def test_sharp_objective_is_the_logarithm_of_the_condition_number(parts, scaling
 
 
 def test_variants_by_their_definitions(parts):
-    dynamics, base = parts
+    dynamics, base, excitation = parts
     basis, limits, _ = basis_and_limits()
     states = basis.states(limits.scaled(np.random.default_rng(3).normal(size=(6, 9))))
     W = dynamics.regressor(*states).reshape(-1, 60) / np.tile(NOMINAL, 100)[:, None]
@@ -96,8 +79,7 @@ def test_variants_by_their_definitions(parts):
         "equilibrated": np.linalg.cond(equilibrated),
         "full": singular[0] / singular[35],
     }
-    found = excitation(parts).condition_numbers(*states)
-    assert found == pytest.approx(expected, rel=1e-8)
+    assert excitation.condition_numbers(*states) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("acceleration", [np.inf, 2.0])
@@ -110,9 +92,8 @@ def test_limits_hold_between_the_grid_points_and_are_reached(acceleration):
     assert (z <= given.upper).all()
     assert (np.abs(dz) <= given.velocity).all()
     assert (np.abs(ddz) <= given.acceleration).all()
-    shares = np.maximum(np.abs(z - given.middle).max(axis=0) / given.reach,
-                        np.abs(dz).max(axis=0) / given.velocity)  # fmt: skip
-    shares = np.maximum(shares, np.abs(ddz).max(axis=0) / given.acceleration)
+    limited = ((z - given.middle, given.reach), (dz, given.velocity), (ddz, given.acceleration))
+    shares = np.max([np.abs(x).max(axis=0) / limit for x, limit in limited], axis=0)
     assert (shares > 0.97).all()
 
 

@@ -15,9 +15,7 @@ def test_the_whole_group_is_found(given, order):
     found = symmetries(given, NAMES)
     assert len(found) == order
     assert len(set(found)) == order
-    for a in found:
-        for b in found:
-            assert a.after(b) in found
+    assert all(a.after(b) in found for a in found for b in found)
 
 
 def test_signs_multiply():

@@ -1,49 +1,39 @@
+from functools import partial
+
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import config_and_model
 
-from paramreduce_cli.config import load_config
 from paramreduce_cli.records import Run
-from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import optimize_trajectories
 
 
 @pytest.fixture(scope="module")
-def small():
-    config = load_config(CONFIGS / "two_link.yaml", ["trajectories.starts=2"])
-    return config, build_model(config, config.model)
+def optimise():
+    config, model = config_and_model("two_link", "trajectories.starts=2")
+    return partial(optimize_trajectories, config.trajectories, model, None)
 
 
-def test_results_do_not_depend_on_the_number_of_processes(small):
-    config, model = small
-    one, two = (
-        optimize_trajectories(config.trajectories, model, None, Run(jobs)) for jobs in (1, 2)
-    )
+def test_results_do_not_depend_on_the_number_of_processes(optimise):
+    one, two = (optimise(Run(jobs)) for jobs in (1, 2))
     for a, b in zip(one.estimation + one.validation, two.estimation + two.validation, strict=True):
         assert np.array_equal(a.coefficients, b.coefficients)
 
 
-def test_finished_parts_are_not_made_again(small):
-    config, model = small
+def test_finished_parts_are_not_made_again(optimise):
     seen = []
     first = Run(2)
-    made = optimize_trajectories(config.trajectories, model, None, first)
+    made = optimise(first)
     del first.parts["estimation-0001"]
     kept = first.parts["estimation-0000"]
-    again = optimize_trajectories(
-        config.trajectories,
-        model,
-        None,
-        Run(2, first.parts, lambda p: seen.append((p.task, p.remark))),
-    )
+    again = optimise(Run(2, first.parts, lambda p: seen.append((p.task, p.remark))))
     assert again.estimation[0] is kept
     assert np.array_equal(again.estimation[1].coefficients, made.estimation[1].coefficients)
     assert ("estimation-0000", "kept from before") in seen
 
 
-def test_trajectories_differ_and_are_better_than_their_starts(small):
-    config, model = small
-    made = optimize_trajectories(config.trajectories, model, None, Run(2))
+def test_trajectories_differ_and_are_better_than_their_starts(optimise):
+    made = optimise(Run(2))
     assert not np.allclose(made.estimation[0].coefficients, made.estimation[1].coefficients)
     assert not np.allclose(made.estimation[0].coefficients, made.validation[0].coefficients)
     for t in made.estimation:

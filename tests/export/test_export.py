@@ -9,7 +9,7 @@ import sys
 import casadi as ca
 import numpy as np
 import pytest
-from conftest import CONFIGS, model_of
+from conftest import TWO_LINK, model_of
 
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.check import check, random_cases
@@ -19,9 +19,7 @@ from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.writing import Exported, export, exported_functions
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
-needs_octave = pytest.mark.skipif(
-    shutil.which("octave-cli") is None, reason="Octave is not installed"
-)
+needs_octave = pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave")
 STRICT = ["-std=c99", "-O2", "-Wall", "-Wextra", "-pedantic", "-Werror"]
 
 
@@ -30,62 +28,57 @@ def model(request):
     return model_of(request.param)
 
 
-@pytest.fixture(scope="module")
-def hexaglide():
-    return model_of("hexaglide")
-
-
-def written(model, folder, kind, what="both", text="full", *, constant=False, single=False):
+def files_of(model, kind, what="both", text="full", **options):
     chosen, title = chosen_model(text, model, None, None)
-    files = export(
-        model, chosen, title=title, language=kind, what=Exported(what), constant=constant,
-        single=single,
-    )  # fmt: skip
-    for name, content in files.items():
+    return export(model, chosen, title=title, language=kind, what=Exported(what), **options)
+
+
+def write(model, folder, *what, **options):
+    for name, content in files_of(model, *what, **options).items():
         (folder / name).write_bytes(content)
-    return chosen
 
 
-def run(command, folder):
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+def run(command, folder, code=0):
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    assert done.returncode == code, done.stdout + done.stderr
+    return done.stdout
 
 
-def c_test(name, folder, *flags):
-    built = run(["gcc", *STRICT, *flags, "-o", "t", f"{name}.c", f"{name}_test.c", "-lm"], folder)
-    assert built.returncode == 0, built.stderr
-    return run(["./t"], folder)
+def run_c(folder, *sources, code=0):
+    run(["gcc", *STRICT, "-o", "t", *sources, "-lm"], folder)
+    return run(["./t"], folder, code)
+
+
+def c_test(name, folder, code=0):
+    return run_c(folder, f"{name}.c", f"{name}_test.c", code=code)
 
 
 @needs_gcc
 @pytest.mark.parametrize("what", list(Exported))
 @pytest.mark.parametrize("text", ["full", "base"])
 def test_c_passes_its_self_test(model, tmp_path, what, text):
-    written(model, tmp_path, "c", what, text)
-    done = c_test(model.mechanism.robot, tmp_path)
-    assert done.returncode == 0, done.stdout
-    assert "FAIL" not in done.stdout
-    assert "_batch" in done.stdout
+    write(model, tmp_path, "c", what, text)
+    out = c_test(model.mechanism.robot, tmp_path)
+    assert "FAIL" not in out
+    assert "_batch" in out
 
 
 @needs_gcc
 @pytest.mark.parametrize("options", [{"constant": True}, {"single": True}])
 def test_c_with_constants_and_in_single_precision(model, tmp_path, options):
-    written(model, tmp_path, "c", **options)
-    done = c_test(model.mechanism.robot, tmp_path)
-    assert done.returncode == 0, done.stdout
+    write(model, tmp_path, "c", **options)
+    c_test(model.mechanism.robot, tmp_path)
 
 
 @needs_gcc
 def test_c_of_closed_loops_solves_them(hexaglide, tmp_path):
-    written(hexaglide, tmp_path, "c")
-    done = c_test("hexaglide", tmp_path)
-    assert done.returncode == 0, done.stdout
-    assert "positions, q" in done.stdout
+    write(hexaglide, tmp_path, "c")
+    assert "positions, q" in c_test("hexaglide", tmp_path)
 
 
-@pytest.mark.parametrize("name", ["puma560", "hexaglide"])
-def test_functions_are_the_reference_on_a_thousand_states(name, hexaglide):
-    model = hexaglide if name == "hexaglide" else model_of(name)
+@pytest.mark.parametrize("name", ["puma", "hexaglide"])
+def test_functions_are_the_reference_on_a_thousand_states(name, request):
+    model = request.getfixturevalue(name)
     chosen, _ = chosen_model("full", model, None, None)
     functions = exported_functions(model, chosen, Exported.BOTH)
     stored = random_cases(model.mechanism, chosen, 1000, np.random.default_rng(11))
@@ -94,27 +87,24 @@ def test_functions_are_the_reference_on_a_thousand_states(name, hexaglide):
 
 @needs_gcc
 def test_a_wrong_result_fails_the_self_test(model, tmp_path):
-    written(model, tmp_path, "c", "idm")
+    write(model, tmp_path, "c", "idm")
     name = model.mechanism.robot
     source = tmp_path / f"{name}.c"
     changed = re.sub(r"(tau\[0\] = .*);", r"\1 + 1e-9;", source.read_text(), count=1)
     source.write_text(changed)
-    done = c_test(name, tmp_path)
-    assert done.returncode == 1
-    assert "FAIL inverse_dynamics, tau" in done.stdout
+    assert "FAIL inverse_dynamics, tau" in c_test(name, tmp_path, code=1)
 
 
 @needs_gcc
 def test_the_makefile_builds_and_tests(model, tmp_path):
-    written(model, tmp_path, "c")
-    assert run(["make", "test"], tmp_path).returncode == 0
+    write(model, tmp_path, "c")
+    run(["make", "test"], tmp_path)
 
 
 @needs_gcc
 @pytest.mark.parametrize("count", [0, 1, 63, 64, 65, 300])
 def test_batches_of_any_length_and_any_angle(tmp_path, count):
-    model = model_of("two_link")
-    written(model, tmp_path, "c", "idm")
+    write(model_of("two_link"), tmp_path, "c", "idm")
     (tmp_path / "many.c").write_text(
         f"""#include "two_link.h"
 #include <math.h>
@@ -140,32 +130,27 @@ int main(void) {{
 }}
 """
     )
-    built = run(["gcc", *STRICT, "-o", "m", "many.c", "two_link.c", "-lm"], tmp_path)
-    assert built.returncode == 0, built.stderr
-    done = run(["./m"], tmp_path)
-    assert done.returncode == 0, done.stdout
+    run_c(tmp_path, "many.c", "two_link.c")
 
 
 @pytest.mark.parametrize("what", list(Exported))
 def test_python_passes_its_self_test(model, tmp_path, what):
-    written(model, tmp_path, "python", what)
-    done = run([sys.executable, f"{model.mechanism.robot}_test.py"], tmp_path)
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "FAIL" not in done.stdout
+    write(model, tmp_path, "python", what)
+    assert "FAIL" not in run([sys.executable, f"{model.mechanism.robot}_test.py"], tmp_path)
 
 
 @needs_octave
 def test_matlab_passes_its_self_test_in_octave(model, tmp_path):
     for what in Exported:
-        written(model, tmp_path, "matlab", what)
-        done = run(["octave-cli", "--eval", f"{model.mechanism.robot}_test"], tmp_path)
-        assert done.returncode == 0, done.stdout + done.stderr
-        assert "ok" in done.stdout
-        assert "FAIL" not in done.stdout
+        write(model, tmp_path, "matlab", what)
+        out = run(["octave-cli", "--eval", f"{model.mechanism.robot}_test"], tmp_path)
+        assert "ok" in out
+        assert "FAIL" not in out
 
 
 def test_casadi_functions_load_and_agree(model, tmp_path):
-    chosen = written(model, tmp_path, "casadi")
+    write(model, tmp_path, "casadi")
+    chosen, _ = chosen_model("full", model, None, None)
     stored = random_cases(model.mechanism, chosen, 3, np.random.default_rng(5))
 
     def loaded(name):
@@ -176,10 +161,8 @@ def test_casadi_functions_load_and_agree(model, tmp_path):
         for k in range(3):
             given = {key: stored[key][k] for key in function.name_in()}
             for key, value in function(**given).items():
-                expected = stored[key][k]
-                np.testing.assert_allclose(
-                    np.array(value).reshape(expected.shape), expected, rtol=1e-9, atol=1e-9
-                )
+                found = np.array(value).reshape(stored[key][k].shape)
+                np.testing.assert_allclose(found, stored[key][k], rtol=1e-9, atol=1e-9)
     if model.mechanism.loops is not None:
         q = loaded("positions")(stored["z"][0], stored["guess"][0])
         np.testing.assert_allclose(np.array(q).ravel(), stored["q"][0], atol=1e-9)
@@ -190,12 +173,11 @@ def test_casadi_functions_load_and_agree(model, tmp_path):
         np.testing.assert_allclose(np.array(b).ravel(), stored["b"][0], atol=1e-7)
 
 
-def test_latex_is_a_table_of_all_parameters(model, tmp_path):
-    chosen = written(model, tmp_path, "latex", text="base")
-    (file,) = tmp_path.iterdir()
-    text = file.read_text()
-    assert text.count(r"\\") == 1 + len(chosen.names)
-    for name in chosen.names:
+def test_latex_is_a_table_of_all_parameters(model):
+    (content,) = files_of(model, "latex", text="base").values()
+    text, names = content.decode(), chosen_model("base", model, None, None)[0].names
+    assert text.count(r"\\") == 1 + len(names)
+    for name in names:
         assert text.count(f"${model.mechanism.symbols[name]}$") >= 2  # by itself and made of itself
     assert text.count("$") % 2 == 0
 
@@ -208,19 +190,15 @@ def test_names_cannot_reach_the_code():
 
 @pytest.mark.parametrize("kind", list(languages))
 def test_every_exporter_gives_files(model, kind):
-    chosen, title = chosen_model("base", model, None, None)
-    files = export(model, chosen, title=title, language=kind, what=Exported.IDM)
+    files = files_of(model, kind, "idm", "base")
     assert files
     assert all(name.startswith((model.mechanism.robot, "Makefile", "CMake")) for name in files)
 
 
 def test_the_command_exports_the_selected_model(invoke, two_link_results, tmp_path):
-    code, out, _ = invoke(
-        "export", CONFIGS / "two_link.yaml", "--results", two_link_results, "--format", "python",
-        "--output", tmp_path / "code",
-    )  # fmt: skip
-    assert code == 0
-    assert "parameters, torque error" in out
+    command = ("export", TWO_LINK, "--results", two_link_results, "--format", "python")
+    done = invoke(*command, "--output", tmp_path / "code")
+    assert "parameters, torque error" in done.out
     assert (tmp_path / "code" / "two_link.py").exists()
 
 
@@ -231,39 +209,22 @@ def test_the_command_exports_the_selected_model(invoke, two_link_results, tmp_pa
         (["--model", "nobody"], "--model nobody: there is full"),
         (["--single", "--format", "python"], "--single goes with --format c"),
         (["--results", "nowhere"], "nowhere/model.h5"),
+        (["--set", "description.gravity=[0,0,-1]"], "was made with another description section"),
     ],
 )
 def test_what_cannot_be_exported(invoke, two_link_results, tmp_path, options, message):
-    results = [] if "--results" in options else ["--results", two_link_results]
-    code, _, err = invoke(
-        "export", CONFIGS / "two_link.yaml", *results, *options, "--output", tmp_path / "x"
-    )
-    assert code == 2
-    assert message in err.replace("\n", " ")
-    assert not (tmp_path / "x").exists()
-
-
-def test_stale_results_are_refused(invoke, two_link_copy, tmp_path):
-    code, _, err = invoke(
-        "export", CONFIGS / "two_link.yaml", "--results", two_link_copy,
-        "--set", "description.gravity=[0,0,-1]", "--output", tmp_path / "x",
-    )  # fmt: skip
-    assert code == 2
-    assert "was made with another description section" in err.replace("\n", " ")
+    command = ("export", TWO_LINK, "--results", two_link_results, "--output", tmp_path / "x")
+    refused = invoke(*command, *options, code=2)
+    assert message in refused.err.replace("\n", " ")
     assert not (tmp_path / "x").exists()
 
 
 def test_a_later_export_leaves_nothing_of_the_former(invoke, two_link_results, tmp_path):
-    folder = tmp_path / "code"
-    (tmp_path / "code").mkdir()
-    (folder / "mine.m").write_text("% mine")
+    (tmp_path / "mine.m").write_text("% mine")
+    command = ("export", TWO_LINK, "--results", two_link_results, "--format", "matlab")
     for what in ("both", "idm"):
-        code, *_ = invoke(
-            "export", CONFIGS / "two_link.yaml", "--results", two_link_results,
-            "--format", "matlab", "--what", what, "--output", folder,
-        )  # fmt: skip
-        assert code == 0
-    names = {path.name for path in folder.iterdir()}
+        invoke(*command, "--what", what, "--output", tmp_path)
+    names = {path.name for path in tmp_path.iterdir()}
     assert "two_link_inverse_dynamics.m" in names
     assert "two_link_direct_dynamics.m" not in names
     assert "mine.m" in names
@@ -281,9 +242,7 @@ def test_models_that_are_unsafe_for_direct_dynamics_say_so(tmp_path):
 
 
 def test_the_header_lists_orders_and_units(hexaglide):
-    chosen, title = chosen_model("full", hexaglide, None, None)
-    files = export(hexaglide, chosen, title=title, language="c", what=Exported.IDM)
-    text = files["hexaglide.h"].decode()
+    text = files_of(hexaglide, "c", "idm")["hexaglide.h"].decode()
     independent = text[text.index("Independent coordinates") : text.index("Dependent coordinates")]
     assert [f"{k}: s_{k + 1}, m" in independent for k in range(6)] == [True] * 6
     assert "Gravity in the base frame, m/s^2: 0 0 -9.8" in text
@@ -292,7 +251,7 @@ def test_the_header_lists_orders_and_units(hexaglide):
 @needs_gcc
 def test_a_guess_survives_loops_that_cannot_be_closed(tmp_path):
     model = model_of("five_bar")
-    written(model, tmp_path, "c", "idm")
+    write(model, tmp_path, "c", "idm")
     n, n_z = len(model.mechanism.generalised_names), model.mechanism.n_dof
     assembly = ", ".join(repr(float(x)) for x in model.mechanism.loops.assembly)
     (tmp_path / "far.c").write_text(
@@ -306,20 +265,17 @@ int main(void) {{
 }}
 """
     )
-    built = run(["gcc", *STRICT, "-o", "f", "far.c", "five_bar.c", "-lm"], tmp_path)
-    assert built.returncode == 0, built.stderr
-    assert run(["./f"], tmp_path).returncode == 0
+    run_c(tmp_path, "far.c", "five_bar.c")
 
 
 def test_python_refuses_arrays_of_another_size(tmp_path):
-    model = model_of("two_link")
-    written(model, tmp_path, "python", "idm")
+    write(model_of("two_link"), tmp_path, "python", "idm")
     script = (
         "import two_link as m\n"
         "try:\n    m.inverse_dynamics(m.PHI, [0, 0, 0], [0, 0], [0, 0])\n"
         "except ValueError as error:\n    print(error)\n"
         "print(m.inverse_dynamics(m.PHI, [0, 0], [[0, 0]] * 3, [0, 0]).shape)\n"
     )
-    done = run([sys.executable, "-c", script], tmp_path)
-    assert "q has shape (3,); its last axes must be (2,)" in done.stdout
-    assert "(3, 2)" in done.stdout
+    out = run([sys.executable, "-c", script], tmp_path)
+    assert "q has shape (3,); its last axes must be (2,)" in out
+    assert "(3, 2)" in out

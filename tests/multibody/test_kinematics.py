@@ -7,8 +7,7 @@ from paramreduce_cli.multibody.kinematics import body_poses
 
 
 def test_poses_agree_with_pinocchio(mechanism):
-    model, offsets = pinocchio_model.build(mechanism, np.ones(10 * mechanism.n_dof))
-    data = model.createData()
+    model, data, offsets = pinocchio_model.build(mechanism, np.ones(10 * mechanism.n_dof))
     for z in random_states(mechanism, 5)[0]:
         pin.forwardKinematics(model, data, z + offsets)
         found = body_poses(mechanism, z)

@@ -1,17 +1,8 @@
 import numpy as np
 import pytest
+from selecting import blocks_of
 
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, standard_deviation
-from paramreduce_cli.records import Block
-
-
-def blocks_of(W, tau, trajectory, size):
-    n_dof = tau.shape[1]
-    for start in range(0, len(tau), size):
-        part = slice(start, start + size)
-        rows = slice(start * n_dof, (start + size) * n_dof)
-        states = np.zeros_like(tau[part])
-        yield Block(trajectory, states[:, 0], *[states] * 3, tau[part], *[states] * 3, W[rows])
 
 
 @pytest.mark.parametrize("size", [1, 7, 100])

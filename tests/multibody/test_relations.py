@@ -29,7 +29,6 @@ def test_what_fits_one_geometry_only_is_no_function_of_it():
 
 def test_parameters_that_are_zero_are_left_out_of_approximate_expressions():
     beta = np.array([[2.0, -0.5, 0.0]])
-    texts = approximate_expressions(
-        ["p", "q", "r", "s"], np.array([0]), beta, np.array([1, 1, 0, 1.0])
-    )
+    known = np.array([1, 1, 0, 1.0])
+    texts = approximate_expressions(["p", "q", "r", "s"], np.array([0]), beta, known)
     assert texts == ["p + 2 q"]

@@ -38,21 +38,12 @@ class Lagrange:
         self.closures = ca.Function("closures", [q, dq], [gaps, jacobian, drift])
 
 
-def inverse_dynamics(mechanism):
-    """A function (q, dq, ddq, phi) -> tau of the open tree."""
-    function = Lagrange(mechanism).tau
-    return lambda *values: np.array(function(*values)).ravel()
-
-
 def _poses(mechanism, q):
     poses = []
     for k, body in enumerate(mechanism.bodies):
         value = q[k] + body.offset
-        zero, one = ca.MX(0), ca.MX(1)
-        if body.joint == "revolute":
-            c, s, slide = ca.cos(value), ca.sin(value), zero
-        else:
-            c, s, slide = one, zero, value
+        turn = (ca.cos(value), ca.sin(value), 0)
+        c, s, slide = turn if body.joint == "revolute" else (1, 0, value)
         motion = ca.vertcat(
             ca.horzcat(c, -s, 0, 0), ca.horzcat(s, c, 0, 0), ca.horzcat(0, 0, 1, slide),
             ca.horzcat(0, 0, 0, 1),

@@ -13,15 +13,13 @@ def error_by_definition(W, chi, kept):
     return np.linalg.norm(chi - W[:, kept] @ phi) / np.linalg.norm(chi)
 
 
-def best_subset_error(W, chi, n):
-    return min(error_by_definition(W, chi, kept) for kept in combinations(range(W.shape[1]), n))
+def all_best_errors(W, chi, sets=None):
+    """Smallest error of any union of the sets, else of columns, by its number of columns.
 
-
-def all_best_errors(W, chi, sets):
-    """Smallest error of any union of the sets, by its number of columns; at most that many.
-
-    Every subset is orthogonalised anew, column by column and twice, all of one size together.
+    Of at most that many columns. Every subset is orthogonalised anew, column by column and twice,
+    all of one size together.
     """
+    sets = [[c] for c in range(W.shape[1])] if sets is None else sets
     X = W / np.linalg.norm(W, axis=0)
     y = chi / np.linalg.norm(chi)
     total = sum(map(len, sets))
@@ -50,7 +48,7 @@ def all_best_errors(W, chi, sets):
 
 def forward_two_passes(W, chi, largest):
     """Algorithm 3 with the second addition that its text describes."""
-    kept, found, before = [], [], None
+    kept, found, before = [], {}, None
 
     def add():
         rest = [k for k in range(W.shape[1]) if k not in kept]
@@ -62,7 +60,7 @@ def forward_two_passes(W, chi, largest):
             kept.remove(before)
             add()
         before = kept[-1]
-        found.append(list(kept))
+        found[len(kept)] = list(kept)
     return found
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from oracles.selection import all_best_errors, error_by_definition
-from selecting import Effort, found, problem
+from selecting import Effort, dependent_problem, found, problem
 
 from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
 
@@ -47,7 +47,7 @@ def test_exhaustive_search_agrees(part):
         W, chi = case(KINDS[k % len(KINDS)], rng)
         m = W.shape[1]
         p = unit_problem(problem(W, chi, preference=rng.permutation(m)))
-        best = all_best_errors(W, chi, [[c] for c in range(m)])
+        best = all_best_errors(W, chi)
         for n in range(1, m + 1):
             search = Search(p, n, 1.0, np.zeros(0, np.int64))
             search.advance(10**6)
@@ -62,10 +62,8 @@ def test_exhaustive_search_agrees(part):
     assert uncertain < 20  # sizes, of about 800
 
 
-def hard_problem(seed=0, rank=26, columns=30):
-    rng = np.random.default_rng(seed)
-    W = rng.normal(size=(60, rank)) @ rng.normal(size=(rank, columns))
-    return problem(W, W @ rng.normal(size=columns))
+def hard_problem():
+    return dependent_problem(0, rank=26, columns=30)
 
 
 def start(p, n):
@@ -107,9 +105,8 @@ def test_what_is_proven_is_kept_when_nodes_run_out_and_a_later_run_proves_more()
     assert set(optimum.status) == {"optimal"}
     before, runs = None, 0
     while before is None or "best-found" in before.status:
-        now = found(
-            "best-subset", p, largest=8, effort=Effort(node_limit=400, kicks=0), previous=before
-        ).proofs
+        effort = Effort(node_limit=400, kicks=0)
+        now = found("best-subset", p, largest=8, effort=effort, previous=before).proofs
         assert np.all(now.lower_bound <= optimum.torque_error * (1 + 1e-9) + 1e-12)
         assert np.all(now.lower_bound <= now.torque_error * (1 + 1e-9))
         assert np.all(now.torque_error >= optimum.torque_error * (1 - 1e-6) - 1e-12)
@@ -138,9 +135,8 @@ def test_an_interruption_ends_the_search_and_keeps_what_is_known():
     def interrupt(_):
         raise KeyboardInterrupt
 
-    result = found(
-        "best-subset", hard_problem(), progress=interrupt, interrupted=lambda: told.append(1)
-    )
+    asked = {"progress": interrupt, "interrupted": lambda: told.append(1)}
+    result = found("best-subset", hard_problem(), **asked)
     assert told == [1]
     assert len(result.subsets) == 30
 
@@ -162,7 +158,7 @@ def test_duplicates_and_columns_beyond_the_rank():
     W = np.column_stack([base, base, -2 * base[:, :2]])
     proofs = found("best-subset", problem(W, base @ [1.0, 2.0, 3.0, 4.0])).proofs
     assert set(proofs.status) == {"optimal"}
-    best = all_best_errors(W, base @ [1.0, 2.0, 3.0, 4.0], [[c] for c in range(10)])
+    best = all_best_errors(W, base @ [1.0, 2.0, 3.0, 4.0])
     assert proofs.torque_error == pytest.approx(best[1:], abs=1e-12)
 
 

@@ -1,21 +1,14 @@
 import numpy as np
 import pytest
+from selecting import blocks_of, dependent_problem
 
 from paramreduce_cli.judgement.torque import torque_errors
-from paramreduce_cli.records import Block
 from paramreduce_cli.reduction.fitting import fit
-from paramreduce_cli.reduction.problem import SelectionProblem
-
-
-def example(seed=0, rank=5, columns=8):
-    rng = np.random.default_rng(seed)
-    W = rng.normal(size=(30, rank)) @ rng.normal(size=(rank, columns))
-    phi = rng.normal(size=columns)
-    return SelectionProblem(W, W @ phi, np.arange(columns), np.arange(columns)), phi
 
 
 def test_approximate_base_parameters_follow_from_beta():
-    p, phi = example(rank=8)
+    p = dependent_problem(0, columns=8)
+    phi = np.linalg.lstsq(p.W, p.chi)[0]
     kept = np.array([4, 1, 6])
     others = np.array([0, 2, 3, 5, 7])
     found = fit(p, kept)
@@ -25,7 +18,7 @@ def test_approximate_base_parameters_follow_from_beta():
 
 
 def test_beyond_the_rank_the_fit_is_exact_and_flagged():
-    p, _ = example()
+    p = dependent_problem(0, rank=5, columns=8)
     assert not fit(p, np.arange(5)).minimum_norm
     found = fit(p, np.arange(7))
     assert found.minimum_norm
@@ -40,19 +33,7 @@ def test_norms_by_their_definitions():
     rng = np.random.default_rng(1)
     W, tau, weights = rng.normal(size=(60, 4)), rng.normal(size=(20, 3)), np.array([1, 5, 0.3])
     models = rng.normal(size=(4, 2))
-    states = np.zeros((20, 3))
-    blocks = [
-        Block(
-            0,
-            states[k : k + 7, 0],
-            *[states[k : k + 7]] * 3,
-            tau[k : k + 7],
-            *[states[k : k + 7]] * 3,
-            W[3 * k : 3 * k + 21],
-        )
-        for k in range(0, 20, 7)
-    ]
-    found = torque_errors(blocks, models, weights)
+    found = torque_errors(blocks_of(W, tau, 0, 7), models, weights)
     rows = np.tile(weights, 20)
     chi = tau.ravel() / rows
     for m in range(2):

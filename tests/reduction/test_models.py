@@ -19,11 +19,10 @@ from paramreduce_cli.report.summary import _first
 def grouped_reduction():
     """Three columns for four parameters; with groups there are subsets of one and three."""
     columns = Columns(("a", "both", "d"), np.array([0, 1, 1, 2]))
-    subsets = (np.array([1]), np.array([2, 0, 1]))
     found = Subsets(
         n=np.array([1, 3]),
         heuristic="swap",
-        subsets=subsets,
+        subsets=(np.array([1]), np.array([2, 0, 1])),
         torque_error=np.array([0.5, 0.1]),
         torque_error_1=np.zeros(2),
         torque_error_inf=np.zeros(2),

@@ -18,14 +18,12 @@ from paramreduce_cli.records import HeuristicValidation, ModelChoice, Proofs
 def judged(n, torque, torque_validation=None, acceleration=None, inverse=None, direct=None):
     """Errors and costs of one heuristic; what is not given does not matter."""
     n = np.asarray(n)
-    zero = np.zeros(n.size)
-    values = {f.name: zero for f in dataclasses.fields(HeuristicValidation)}
-    torque = np.asarray(torque, float)
+    values = dict.fromkeys((f.name for f in dataclasses.fields(HeuristicValidation)), 0 * n)
     values |= {
         "n": n,
         "torque_error_estimation": torque,
         "torque_error_validation": torque if torque_validation is None else torque_validation,
-        "acceleration_error_estimation": zero if acceleration is None else acceleration,
+        "acceleration_error_estimation": 0 * n if acceleration is None else acceleration,
         "operations_inverse": 10 * n if inverse is None else inverse,
         "operations_direct": 10 * n if direct is None else direct,
     }
@@ -64,17 +62,10 @@ def test_of_equal_models_the_last_heuristics_is_taken():
     assert best_of_size(results, 7) is None
 
 
-def proofs(n, lower_bound):
-    n = np.asarray(n)
-    empty = tuple(np.zeros(0, int) for _ in n)
-    bound = np.asarray(lower_bound)
-    zero = np.zeros(n.size)
-    return Proofs(n, (), empty, bound, bound, ("optimal",) * n.size, zero, zero, empty)
-
-
 def test_what_is_proven_necessary():
-    found = proofs([1, 2, 4], [0.5, 0.1, 0.001])
-    found = dataclasses.replace(found, n=np.array([1, 2, 4]))
+    zero, bound = np.zeros(3, int), np.array([0.5, 0.1, 0.001])
+    empty, status = (zero[:0],) * 3, ("optimal",) * 3
+    found = Proofs(np.array([1, 2, 4]), (), empty, bound, bound, status, zero, zero, empty)
     assert proven_necessary(found, 4, 0.05)
     assert not proven_necessary(found, 4, 0.2)
     assert proven_necessary(found, 3, 0.05)
@@ -93,18 +84,14 @@ def test_the_front_is_what_nothing_beats(seed):
     }  # fmt: skip
 
     def values(name, row):
-        r = results[name]
-        return (
-            r.n[row], r.torque_error_estimation[row], r.acceleration_error_estimation[row],
-            r.operations_inverse[row], r.operations_direct[row],
-        )  # fmt: skip
+        fields = ("n", "torque_error_estimation", "acceleration_error_estimation",
+                  "operations_inverse", "operations_direct")  # fmt: skip
+        return tuple(getattr(results[name], field)[row] for field in fields)
 
     everything = {values(name, row) for name in results for row in range(8)}
 
     def beaten(one):
-        return any(
-            all(x <= y for x, y in zip(two, one, strict=True)) and two != one for two in everything
-        )
+        return any(two != one and np.all(np.array(two) <= one) for two in everything)
 
     front = [values(m.heuristic, results[m.heuristic].row(m.n)) for m in pareto_front(results)]
     assert len(front) == len(set(front))

@@ -1,15 +1,7 @@
 import csv
 import io
-import json
-
-import pytest
 
 from paramreduce_cli.report.overview import overview, overview_row
-
-
-@pytest.fixture
-def summary(two_link_results):
-    return json.loads((two_link_results / "report" / "summary.json").read_text())
 
 
 def test_one_row_per_robot_with_the_selected_model(summary):
@@ -29,8 +21,7 @@ def test_one_row_per_robot_with_the_selected_model(summary):
 
 
 def test_the_command_writes_text_csv_and_latex(invoke, two_link_results, tmp_path):
-    code, out, _ = invoke("table", two_link_results, "--output", tmp_path / "all")
-    assert code == 0
+    out = invoke("table", two_link_results, "--output", tmp_path / "all").out
     assert "two_link" in out
     assert (tmp_path / "all.txt").read_text() in out
     assert (tmp_path / "all.csv").read_text().startswith("robot,heuristic")
@@ -38,14 +29,11 @@ def test_the_command_writes_text_csv_and_latex(invoke, two_link_results, tmp_pat
 
 
 def test_folders_without_a_report(invoke, tmp_path):
-    code, _, err = invoke("table", tmp_path)
-    assert code == 2
-    assert "summary.json: there is no such file" in err
+    assert "summary.json: there is no such file" in invoke("table", tmp_path, code=2).err
     assert not (tmp_path / "table.csv").exists()
 
 
 def test_a_summary_of_another_version(invoke, tmp_path):
     (tmp_path / "old.json").write_text('{"robot": "old"}')
-    code, _, err = invoke("table", tmp_path / "old.json", "--output", tmp_path / "all")
-    assert code == 2
-    assert "is no summary of this version" in err
+    refused = invoke("table", tmp_path / "old.json", "--output", tmp_path / "all", code=2)
+    assert "is no summary of this version" in refused.err

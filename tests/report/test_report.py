@@ -1,25 +1,15 @@
 import csv
 import io
-import json
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
+import h5py
 import numpy as np
 import pytest
 
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.table import Table
 from paramreduce_cli.report.tables import tables
-
-PAPER_FIGURES = (
-    "trajectory",
-    "torque-error",
-    "operations",
-    "error-vs-operations",
-    "torques",
-    "acceleration-error",
-)
 
 
 @pytest.fixture(scope="module")
@@ -27,12 +17,11 @@ def folder(two_link_results):
     return two_link_results / "report"
 
 
-@pytest.fixture(scope="module")
-def summary(folder):
-    return json.loads((folder / "summary.json").read_text())
-
-
-@pytest.mark.parametrize("name", [*PAPER_FIGURES, "poses", "mass-matrix-condition"])
+@pytest.mark.parametrize(
+    "name",
+    ["trajectory", "torque-error", "operations", "error-vs-operations", "torques",
+     "acceleration-error", "poses", "mass-matrix-condition"],
+)  # fmt: skip
 def test_figures_are_there_in_every_format(folder, name):
     assert name in figures
     assert (folder / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
@@ -65,8 +54,7 @@ def test_the_page_needs_nothing_else(folder):
 
 
 @pytest.mark.parametrize("name", [*figures, *tables])
-def test_everything_has_a_place_on_the_page_and_stands_there(folder, name):
-    place_of(figures[name] if name in figures else tables[name])
+def test_everything_stands_on_the_page(folder, name):
     page = (folder / "index.html").read_text()
     if name in figures:
         drawn = (folder / "figures" / f"{name}.svg").exists()
@@ -79,41 +67,28 @@ def test_everything_has_a_place_on_the_page_and_stands_there(folder, name):
 def test_summary_holds_what_a_regression_job_compares(summary):
     assert {"robot", "config_sha256", "versions", "seconds", "model", "trajectories", "reduction",
             "validation", "selected"} <= set(summary)  # fmt: skip
-    assert {"n_dof", "n_parameters", "n_affecting", "n_base", "rank_gap", "names"} <= set(
-        summary["model"]
-    )
-    assert set(summary["seconds"]) == {
-        "build-model",
-        "optimize-trajectories",
-        "sample",
-        "reduce",
-        "validate",
-    }
+    model = {"n_dof", "n_parameters", "n_affecting", "n_base", "rank_gap", "names"}
+    assert model <= set(summary["model"])
+    stages = {"build-model", "optimize-trajectories", "sample", "reduce", "validate"}
+    assert set(summary["seconds"]) == stages
     entry = summary["trajectories"]["estimation"][0]
     assert {"kappa_start", "kappa", "kappa_variants", "peak_position", "peak_velocity", "cpu_seconds",
             "iterations", "status"} <= set(entry)  # fmt: skip
     for name in ("qr", "forward-selection", "backward-elimination"):
-        assert sorted(summary["reduction"][name]["order"]) == sorted(
-            summary["reduction"]["qr"]["order"]
-        )
+        orders = [summary["reduction"][one]["order"] for one in (name, "qr")]
+        assert sorted(orders[0]) == sorted(orders[1])
         row = summary["validation"][name][3]
         assert row["n"] == 4
         assert {"estimation", "validation"} <= set(row["torque_error"])
         assert {"estimation", "validation"} <= set(row["acceleration_error"])
-        assert {
-            "inverse",
-            "direct",
-            "inverse_plain",
-            "direct_plain",
-            "inverse_paper_rule",
-            "direct_paper_rule",
-        } == set(row["operations"])
+        kinds = {
+            f"{d}{rule}" for d in ("inverse", "direct") for rule in ("", "_plain", "_paper_rule")
+        }
+        assert set(row["operations"]) == kinds
 
 
 def test_summary_agrees_with_the_samples(summary, two_link_results):
     """The selected model's torque error, recomputed from the samples alone."""
-    import h5py
-
     with h5py.File(two_link_results / "samples.h5") as file:
         names = [name.decode() for name in file["parameters/names"]]
         weights = file["nominal_torque"][:]
@@ -128,12 +103,6 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
 def test_latex_escapes_what_latex_would_trip_over():
     table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
     text = table.to_latex({"m_3": r"m_{\mathrm{3}}"})
-    for piece in (
-        r"$\kappa$ \& 5 \%",
-        r"$m_{\mathrm{3}}$",
-        r"a\_b",
-        r"50 \%",
-        r"$\varepsilon_\tau$",
-        r"x\^{}2",
-    ):
+    for piece in (r"$\kappa$ \& 5 \%", r"$m_{\mathrm{3}}$", r"a\_b", r"50 \%",
+                  r"$\varepsilon_\tau$", r"x\^{}2"):  # fmt: skip
         assert piece in text

@@ -2,8 +2,9 @@
 
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import CONFIGS, TWO_LINK
 
+from paramreduce_cli.export import running
 from paramreduce_cli.records import Paths, Tracking
 from paramreduce_cli.tracking.control import simulate
 from paramreduce_cli.tracking.paths import point_to_point
@@ -71,31 +72,21 @@ def test_the_error_of_a_path_is_over_its_own_samples():
 
 
 def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):
-    code, _, err = invoke(
-        "report", CONFIGS / "two_link.yaml", "--results", two_link_copy,
-        "--set", "report.tracking={}", "--set", "report.formats=[svg]",
-    )  # fmt: skip
-    assert code == 0, err
+    settings = ["report.tracking={}", "report.formats=[svg]"]
+    invoke("report", TWO_LINK, "--results", two_link_copy, settings=settings)
     assert (two_link_copy / "report/figures/tracking.svg").exists()
     assert "What it is for" in (two_link_copy / "report/index.html").read_text()
 
 
 def test_without_a_compiler_the_controller_is_interpreted(invoke, two_link_copy, monkeypatch):
-    from paramreduce_cli.export import running
-
     monkeypatch.setattr(running, "load", lambda *_: None)
-    code, _, err = invoke(
-        "report", CONFIGS / "two_link.yaml", "--results", two_link_copy, "--force",
-        "--set", "report.tracking={moves: 1, control_period: 0.01}", "--set", "report.formats=[svg]",
-    )  # fmt: skip
-    assert code == 0, err
+    settings = ["report.tracking={moves: 1, control_period: 0.01}", "report.formats=[svg]"]
+    invoke("report", TWO_LINK, "--results", two_link_copy, "--force", settings=settings)
     assert (two_link_copy / "report/figures/tracking.svg").exists()
 
 
 def test_loops_are_refused(invoke, tmp_path):
-    code, _, err = invoke(
-        "run", CONFIGS / "four_bar.yaml", "--results", tmp_path, "--set", "report.tracking={}",
-        "--set", "trajectories.count=1", "--set", "trajectories.max_iterations=20",
-    )  # fmt: skip
-    assert code == 2
-    assert "report.tracking is for open trees" in err.replace("\n", " ")
+    settings = ["report.tracking={}", "trajectories.count=1", "trajectories.max_iterations=20"]
+    run = ("run", CONFIGS / "four_bar.yaml", "--results", tmp_path)
+    refused = invoke(*run, settings=settings, code=2)
+    assert "report.tracking is for open trees" in refused.err.replace("\n", " ")

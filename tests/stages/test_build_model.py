@@ -2,13 +2,10 @@ import pytest
 from conftest import model_of
 
 
-@pytest.fixture(scope="module")
-def puma():
-    return model_of("puma560")
-
-
-def test_counts_of_the_puma(puma):
-    assert (puma.values.size, puma.affecting.sum(), puma.base.columns.size) == (60, 49, 36)
+@pytest.mark.parametrize(("name", "counts"), [("puma", (60, 49, 36)), ("hexaglide", (70, 70, 64))])
+def test_counts_of_all_affecting_and_base_parameters(name, counts, request):
+    model = request.getfixturevalue(name)
+    assert (model.values.size, model.affecting.sum(), model.base.columns.size) == counts
 
 
 def test_regrouping_relations_follow_khalil(puma):

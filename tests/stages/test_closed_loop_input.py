@@ -8,13 +8,17 @@ from conftest import CONFIGS
 FOUR_BAR = CONFIGS / "four_bar.yaml"
 
 
-def build(invoke, tmp_path, *overrides, text=None, stage="build-model"):
-    path = FOUR_BAR
-    if text is not None:
-        path = tmp_path / "mine.yaml"
-        path.write_text(text)
-    options = [part for override in overrides for part in ("--set", override)]
-    return path, invoke(stage, path, "--results", tmp_path / "r", "--quiet", *options)
+@pytest.fixture
+def run(invoke, tmp_path):
+    """Run a stage, which fails unless another exit code is given; returns the standard error."""
+
+    def call(*settings, stage="build-model", path=FOUR_BAR, code=2):
+        command = (stage, path, "--results", tmp_path / "r", "--quiet")
+        out, err = invoke(*command, settings=settings, code=code)
+        assert out == ""
+        return err
+
+    return call
 
 
 @pytest.mark.parametrize(
@@ -39,82 +43,80 @@ def build(invoke, tmp_path, *overrides, text=None, stage="build-model"):
         ("at: [ground, 0, 0]", "at: [grund, 0, 0]", 18, "with the constants ground, crank"),
         ("at: [ground, 0, 0]", "at: [{rx: 0, ry: 1}]", 18, "one of xyz, rx, ry, rz"),
         ("q_rocker}\n", "q_crank}\n", 18, "belongs to several joints"),
+        ("crank: 0.4 ", "crank: 2*rocker ", 7, "constants.crank: '2*rocker' is not a number"),
+        ("crank: 0.4 ", "crank: crank + 0.1 ", 7, "constants.crank: 'crank + 0.1' is not a number"),
+        ("crank: 0.4 ", "pi: 3\n  crank: 0.4 ", 7, "constants.pi: cannot be the name of a constant"),
+        ("crank: 0.4 ", "2nd: 3\n  crank: 0.4 ", 7, "constants.2nd: cannot be the name of a constant"),
     ],
 )  # fmt: skip
-def test_mistakes_are_placed_and_explained(invoke, tmp_path, old, new, line, says):
-    text = FOUR_BAR.read_text()
-    assert old in text
-    path, (code, out, err) = build(invoke, tmp_path, text=text.replace(old, new, 1))
-    assert (code, out) == (2, "")
+def test_mistakes_are_placed_and_explained(run, write_config, old, new, line, says):
+    path = write_config((old, new), robot="four_bar")
+    err = run(path=path)
     assert f"{path}, line {line}: " in err
     assert says in err
     assert "Traceback" not in err
+    assert err.count("Error:") == (3 if new == "q_crank}\n" else 1)  # q_rocker is used twice more
 
 
-def test_an_override_is_named_instead_of_the_line(invoke, tmp_path):
-    _, (code, _, err) = build(invoke, tmp_path, "description.tree.independent=[q_crank, q_rocker]")
-    assert code == 2
+def test_an_override_is_named_instead_of_the_line(run):
+    err = run("description.tree.independent=[q_crank, q_rocker]")
     assert err.startswith("Error: --set description.tree.independent=[q_crank, q_rocker]: ")
 
 
-def test_a_loop_without_freedom(invoke, tmp_path):
-    text = FOUR_BAR.read_text().replace(
-        "    independent:",
-        "      - {name: strut, type: planar, bodies: [base, crank], at: [[0, crank, 0], [crank, 0, 0]]}\n"
-        "    independent:",
-    )
-    _, (code, _, err) = build(invoke, tmp_path, text=text)
-    assert code == 2
-    assert "over-constrained" in err
+STRUT = "      - {name: strut, type: planar, bodies: [base, crank], at: [[0, crank, 0], [crank, 0, 0]]}\n"
 
 
-def test_coordinates_that_are_tied_to_each_other(invoke, tmp_path):
+@pytest.mark.parametrize(
+    ("replacements", "says"),
+    [
+        ([("    independent:", f"{STRUT}    independent:")], "over-constrained"),
+        ([("type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]",
+           "type: revolute, bodies: [wrist, rocker], at: [[0, 0, 0], [{xyz: [rocker, 0, 0]}, {rx: pi}]]"),
+          ("    closures:",
+           "      - {name: slide, parent: coupler, joint: prismatic, at: [coupler, 0, 0], massless: true}\n"
+           "      - {name: wrist, parent: slide, joint: universal, massless: true}\n    closures:")],
+         "closes with its two z axes against each other"),
+    ],
+)  # fmt: skip
+def test_loops_that_cannot_work(run, write_config, replacements, says):
+    assert says in run(path=write_config(*replacements, robot="four_bar"))
+
+
+def test_coordinates_that_are_tied_to_each_other(run, write_config):
     """Of two four-bars side by side, crank and rocker of the first are no choice."""
-    text = FOUR_BAR.read_text()
-    bodies, _, rest = text.partition("    closures:\n")
-    more = [
-        "      - {name: crank2, at: [0, 0, 1], coordinates: q_crank2}\n",
-        "      - {name: coupler2, parent: crank2, at: [crank, 0, 0], coordinates: q_coupler2}\n",
-        "      - {name: rocker2, at: [ground, 0, 1], coordinates: q_rocker2}\n",
-    ]
-    text = bodies + "".join(more) + "    closures:\n" + rest
-    text = text.replace(
-        "    independent: [q_crank]\n",
-        "      - {type: planar, bodies: [coupler2, rocker2], at: [[coupler, 0, 0], [rocker, 0, 0]]}\n"
-        "    independent: [q_crank, q_rocker]\n",
-    ).replace("q_rocker: 2}", "q_rocker: 2, q_crank2: pi/2, q_coupler2: -pi/3, q_rocker2: 2}")
-    text = text.replace(
-        "slender_rods:\n", "slender_rods:\n    crank2: {}\n    coupler2: {}\n    rocker2: {}\n"
-    )
-    path, (code, _, err) = build(invoke, tmp_path, text=text)
-    assert code == 2
+    path = write_config(
+        ("    closures:\n",
+         "      - {name: crank2, at: [0, 0, 1], coordinates: q_crank2}\n"
+         "      - {name: coupler2, parent: crank2, at: [crank, 0, 0], coordinates: q_coupler2}\n"
+         "      - {name: rocker2, at: [ground, 0, 1], coordinates: q_rocker2}\n    closures:\n"),
+        ("    independent: [q_crank]\n",
+         "      - {type: planar, bodies: [coupler2, rocker2], at: [[coupler, 0, 0], [rocker, 0, 0]]}\n"
+         "    independent: [q_crank, q_rocker]\n"),
+        ("q_rocker: 2}", "q_rocker: 2, q_crank2: pi/2, q_coupler2: -pi/3, q_rocker2: 2}"),
+        ("slender_rods:\n", "slender_rods:\n    crank2: {}\n    coupler2: {}\n    rocker2: {}\n"),
+        robot="four_bar",
+    )  # fmt: skip
+    err = run(path=path)
     assert "are not independent: the loops tie them to each other" in err
     assert "Choose others, for example" in err
     assert f"{path}, line " in err
 
 
-def test_bounds_that_cannot_be_kept_name_the_one_in_the_way(invoke, tmp_path):
-    folder = tmp_path / "r"
-    _, (code, _, _) = build(invoke, tmp_path)
-    assert code == 0
-    before = (folder / "model.h5").read_bytes()
+def test_bounds_that_cannot_be_kept_name_the_one_in_the_way(run, tmp_path):
+    run(code=0)
+    before = (tmp_path / "r" / "model.h5").read_bytes()
     bound = "{name: high, quantity: coordinate, coordinate: q_rocker, min: 3.1}"
-    _, (code, _, err) = build(
-        invoke, tmp_path, f"trajectories.constraints=[{bound}]", stage="optimize-trajectories"
-    )
-    assert code == 2
+    err = run(f"trajectories.constraints=[{bound}]", stage="optimize-trajectories")
     assert "high (coordinate, at least 3.1)" in err
-    assert (folder / "model.h5").read_bytes() == before
-    assert not (folder / "trajectories.h5").exists()
+    assert (tmp_path / "r" / "model.h5").read_bytes() == before
+    assert not (tmp_path / "r" / "trajectories.h5").exists()
 
 
-def test_limits_that_the_loops_do_not_reach(invoke, tmp_path):
+def test_limits_that_the_loops_do_not_reach(run):
     """Driven by the rocker, the linkage cannot make a whole turn."""
     driven = "description.tree.independent=[q_rocker]"
-    _, (code, _, _) = build(invoke, tmp_path, driven)
-    assert code == 0
-    _, (code, _, err) = build(invoke, tmp_path, driven, stage="optimize-trajectories")
-    assert code == 2
+    run(driven, code=0)
+    err = run(driven, stage="optimize-trajectories")
     assert "trajectories.position_limits" in err
     assert "use_full_range" in err
 
@@ -133,121 +135,64 @@ def test_limits_that_the_loops_do_not_reach(invoke, tmp_path):
         ("{name: a, quantity: coordinate, coordinate: q_crank, min: 2, max: 1}", "bounds cross"),
     ],
 )
-def test_constraints_that_do_not_make_sense(invoke, tmp_path, constraint, says):
-    _, (code, _, err) = build(invoke, tmp_path, f"trajectories.constraints=[{constraint}]")
-    assert code == 2
-    assert says in err
+def test_constraints_that_do_not_make_sense(run, constraint, says):
+    assert says in run(f"trajectories.constraints=[{constraint}]")
 
 
-def test_recordings_beyond_the_reach_of_the_loops(invoke, tmp_path):
+def test_recordings_beyond_the_reach_of_the_loops(run, tmp_path):
     table = tmp_path / "rocker.csv"
     rows = "".join(f"{k / 10},{1.9 + k / 10},1,{k % 3}\n" for k in range(40))
     table.write_text("time,z1,dz1,ddz1\n" + rows)
-    overrides = [
+    settings = [
         "description.tree.independent=[q_rocker]",
         f"sampling.estimation_file={table}",
         f"sampling.validation_file={table}",
     ]
-    assert build(invoke, tmp_path, *overrides)[1][0] == 0
-    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="sample")
-    assert code == 2
-    assert "the loops cannot be closed at q_rocker = " in err
+    run(*settings, code=0)
+    assert "the loops cannot be closed at q_rocker = " in run(*settings, stage="sample")
     assert not (tmp_path / "r" / "samples.h5").exists()
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        ("crank: 0.4 ", "crank: 2*rocker ", "constants.crank: '2*rocker' is not a number"),
-        ("crank: 0.4 ", "crank: crank + 0.1 ", "constants.crank: 'crank + 0.1' is not a number"),
-        ("crank: 0.4 ", "pi: 3\n  crank: 0.4 ", "constants.pi: cannot be the name of a constant"),
-        ("crank: 0.4 ", "2nd: 3\n  crank: 0.4 ", "constants.2nd: cannot be the name of a constant"),
-    ],
-)
-def test_constants_use_those_above_them_only(invoke, tmp_path, old, new, says):
-    _, (code, _, err) = build(invoke, tmp_path, text=FOUR_BAR.read_text().replace(old, new, 1))
-    assert code == 2
-    assert says in err
-    assert err.count("Error:") == 1
-
-
-def test_hinges_closed_the_wrong_way_round(invoke, tmp_path):
-    text = FOUR_BAR.read_text().replace(
-        "type: planar, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]",
-        "type: revolute, bodies: [wrist, rocker], at: [[0, 0, 0], [{xyz: [rocker, 0, 0]}, {rx: pi}]]",
-    )
-    text = text.replace(
-        "    closures:",
-        "      - {name: slide, parent: coupler, joint: prismatic, at: [coupler, 0, 0], massless: true}\n"
-        "      - {name: wrist, parent: slide, joint: universal, massless: true}\n    closures:",
-    )
-    _, (code, _, err) = build(invoke, tmp_path, text=text)
-    assert code == 2
-    assert "closes with its two z axes against each other" in err
-
-
-def test_images_that_leave_the_limits_are_no_symmetry(invoke, tmp_path):
-    overrides = ["trajectories.count=1", "trajectories.starts=1", "trajectories.max_iterations=5"]
-    options = [part for o in overrides for part in ("--set", o)]
-    config = CONFIGS / "five_bar.yaml"
-    code, _, _ = invoke("build-model", config, "--results", tmp_path, "--quiet")
-    assert code == 0
-    code, _, _ = invoke("optimize-trajectories", config, "--results", tmp_path, "--quiet", *options)
-    assert code == 0
+def test_images_that_leave_the_limits_are_no_symmetry(run, tmp_path):
+    small = ["trajectories.count=1", "trajectories.starts=1", "trajectories.max_iterations=5"]
+    five_bar = CONFIGS / "five_bar.yaml"
+    run(path=five_bar, code=0)
+    run(*small, stage="optimize-trajectories", path=five_bar, code=0)
     wrong = "sampling.symmetries=[[-q_right, -q_left]]"
-    code, _, err = invoke(
-        "sample", config, "--results", tmp_path, "--quiet", *options, "--set", wrong
-    )
-    assert code == 2
+    err = run(*small, wrong, stage="sample", path=five_bar)
     assert err.startswith(f"Error: --set {wrong}: sampling.symmetries: the image")
-    assert not (tmp_path / "samples.h5").exists()
+    assert not (tmp_path / "r" / "samples.h5").exists()
 
 
-def test_a_mechanism_without_mass(invoke, tmp_path):
-    text = FOUR_BAR.read_text()
-    for name in ("crank", "coupler", "rocker"):
-        text = text.replace(f"{{name: {name},", f"{{massless: true, name: {name},")
-    text = text[: text.index("    crank: {m:")] + text[text.index("nominal_torque") :]
-    text = text.replace("slender_rods:\n", "slender_rods: {}\n")
-    _, (code, _, err) = build(invoke, tmp_path, text=text)
-    assert code == 2
-    assert "are all massless" in err
+def test_a_mechanism_without_mass(run):
+    massless = [f"description.tree.bodies.{k}.massless=true" for k in range(3)]
+    assert "are all massless" in run(*massless, "parameter_sets={slender_rods: {}}")
 
 
-def test_groups_and_the_sizes_they_leave(invoke, tmp_path):
+def test_groups_and_the_sizes_they_leave(run, tmp_path):
     groups = (
         "reduction.groups=[{name: a, parameters: [m_coupler, Izz_crank, mx_crank]}, "
         "{name: b, parameters: [my_crank, Izz_coupler, mx_coupler]}, "
         "{name: c, parameters: [my_coupler, Izz_rocker, mx_rocker, my_rocker]}]"
     )
-    overrides = [groups, "trajectories.count=1", "trajectories.starts=1", "selected.n=2",
-                 "selected.torque_error=null", "report.formats=[svg]"]  # fmt: skip
-    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
-    assert code == 2
+    settings = [groups, "trajectories.count=1", "trajectories.starts=1",
+                "selected.torque_error=null", "report.formats=[svg]"]  # fmt: skip
+    err = run(*settings, "selected.n=2", stage="run")
     assert "selected.n is 2, but with groups forward-selection has subsets of" in err
     before = (tmp_path / "r" / "reduction.h5").read_bytes()
-    stop = "reduction.stop.parameters=1"
-    _, (code, _, err) = build(invoke, tmp_path, *overrides[:3], stop, stage="reduce")
-    assert code == 2
+    err = run(*settings[:3], "reduction.stop.parameters=1", stage="reduce")
     assert "the smallest subset has" in err
     assert (tmp_path / "r" / "reduction.h5").read_bytes() == before
-    overrides[3] = "selected.n=10"
-    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
-    assert (code, err) == (0, "")
+    assert run(*settings, "selected.n=10", stage="run", code=0) == ""
 
 
-def test_a_tied_group_has_the_value_that_fits_all_its_members(invoke, tmp_path):
-    overrides = [
+def test_a_tied_group_has_the_value_that_fits_all_its_members(run, tmp_path):
+    settings = [
         "reduction.groups=[{name: rods, bodies: [coupler, rocker], kinds: [Izz], tied: true}]",
-        "trajectories.count=1",
-        "trajectories.starts=1",
-        "report.formats=[svg]",
-        "selected.n=9",
-        "selected.torque_error=null",
-        "validation.accept.torque_error_validation=10",
-    ]
-    _, (code, _, err) = build(invoke, tmp_path, *overrides, stage="run")
-    assert (code, err) == (0, "")
+        "trajectories.count=1", "trajectories.starts=1", "report.formats=[svg]", "selected.n=9",
+        "selected.torque_error=null", "validation.accept.torque_error_validation=10",
+    ]  # fmt: skip
+    assert run(*settings, stage="run", code=0) == ""
     with (
         h5py.File(tmp_path / "r" / "reduction.h5") as file,
         h5py.File(tmp_path / "r" / "samples.h5") as samples,

@@ -5,33 +5,25 @@ import json
 import h5py
 import numpy as np
 import pytest
-from conftest import CONFIGS
+from conftest import TWO_LINK, summary_of
 
-TWO_LINK = CONFIGS / "two_link.yaml"
-ANY = ["--set", "selected.n=null", "--set", "selected.heuristic=null"]
-SVG = ["--set", "report.formats=[svg]"]
+ANY = ["selected.n=null", "selected.heuristic=null"]
 
 
-def summary(folder):
-    return json.loads((folder / "report" / "summary.json").read_text())
+@pytest.fixture
+def validate(invoke, two_link_copy):
+    validate = ("validate", TWO_LINK, "--results", two_link_copy)
+    return lambda *settings, code=0: invoke(*validate, settings=[*ANY, *settings], code=code)
 
 
-def validated(invoke, folder, *settings, command="validate"):
-    changes = [part for setting in settings for part in ("--set", setting)]
-    return invoke(command, TWO_LINK, "--results", folder, *ANY, *changes)
-
-
-def test_the_smallest_model_within_a_tolerance_is_taken_and_proven(invoke, two_link_copy):
-    code, out, _ = validated(invoke, two_link_copy, "selected.torque_error=0.1")
-    assert code == 0
+def test_the_smallest_model_within_a_tolerance_is_taken_and_proven(validate, two_link_copy):
+    out = validate("selected.torque_error=0.1").out
     with h5py.File(two_link_copy / "validation.h5") as file:
         heuristic, n = file["selected/heuristic"][()].decode(), int(file["selected/n"][()])
         reason = file["selected/reason"][()].decode()
+        both = ("estimation", "validation")
         errors = {
-            name: np.maximum(
-                file[f"{name}/torque_error_estimation"][:],
-                file[f"{name}/torque_error_validation"][:],
-            )
+            name: np.max([file[f"{name}/torque_error_{which}"] for which in both], axis=0)
             for name in ("best-subset", "swap", "forward-selection")
         }
     assert heuristic == "best-subset"
@@ -42,17 +34,13 @@ def test_the_smallest_model_within_a_tolerance_is_taken_and_proven(invoke, two_l
     assert "best-subset" in out
 
 
-def test_a_tolerance_that_no_model_keeps_is_not_accepted(invoke, two_link_copy):
-    code, _, err = validated(
-        invoke, two_link_copy, "selected.torque_error=1e-30", "validation.accept={}"
-    )
-    assert code == 1
-    assert "no model has torque error at most" in err
+def test_a_tolerance_that_no_model_keeps_is_not_accepted(validate):
+    refused = validate("selected.torque_error=1e-30", "validation.accept={}", code=1)
+    assert "no model has torque error at most" in refused.err
 
 
-def test_operations_as_a_tolerance(invoke, two_link_copy):
-    code, *_ = validated(invoke, two_link_copy, "selected.operations=32", "validation.accept={}")
-    assert code == 0
+def test_operations_as_a_tolerance(validate, two_link_copy):
+    validate("selected.operations=32", "validation.accept={}")
     with h5py.File(two_link_copy / "validation.h5") as file:
         heuristic, n = file["selected/heuristic"][()].decode(), int(file["selected/n"][()])
         assert file[f"{heuristic}/operations_inverse"][n - 1] <= 32
@@ -74,27 +62,19 @@ def test_operations_as_a_tolerance(invoke, two_link_copy):
     ],
 )
 def test_mistakes_are_explained(invoke, tmp_path, setting, says):
-    code, _, err = invoke("build-model", TWO_LINK, "--results", tmp_path / "r", "--set", setting)
-    assert code == 2
-    assert says in err
+    build = ("build-model", TWO_LINK, "--results", tmp_path / "r")
+    assert says in invoke(*build, settings=[setting], code=2).err
 
 
 def test_criteria_and_their_names(invoke, two_link_copy):
     wanted = ["swap", "swap@acceleration", "backward-elimination@operations"]
-    code, *_ = invoke(
-        "run", TWO_LINK, "--results", two_link_copy, *ANY, *SVG, "--quiet",
-        "--set", f"reduction.heuristics={json.dumps(wanted)}", "--set", "selected.n=3",
-    )  # fmt: skip
-    assert code == 0
-    found = summary(two_link_copy)
+    heuristics = f"reduction.heuristics={json.dumps(wanted)}"
+    settings = [*ANY, "report.formats=[svg]", heuristics, "selected.n=3"]
+    invoke("run", TWO_LINK, "--results", two_link_copy, "--quiet", settings=settings)
+    found = summary_of(two_link_copy)
     assert list(found["validation"]) == wanted
-    by_torque, by_acceleration = (
-        found["validation"][name][2] for name in ("swap", "swap@acceleration")
-    )
-    assert (
-        by_acceleration["acceleration_error"]["estimation"]
-        <= by_torque["acceleration_error"]["estimation"]
-    )
+    errors = [found["validation"][name][2]["acceleration_error"] for name in wanted]
+    assert errors[1]["estimation"] <= errors[0]["estimation"]
     assert found["reduction"]["proofs"] == []
     assert found["reduction"]["pareto"]
 
@@ -110,21 +90,21 @@ def proofs(folder):
 
 def test_proofs_are_continued_on_the_same_data_alone(invoke, two_link_copy):
     """Groups change what is chosen among, but not the data."""
-    limited = ["--set", "reduction.best_subset.node_limit=1"]
-    grouped = ["--set", 'reduction.groups=[{"name": "g", "bodies": ["upper", "fore"]}]']
+    limited = ["reduction.best_subset.node_limit=1"]
+    grouped = ['reduction.groups=[{"name": "g", "bodies": ["upper", "fore"]}]']
     (two_link_copy / "reduction.h5").unlink()
     reduce = ("reduce", TWO_LINK, "--results", two_link_copy, "--quiet")
-    assert invoke(*reduce, *limited)[0] == 0
+    invoke(*reduce, settings=limited)
     assert "best-found" in proofs(two_link_copy)[2]
-    assert invoke(*reduce, *limited)[0] == 0  # not up to date: more can be proven
+    invoke(*reduce, settings=limited)  # not up to date: more can be proven
     first = proofs(two_link_copy)
-    assert invoke(*reduce)[0] == 0
+    invoke(*reduce)
     second = proofs(two_link_copy)
     assert set(second[2]) == {"optimal"}
     assert second[3] > first[3]
     assert np.all(first[0] <= second[1] * (1 + 1e-9) + 1e-12)
-    assert invoke(*reduce, *grouped)[0] == 0
-    assert invoke(*reduce)[0] == 0
+    invoke(*reduce, settings=grouped)
+    invoke(*reduce)
     last = proofs(two_link_copy)
     assert np.allclose(last[1], second[1], atol=1e-12)
     assert np.all(last[0] <= last[1] * (1 + 1e-9))

@@ -4,8 +4,6 @@ A criterion returns a smooth value to minimise with its derivative by the eigenv
 sharper, the closer to the exact criterion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from paramreduce_cli.records import FloatArray

@@ -1,7 +1,5 @@
 """The condition number of W."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.excitation.criteria import SMALLEST

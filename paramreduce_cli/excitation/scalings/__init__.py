@@ -5,8 +5,6 @@ hands back how a derivative with respect to that matrix is pulled back to W. It 
 exponent of the smooth maxima that stand for true ones while optimising, infinite for those.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from paramreduce_cli.records import FloatArray

@@ -1,7 +1,5 @@
 """Columns of unit length."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.excitation.scalings import Pullback

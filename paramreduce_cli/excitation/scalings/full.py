@@ -1,7 +1,5 @@
 """The scaling that looks at all columns of W, not at the base columns alone."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.excitation.scalings import Pullback

@@ -1,7 +1,5 @@
 """Columns as they are."""
 
-from __future__ import annotations
-
 from paramreduce_cli.excitation.scalings import Pullback
 from paramreduce_cli.records import FloatArray
 

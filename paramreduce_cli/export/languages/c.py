@@ -1,7 +1,5 @@
 """C99: a header, a source, a self-test and the files that build them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

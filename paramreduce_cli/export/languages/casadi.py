@@ -1,7 +1,5 @@
 """Serialised CasADi functions."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from tempfile import TemporaryDirectory
 

@@ -1,7 +1,5 @@
 """The approximate base parameters as equations for a paper."""
 
-from __future__ import annotations
-
 from paramreduce_cli.export.exported import ExportedModel, plain
 from paramreduce_cli.texts import latex as typeset
 

@@ -1,7 +1,5 @@
 """MATLAB and Octave: one function a file, and a script that tests them."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.export.exported import ExportedModel, about

@@ -1,7 +1,5 @@
 """A NumPy module, and a self-test for it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

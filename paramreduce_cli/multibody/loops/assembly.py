@@ -4,8 +4,6 @@ Ranks are decided on several configurations reached from the assembly by small r
 so that one singular configuration is not taken for a property of the mechanism.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 

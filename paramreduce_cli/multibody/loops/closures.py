@@ -4,8 +4,6 @@ Phi(q) = 0 in the generalised coordinates of the open tree; lengths are in m and
 without unit, so that every equation is about as large as the gap it measures.
 """
 
-from __future__ import annotations
-
 import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Vector, dot, subtract

@@ -5,8 +5,6 @@ along the straight line from where it started, in steps that shorten where Newto
 corrections are not small against the step: a solution stays on its assembly mode.
 """
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import casadi as ca

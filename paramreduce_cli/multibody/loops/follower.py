@@ -1,7 +1,5 @@
 """Positions of closed loops along a motion that an optimiser changes step by step."""
 
-from __future__ import annotations
-
 import contextlib
 
 import numpy as np

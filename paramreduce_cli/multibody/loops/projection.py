@@ -10,8 +10,6 @@ The sum in delta_z has M_qq, and b its sign, by inserting ddq into d_q = M_qq dd
 the paper prints it without and with the other sign.
 """
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import casadi as ca

@@ -23,8 +23,6 @@ counters of every array in a tuple:
 * ``errors``: INSIDE and BOUND.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numba

@@ -1,7 +1,5 @@
 """Searches for the best subsets of all sizes, and what they prove."""
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterable

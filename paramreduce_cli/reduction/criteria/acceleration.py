@@ -1,7 +1,5 @@
 """The acceleration error as a criterion: exact, with first-order proposals."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The cost of evaluating a model as a criterion, under a limit of the torque error."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cached_property
 

@@ -1,7 +1,5 @@
 """The Euclidean torque error as a criterion, in closed form."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

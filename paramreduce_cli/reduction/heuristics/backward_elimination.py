@@ -1,7 +1,5 @@
 """Backward Elimination [Ros2019], Algorithm 1, from one base set or from several."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import islice
 

@@ -1,7 +1,5 @@
 """Sequential floating forward selection [Pudil1994]."""
 
-from __future__ import annotations
-
 from paramreduce_cli.reduction.objective import Units
 from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, completed

@@ -1,7 +1,5 @@
 """Forward Selection [Ros2019], Algorithm 2."""
 
-from __future__ import annotations
-
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
 
 

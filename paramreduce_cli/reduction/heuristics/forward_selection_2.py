@@ -1,7 +1,5 @@
 """Forward Selection with two iterations [Ros2019], Algorithm 3."""
 
-from __future__ import annotations
-
 from paramreduce_cli.reduction.objective import without
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, completed
 

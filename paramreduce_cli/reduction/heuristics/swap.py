@@ -1,7 +1,5 @@
 """Local search by exchanges from many starts."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Torque error against operations."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

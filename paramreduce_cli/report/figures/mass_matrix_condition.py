@@ -1,7 +1,5 @@
 """Health of the mass matrix."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData

@@ -1,7 +1,5 @@
 """Operations against n."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData

@@ -1,7 +1,5 @@
 """Heuristics over what is proven."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """The selection on other data."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """Torques along a trajectory."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

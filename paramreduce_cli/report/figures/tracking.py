@@ -1,7 +1,5 @@
 """Control with the exported models."""
 
-from __future__ import annotations
-
 import numpy as np
 from matplotlib.figure import Figure
 

@@ -1,7 +1,5 @@
 """The states along the first trajectory of the validation set."""
 
-from __future__ import annotations
-
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData

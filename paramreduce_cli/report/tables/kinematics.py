@@ -1,7 +1,5 @@
 """The geometry of the mechanism, as its config gives it."""
 
-from __future__ import annotations
-
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.table import Table

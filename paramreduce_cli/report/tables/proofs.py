@@ -1,7 +1,5 @@
 """How far the best subset of every size is proven."""
 
-from __future__ import annotations
-
 from paramreduce_cli.records import ProofStatus
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed

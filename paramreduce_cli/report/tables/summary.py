@@ -1,7 +1,5 @@
 """What each heuristic reaches at the selected number of parameters."""
 
-from __future__ import annotations
-
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.overview import HEADER, function_cells
 from paramreduce_cli.report.sections import PageSection, placed

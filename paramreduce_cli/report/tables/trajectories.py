@@ -1,7 +1,5 @@
 """How every trajectory of both sets excites the parameters, and what it took to find."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.records import Trajectory

@@ -1,7 +1,5 @@
 """What the trajectories had to be like."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.records import FloatArray

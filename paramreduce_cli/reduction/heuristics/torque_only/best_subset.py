@@ -1,7 +1,5 @@
 """The best subset of every size by branch and bound."""
 
-from __future__ import annotations
-
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.reduction.heuristics.swap import swap
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size

@@ -1,7 +1,5 @@
 """QR decomposition with column pivoting [Ros2019], Sec. 2.3."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import Orthogonaliser
