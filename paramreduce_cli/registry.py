@@ -5,8 +5,9 @@ What a room offers are the files in its folder: ``forward_selection.py`` holds t
 and names can be listed without importing what they stand for.
 """
 
+import ast
 import importlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -45,12 +46,9 @@ class Registry:
         self.kind = kind
         self._files = _files(_PACKAGE.joinpath(*room.split(".")[1:]))
 
-    def __getitem__(self, name: str) -> Callable[..., Any]:
+    def __getitem__(self, name: str) -> Any:
         path = self._files[name].relative_to(_PACKAGE.parent).with_suffix("")
-        function: Callable[..., Any] = getattr(
-            importlib.import_module(".".join(path.parts)), path.stem
-        )
-        return function
+        return getattr(importlib.import_module(".".join(path.parts)), path.stem)
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._files)
@@ -61,6 +59,16 @@ class Registry:
     def __len__(self) -> int:
         return len(self._files)
 
-    def items(self) -> list[tuple[str, Callable[..., Any]]]:
+    def summary(self, name: str) -> str:
+        """First line of a function's docstring; its file is read, not imported."""
+        path = self._files[name]
+        functions = (
+            node
+            for node in ast.parse(path.read_text(encoding="utf-8")).body
+            if isinstance(node, ast.FunctionDef) and node.name == path.stem
+        )
+        return (ast.get_docstring(next(functions)) or "").partition("\n")[0]
+
+    def items(self) -> list[tuple[str, Any]]:
         """Names with their functions."""
         return [(name, self[name]) for name in self]

@@ -5,16 +5,14 @@ from, the return type which artifact is written.
 """
 
 import hashlib
+import importlib.metadata
 import json
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
-
-import casadi
-import numpy
-import scipy
 
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
@@ -46,13 +44,11 @@ from paramreduce_cli.records import (
 )
 
 
+@cache
 def versions() -> dict[str, str]:
     """Of this package and of the libraries that numbers depend on."""
-    return {
-        "paramreduce": __version__,
-        "numpy": numpy.__version__,
-        "scipy": scipy.__version__,
-        "casadi": casadi.__version__,
+    return {"paramreduce": __version__} | {
+        name: importlib.metadata.version(name) for name in ("numpy", "scipy", "casadi")
     }
 
 

@@ -79,13 +79,37 @@ def test_what_is_imported_by_name_is_of_the_own_room(path):
     assert not [call for call in calls(path, "print") if isinstance(call.func, ast.Name)]
 
 
+def modules_after(script):
+    script = f"import json, sys\n{script}\nprint(json.dumps(sorted(sys.modules)), file=sys.stderr)"
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, check=True)
+    return set(json.loads(done.stderr.splitlines()[-1]))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "heavy"),
+    [
+        (["--version"], {*LIGHT, "numpy"}),
+        (["--help"], {*LIGHT, "numpy"}),
+        (["init", "--help"], LIGHT),
+        (["inspect", "{file}"], set(LIGHT) - {"h5py"}),
+    ],
+)
+def test_what_needs_no_numerics_loads_none(two_link_results, arguments, heavy):
+    arguments = [text.format(file=two_link_results / "model.h5") for text in arguments]
+    script = f"""
+from paramreduce_cli.cli import main
+sys.argv[1:] = {arguments}
+try:
+    main()
+except SystemExit as stopped:
+    assert stopped.code == 0
+"""
+    assert not modules_after(script) & set(heavy)
+
+
 def test_reading_a_config_loads_no_numerics():
     """Names on offer are listed without importing what they stand for."""
-    script = (
-        "import json, sys; from paramreduce_cli.config import config_schema; config_schema(); "
-        "print(json.dumps(sorted(sys.modules)))"
-    )
-    loaded = set(json.loads(subprocess.check_output([sys.executable, "-c", script])))
+    loaded = modules_after("from paramreduce_cli.config import config_schema; config_schema()")
     assert not loaded & set(LIGHT)
     ours = {name.split(".")[1] for name in loaded if name.startswith("paramreduce_cli.")}
     assert min(LEVEL[name] for name in ours) == LEVEL["config"]

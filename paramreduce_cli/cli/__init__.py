@@ -7,12 +7,10 @@ import warnings
 import click
 
 from paramreduce_cli import __version__
-from paramreduce_cli.cli import files
-from paramreduce_cli.cli.export import export
-from paramreduce_cli.cli.stages import run, stage_command
+from paramreduce_cli.cli.commands import commands
 from paramreduce_cli.cli.terminal import err, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
-from paramreduce_cli.pipeline import pipeline
+from paramreduce_cli.stages import stages
 
 WRONG = 2
 INTERNAL = 70
@@ -57,7 +55,34 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class _Commands(click.Group):
+    """The stages and the other commands, each imported when it is called."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Names, in alphabetical order."""
+        return sorted((*stages, *commands))
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        """The command with a name; None if there is none."""
+        if name in commands:
+            command: click.Command = commands[name]
+            return command
+        if name in stages:
+            from paramreduce_cli.cli.stage_command import stage_command
+
+            return stage_command(name)
+        return None
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """List them with what they do, read from their files."""
+        rooms = {name: room for room in (stages, commands) for name in room}
+        with formatter.section("Commands"):
+            formatter.write_dl(
+                [(name, rooms[name].summary(name)) for name in self.list_commands(ctx)]
+            )
+
+
+@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(__version__, prog_name="paramreduce")
 def cli() -> None:
     """Find the smallest set of dynamic parameters that still predicts a robot's forces.
@@ -65,18 +90,3 @@ def cli() -> None:
     A robot is one YAML file; results go to results/ROBOT. Start with
     `paramreduce run configs/two_link.yaml`, or `paramreduce init --dh my_arm` for your own.
     """
-
-
-for _stage in pipeline():
-    cli.add_command(stage_command(_stage))
-for _command in (
-    run,
-    export,
-    files.schema,
-    files.init,
-    files.inspect,
-    files.compare_command,
-    files.table_command,
-    files.graph,
-):
-    cli.add_command(_command)

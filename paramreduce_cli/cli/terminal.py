@@ -1,16 +1,20 @@
 """What goes to the terminal: text, warnings, progress, and Ctrl-C coming from it."""
 
+from __future__ import annotations
+
 import signal
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import rich.console
 import rich.progress
 
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.records import Progress
+
+if TYPE_CHECKING:
+    from paramreduce_cli.records import Progress  # NumPy takes longer to load than all else here
 
 
 class _Console(rich.console.Console):

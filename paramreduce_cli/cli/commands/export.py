@@ -7,7 +7,7 @@ import click
 
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store, load_file
-from paramreduce_cli.cli.stages import CONFIG, RESULTS, SET
+from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError

@@ -1,0 +1,64 @@
+"""The command that holds one run against another."""
+
+from pathlib import Path
+
+import click
+
+from paramreduce_cli.cli.summaries import load_summary
+from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
+from paramreduce_cli.report.comparison import compare as compared
+
+DIFFERENT = 1
+
+
+@click.command()
+@click.argument("first", type=click.Path(path_type=Path))
+@click.argument("second", type=click.Path(path_type=Path))
+@click.option(
+    "--tolerance", "given", multiple=True, metavar="QUANTITY=RELATIVE",
+    help=f"Relative tolerance of {', '.join(TOLERANCES)}; may be repeated.",
+)  # fmt: skip
+@click.option(
+    "--only", multiple=True, type=click.Choice(list(QUANTITIES)), help="Compare only this."
+)
+def compare(first: Path, second: Path, given: tuple[str, ...], only: tuple[str, ...]) -> int:
+    """Compare two summaries or results folders; exit code 1 if they differ too much.
+
+    Orders are compared up to ties, trajectories by the best and the median condition number.
+
+    Example: paramreduce compare results/reference/puma560.json results/puma560
+    """
+    summaries = [load_summary(path) for path in (first, second)]
+    for path, summary in zip((first, second), summaries, strict=True):
+        if "proofs" not in summary.get("reduction", {}):
+            raise ConfigError(
+                f"{path}: is a summary of an older version; make it again with `paramreduce run`."
+            )
+    tolerances = {**TOLERANCES, **dict(map(_tolerance, given))}
+    try:
+        differences = compared(summaries[0], summaries[1], tolerances, only)
+    except (KeyError, TypeError, IndexError) as error:
+        raise ConfigError(
+            f"{first} or {second}: is no summary of this version ({error})."
+        ) from error
+    bad = [d for d in differences if not d.tolerated]
+    for difference in bad:
+        say(f"{difference.what}: {difference.first} -> {difference.second}")
+    tolerated = len(differences) - len(bad)
+    if bad:
+        say(f"{len(bad)} differences beyond tolerance, {tolerated} within.")
+        return DIFFERENT
+    say(f"{first} and {second} agree: {tolerated} differences, all within tolerance.")
+    return 0
+
+
+def _tolerance(text: str) -> tuple[str, Tolerance]:
+    name, _, value = text.partition("=")
+    try:
+        return name, Tolerance(float(value), TOLERANCES[name].absolute)
+    except (KeyError, ValueError) as error:
+        raise ConfigError(
+            f"--tolerance {text}: write QUANTITY=NUMBER with one of {', '.join(TOLERANCES)}."
+        ) from error

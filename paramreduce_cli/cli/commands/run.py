@@ -1,0 +1,111 @@
+"""The command that runs everything."""
+
+import statistics
+from pathlib import Path
+from typing import Any
+
+import click
+import rich.box
+import rich.table
+
+from paramreduce_cli.artifacts.report_files import load_json
+from paramreduce_cli.cli.options import (
+    CONFIG,
+    FORCE,
+    JOBS,
+    QUIET,
+    RESULTS,
+    SET,
+    cores,
+    results_store,
+)
+from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
+from paramreduce_cli.cli.terminal import interruption, out, progress_bars, remark, say
+from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.pipeline import stages_to_run
+from paramreduce_cli.records import Report
+from paramreduce_cli.runner import Runner
+from paramreduce_cli.texts import share
+
+_TABLE_WIDTH = 110
+
+
+@click.command()
+@CONFIG
+@RESULTS
+@SET
+@FORCE
+@QUIET
+@JOBS
+def run(
+    config: Path,
+    results: Path | None,
+    overrides: tuple[str, ...],
+    force: bool,
+    quiet: bool,
+    jobs: int | None,
+) -> int:
+    """Run all stages in order, skipping what is up to date.
+
+    Ends with a summary table and the path of the report. Exit code 1 where the selected
+    model is not accepted.
+
+    Example: paramreduce run configs/puma560.yaml
+    """
+    loaded = load_config(config, overrides)
+    store = results_store(loaded, results)
+    with placed_errors(config, overrides), store.locked():
+        for stage in stages_to_run(loaded):
+            with progress_bars(quiet) as progress:
+                runner = Runner(
+                    loaded, store, jobs or cores(), progress, None, remark, interruption.heeded
+                )
+                outcome = runner.run(stage, force=force)
+            if not quiet:
+                say_outcome(outcome)
+    summary = load_json(store.path(Report))
+    if not quiet:
+        _say_summary(summary)
+        say(f"Report: {store.path(Report).with_name('index.html')}")
+    selected = summary["selected"]
+    if not quiet:
+        say(f"Selected: {selected['reason']}")
+        for text in selected["remarks"]:
+            remark(text.rstrip("."))
+    return say_verdict(selected["accepted"], selected["verdict"], quiet)
+
+
+def _say_summary(summary: dict[str, Any]) -> None:
+    model, n = summary["model"], summary["selected"]["n"]
+    say(
+        f"\n{summary['robot']}: {model['n_parameters']} parameters, {model['n_affecting']} act on the "
+        f"torques, {model['n_base']} base parameters"
+    )
+    trajectories = summary["trajectories"]
+    if trajectories is not None:
+        kappas = [t["kappa"] for t in trajectories["estimation"]]
+        say(
+            f"{len(kappas)} trajectories, {trajectories['scaling']} kappa: best {min(kappas):.4g}, "
+            f"median {statistics.median(kappas):.4g}, worst {max(kappas):.4g}"
+        )
+    table = rich.table.Table(title=f"Reduced models with {n} parameters", box=rich.box.SIMPLE)
+    headings = ("heuristic", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "d", "M|δ")
+    for k, heading in enumerate(headings):
+        table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
+    for name, rows in summary["validation"].items():
+        for row in rows:
+            if row["n"] == n:
+                table.add_row(name, *_summary_cells(row))
+    full = summary["full"]
+    operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
+    table.add_row("full model", "", "", "", "", *operations)
+    out.print(table, width=max(out.width, _TABLE_WIDTH))
+
+
+def _summary_cells(row: dict[str, Any]) -> list[str]:
+    cells = []
+    for part in ("torque_error", "acceleration_error"):
+        for which in ("estimation", "validation"):
+            value = row[part][which]
+            cells.append(share(value))
+    return [*cells, str(row["operations"]["inverse"]), str(row["operations"]["direct"])]

@@ -1,0 +1,41 @@
+"""Options that several commands take, and what they stand for."""
+
+import os
+from pathlib import Path
+
+import click
+
+from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.config import Config
+from paramreduce_cli.errors import ConfigError
+
+CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
+RESULTS = click.option(
+    "--results",
+    type=click.Path(path_type=Path, file_okay=False),
+    help="Folder of the artifacts.  [default: results/ROBOT]",
+)
+SET = click.option(
+    "--set", "overrides", multiple=True, metavar="KEY=VALUE",
+    help="Override a key of the config, such as trajectories.count=3; may be repeated.",
+)  # fmt: skip
+FORCE = click.option("--force", is_flag=True, help="Do it again even if it is up to date.")
+QUIET = click.option("--quiet", is_flag=True, help="Say nothing but errors and warnings.")
+JOBS = click.option(
+    "--jobs", type=click.IntRange(min=1), default=None, metavar="N",
+    help="Worker processes.  [default: all cores]",
+)  # fmt: skip
+
+
+def cores() -> int:
+    """Cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def results_store(config: Config | None, results: Path | None) -> Store:
+    """The folder that results go to."""
+    if results is not None:
+        return Store(results)
+    if config is None:
+        raise ConfigError("--results: without a config, say where the results go.")
+    return Store(Path("results") / config.robot)

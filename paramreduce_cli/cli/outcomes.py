@@ -1,0 +1,22 @@
+"""What is said of stages that have run."""
+
+from paramreduce_cli.cli.terminal import err, say
+from paramreduce_cli.runner import Outcome
+
+NOT_ACCEPTED = 1
+
+
+def say_outcome(outcome: Outcome) -> None:
+    """Say how long a stage took, and where its artifact is."""
+    state = "up to date" if outcome.current else f"{outcome.seconds:.1f} s"
+    say(f"{outcome.stage}: {state}, {outcome.path}")
+
+
+def say_verdict(accepted: bool, verdict: str, quiet: bool) -> int:
+    """Say whether the selected model is accepted; returns the exit code."""
+    if not accepted:
+        err.print(f"Not accepted: {verdict}", markup=False)
+        return NOT_ACCEPTED
+    if not quiet:
+        say(verdict)
+    return 0

@@ -1,0 +1,89 @@
+"""Commands that run stages; derived from their signatures, nothing about a stage is written here."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+
+from paramreduce_cli.artifacts.store import file_of, load_file
+from paramreduce_cli.cli.options import FORCE, JOBS, QUIET, RESULTS, SET, cores, results_store
+from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
+from paramreduce_cli.cli.terminal import interruption, progress_bars, remark
+from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.pipeline import Stage, describe_stage
+from paramreduce_cli.records import Validation
+from paramreduce_cli.runner import Outcome, Runner
+from paramreduce_cli.stages import stages
+
+
+def stage_command(name: str) -> click.Command:
+    """The command that runs a stage."""
+    stage = describe_stage(name, stages[name])
+    config_optional = not stage.needs_config
+
+    def command(
+        config: Path | None,
+        results: Path | None,
+        overrides: tuple[str, ...],
+        force: bool,
+        quiet: bool,
+        jobs: int | None = None,
+        samples: Path | None = None,
+    ) -> int:
+        if config is None and samples is None:
+            raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
+        if config is None and overrides:
+            raise click.UsageError("--set changes keys of a CONFIG; give one.")
+        loaded = load_config(config, overrides) if config is not None else None
+        store = results_store(loaded, results)
+        placed = placed_errors(config, overrides)
+        with placed, store.locked(), progress_bars(quiet) as progress:
+            runner = Runner(
+                loaded, store, jobs or cores(), progress, samples, remark, interruption.heeded
+            )
+            outcome = runner.run(stage, force=force, go_on=True)
+        if not quiet:
+            say_outcome(outcome)
+        return _exit_code(stage, outcome, quiet)
+
+    params: list[Any] = [RESULTS, SET, FORCE, QUIET]
+    if stage.lends_run is not None:
+        params.append(JOBS)
+    if config_optional:
+        params.append(
+            click.option(
+                "--samples", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+                help="A samples.h5 of your own; then no CONFIG is needed.",
+            )
+        )  # fmt: skip
+    params.append(
+        click.argument(
+            "config", type=click.Path(path_type=Path, dir_okay=False), required=not config_optional
+        )
+    )
+    decorated: Callable[..., Any] = command
+    for parameter in params:
+        decorated = parameter(decorated)
+    return click.command(stage.name, help=_stage_help(stage, config_optional))(decorated)
+
+
+def _stage_help(stage: Stage, config_optional: bool) -> str:
+    reads = [file_of(entry.type) for entry in stage.artifacts]
+    source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
+    flow = f"Reads {source or 'the config'}; writes {file_of(stage.output)}."
+    example = f"Example: paramreduce {stage.name} configs/puma560.yaml"
+    if config_optional:
+        example += f", or: paramreduce {stage.name} --samples my_samples.h5 --results my_results"
+    text = (stage.function.__doc__ or "").strip().replace("\n    ", "\n")
+    return f"{text}\n\n{flow}\n\n{example}"
+
+
+def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
+    if stage.output is not Validation:
+        return 0
+    record = outcome.record or load_file(outcome.path, Validation, None, stage.name)[0]
+    if not quiet:
+        for entry in record.remarks:
+            remark(entry.text.rstrip("."))
+    return say_verdict(record.accepted, record.verdict, quiet)
