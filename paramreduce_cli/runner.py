@@ -156,7 +156,9 @@ class Runner:
         made = (stamp.schema, stamp.stage, stamp.robot, stamp.versions)
         if made != (SCHEMA, stage.name, self.config.robot, versions()):
             return False
-        return not self._changed_sections(stamp) and stamp.inputs == self._input_digests(stage)
+        if self._changed_sections(stamp) or stamp.inputs != self._input_digests(stage):
+            return False
+        return self.store.is_whole(stage.output)
 
     def _changed_sections(self, stamp: Stamp) -> list[str]:
         assert self.config is not None

@@ -3,6 +3,7 @@
 import contextlib
 import errno
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from pathlib import Path
@@ -34,6 +35,17 @@ def atomically(path: Path) -> Iterator[Path]:
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
+
+
+_LEFT = re.compile(r"\..+\.\w{8}\.tmp")
+"""Names of temporary files."""
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
+    for path in folder.rglob(".*.tmp"):
+        if _LEFT.fullmatch(path.name):
+            path.unlink(missing_ok=True)
 
 
 def _reason(error: Exception) -> str:

@@ -109,9 +109,25 @@ def load_recording(path: Path, n_dof: int) -> Recording:
     if rows < _FEWEST_SAMPLES:
         raise DataError(f"{path}: {rows} samples are too few; bring at least {_FEWEST_SAMPLES}.")
     time = arrays.get("time", np.arange(rows, dtype=float))
+    _check_time(path, time.ravel())
     return Recording(
         str(path), time.ravel(), arrays["z"], arrays["dz"], arrays["ddz"], arrays.get("tau")
     )
+
+
+def _check_time(path: Path, time: FloatArray) -> None:
+    """Time goes on; it may begin anew, for another trajectory, but not time and again."""
+    steps = np.diff(time)
+    starts = np.concatenate([[-1], np.flatnonzero(steps < 0), [time.size - 1]])
+    wrong = np.flatnonzero(steps == 0)
+    if wrong.size == 0 and np.diff(starts).min() < _FEWEST_SAMPLES:
+        wrong = np.flatnonzero(steps < 0)
+    if wrong.size:
+        row = int(wrong[0]) + 1
+        raise DataError(
+            f"{path}: the time does not go on from data row {row} to {row + 1}. Give it in seconds, "
+            "rising; it may begin anew where another trajectory does."
+        )
 
 
 def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
@@ -127,6 +143,10 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}
     for key in ("z", "dz", "ddz", "tau"):
+        if f"{key}{n_dof + 1}" in columns:
+            raise DataError(
+                f"{path}, line 1: there is a column {key}{n_dof + 1}, but the robot has {n_dof} joints."
+            )
         wanted = [f"{key}{j + 1}" for j in range(n_dof)]
         if all(name in columns for name in wanted):
             arrays[key] = np.column_stack([columns[name] for name in wanted])
@@ -145,6 +165,8 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
 def _table(path: Path) -> tuple[list[str], FloatArray]:
     """Headings and numbers of a CSV, (n_rows, n_columns); held as numbers from the start."""
     numbers = array.array("d")
+    if path.exists() and not path.is_file():
+        raise ArtifactError(f"{path}: is no file.")
     try:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(path, "rt", encoding="utf-8-sig", newline="") as file:

@@ -1,4 +1,10 @@
-"""HDF5 files with where they came from: written whole, read with clear refusals."""
+"""HDF5 files with where they came from: written whole, checked as they are read.
+
+Every byte that means something has a checksum that HDF5 compares whenever it is read: numbers in
+chunks a Fletcher-32 each, and what is small stands with names, shapes and attributes in headers,
+which HDF5 checks by itself from version 1.10 of its format on. Text is of fixed length, as HDF5
+does not check the heap where other text goes.
+"""
 
 import contextlib
 import dataclasses
@@ -16,13 +22,22 @@ import numpy as np
 from paramreduce_cli.artifacts.atomic import PatientFile, atomically
 from paramreduce_cli.errors import ArtifactError
 
-SCHEMA = 5
+SCHEMA = 6
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
 _CHUNK = 16384
 """Numbers in a chunk of a dataset that grows: 128 KiB."""
 _CHUNK_CACHE = 1 << 20
 """Bytes that HDF5 keeps of each dataset; all are read and written in order."""
+_FORMAT = ("v110", "v110")
+_SMALL = 8192
+"""Bytes that a header has room for."""
+_LARGEST_HEADER = 60_000
+"""Bytes that a header can be made to hold; text beyond that is an array with one entry."""
+_READ_AT_ONCE = 1 << 24
+"""Bytes."""
+_MOST_COMPRESSED = 1000
+"""A dataset that declares more numbers for what it holds is none that was written."""
 
 
 @dataclass(frozen=True)
@@ -64,24 +79,44 @@ class Writer:
 
     def timing(self, name: str, value: Any) -> None:
         """Write how long something took, which is no part of what the file holds."""
-        self._group.create_dataset(name, data=np.asarray(value))
+        self._store(name, np.asarray(value))
 
     def dataset(self, name: str, value: Any) -> None:
         """Write an array, a number, a text or a list of texts."""
         array = np.asarray(value)
-        if array.dtype.kind in "US":
-            flat = [str(item) for item in array.ravel()]
-            self._note(name, "\0".join(flat).encode())
-            data = np.array(flat, dtype=object).reshape(array.shape)
-            self._group.create_dataset(name, data=data, dtype=h5py.string_dtype())
+        if array.dtype.kind not in "US":
+            self._note(name, np.ascontiguousarray(array).tobytes())
+            self._store(name, array)
             return
-        self._note(name, np.ascontiguousarray(array).tobytes())
-        self._group.create_dataset(name, data=array)
+        flat = [str(item).encode() for item in array.ravel()]
+        self._note(name, b"\0".join(flat))
+        kind = h5py.string_dtype(length=max(1, *map(len, flat)) if flat else 1)
+        self._store(name, np.array(flat, dtype=kind).reshape(array.shape))
 
     def attribute(self, name: str, value: Any) -> None:
         """Write a small attribute of the file."""
         self._note(name, repr(value).encode())
-        self._group.attrs[name] = value
+        write_attribute(self._group, name, value)
+
+    def _store(self, name: str, array: np.ndarray) -> None:
+        if array.nbytes > _LARGEST_HEADER and array.shape == ():
+            array = array[None]
+        if array.nbytes > (_SMALL if array.shape else _LARGEST_HEADER):
+            whole = array.shape if array.nbytes <= _CHUNK_CACHE else True
+            self._group.create_dataset(name, data=array, chunks=whole, fletcher32=True)
+            return
+        # By hand, as h5py never asks HDF5 to put a scalar into a header.
+        layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
+        layout.set_layout(h5py.h5d.COMPACT)
+        links = h5py.h5p.create(h5py.h5p.LINK_CREATE)
+        links.set_create_intermediate_group(True)
+        kind = h5py.h5t.py_create(array.dtype, logical=True)
+        space = (
+            h5py.h5s.create_simple(array.shape) if array.shape else h5py.h5s.create(h5py.h5s.SCALAR)
+        )
+        made = h5py.h5d.create(self._group.id, name.encode(), kind, space, layout, links)
+        if array.size:
+            h5py.Dataset(made)[...] = array
 
     def rows(self, name: str, columns: int | None) -> Callable[[np.ndarray], None]:
         """A dataset that grows by blocks of rows.
@@ -96,8 +131,9 @@ class Writer:
         tail = () if columns is None else (columns,)
         chunk = max(1, _CHUNK // max(1, columns or 1))
         data = self._group.create_dataset(
-            name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8"
-        )
+            name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8",
+            fletcher32=True,
+        )  # fmt: skip
 
         def append(block: np.ndarray) -> None:
             start = data.shape[0]
@@ -129,15 +165,24 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
     """
     started = time.perf_counter()
     with atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
-        with h5py.File(disk, "w", rdcc_nbytes=_CHUNK_CACHE) as file:
+        with h5py.File(disk, "w", libver=_FORMAT, rdcc_nbytes=_CHUNK_CACHE) as file:
             writer = Writer(file, disk.check)
             fill(writer)
             seconds = stamp.seconds + time.perf_counter() - started
             done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
             for name, value in _attributes(done).items():
-                file.attrs[name] = value
+                write_attribute(file, name, value)
         disk.check()
     return done
+
+
+def write_attribute(group: h5py.Group, name: str, value: Any) -> None:
+    """Write an attribute; text of fixed length."""
+    if isinstance(value, str):
+        value = np.array(
+            value.encode(), dtype=h5py.string_dtype(length=max(1, len(value.encode())))
+        )
+    group.attrs[name] = value
 
 
 class Reader:
@@ -177,7 +222,8 @@ class Reader:
     def attribute(self, name: str, default: Any = None) -> Any:
         """An attribute of the file."""
         value = self.file.attrs.get(name, default)
-        return value.item() if isinstance(value, np.generic) else value
+        value = value.item() if isinstance(value, np.generic) else value
+        return value.decode() if isinstance(value, bytes) else value
 
     def rows(self, name: str) -> h5py.Dataset:
         """A numeric dataset to be read in slices."""
@@ -186,11 +232,46 @@ class Reader:
             raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")
         return data
 
+    def verify(self) -> None:
+        """Read all there is, and so have all checksums compared.
+
+        Raises:
+            ArtifactError: Something is damaged.
+        """
+        for name in self.file.attrs:
+            self.attribute(name)
+        names: list[str] = []
+        self.file.visit(names.append)
+        for name in names:
+            if isinstance(self.file[name], h5py.Dataset):
+                data = self._dataset(name)
+                step = (
+                    max(1, _READ_AT_ONCE * max(1, len(data)) // max(1, data.nbytes))
+                    if data.shape
+                    else 1
+                )
+                for start in range(0, len(data) if data.shape else 1, step):
+                    data[start : start + step] if data.shape else data[()]
+
     def _dataset(self, name: str) -> h5py.Dataset:
+        parts = name.split("/")
+        for k in range(len(parts)):
+            link = self.file.get("/".join(parts[: k + 1]), getlink=True)
+            if isinstance(link, h5py.ExternalLink):
+                raise ArtifactError(
+                    f"{self.path}: /{name} is in another file; copy it into this one."
+                )
         found = self.file.get(name)
         if not isinstance(found, h5py.Dataset):
             raise ArtifactError(
                 f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
+            )
+        if found.is_virtual or found.external:
+            raise ArtifactError(f"{self.path}: /{name} is in another file; copy it into this one.")
+        if found.nbytes > _SMALL + _MOST_COMPRESSED * found.id.get_storage_size():
+            raise ArtifactError(
+                f"{self.path}: /{name} declares {' x '.join(map(str, found.shape))} numbers, but "
+                "holds hardly any."
             )
         return found
 
@@ -208,6 +289,8 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
     """
     if not path.exists():
         raise ArtifactError(f"{path}: there is no such file.{' ' + hint if hint else ''}")
+    if not path.is_file():  # a pipe would be waited for
+        raise ArtifactError(f"{path}: is no file.{' ' + hint if hint else ''}")
     try:
         file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)
     except OSError as error:
@@ -217,8 +300,10 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
     with file:
         try:
             yield Reader(path, file)
-        except (OSError, KeyError, RuntimeError, ValueError, TypeError) as error:
-            raise ArtifactError(f"{path}: is damaged: {error}.") from error
+        except (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError) as error:
+            raise ArtifactError(
+                f"{path}: is damaged: {error}.{' ' + hint if hint else ''}"
+            ) from error
 
 
 def _attributes(stamp: Stamp) -> dict[str, Any]:

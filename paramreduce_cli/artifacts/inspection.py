@@ -9,7 +9,7 @@ from paramreduce_cli.artifacts.hdf5 import reading
 
 
 def contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
-    """Attributes of a file, and (name, shape, type or value) of its datasets.
+    """Attributes of a file, and (name, shape, type or value) of its datasets; all of it is checked.
 
     Raises:
         ArtifactError: It cannot be read.
@@ -21,7 +21,8 @@ def contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
             datasets.append((f"/{name}", _shape(item), _content(item)))
 
     with reading(path) as reader:
-        attributes = {key: str(value) for key, value in reader.file.attrs.items()}
+        reader.verify()
+        attributes = {key: str(reader.attribute(key)) for key in reader.file.attrs}
         reader.file.visititems(visit)
     return attributes, datasets
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts.atomic import atomically
-from paramreduce_cli.artifacts.hdf5 import Stamp
+from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 
@@ -18,25 +18,32 @@ SUMMARY = "report/summary.json"
 
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
     """Write a report's files, its summary last, and remove what a former report left."""
-    digest = hashlib.sha256()
     for name, content in report.files.items():
-        digest.update(name.encode() + content)
         with atomically(folder / name) as path:
             path.write_bytes(content)
-    done = dataclasses.replace(stamp, digest=digest.hexdigest())
     _remove_what_a_former_report_left(folder, set(report.files))
-    summary = {**report.summary, "files": sorted(report.files), "provenance": done.__dict__}
+    files = {name: hashlib.sha256(report.files[name]).hexdigest() for name in sorted(report.files)}
+    summary = {**report.summary, "files": files}
+    summary["provenance"] = vars(stamp)
+    done = dataclasses.replace(stamp, digest=_digest(summary))
+    summary["provenance"] = vars(done)
     with atomically(folder / Path(SUMMARY).name) as path:
         path.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return done
 
 
+def _digest(summary: Mapping[str, Any]) -> str:
+    """Of a summary but for the digest in it."""
+    content = {**summary, "provenance": {**summary["provenance"], "digest": ""}}
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
 def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
     try:
-        former = load_json(folder / Path(SUMMARY).name).get("files", [])
-    except (ArtifactError, AttributeError):
+        former = set(map(str, load_json(folder / Path(SUMMARY).name).get("files", ())))
+    except (ArtifactError, AttributeError, TypeError):
         return
-    for name in set(former) - files:
+    for name in former - files:
         if not Path(name).is_absolute() and ".." not in Path(name).parts:
             (folder / name).unlink(missing_ok=True)
 
@@ -62,14 +69,47 @@ def save_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def summary_stamp(path: Path) -> Stamp | None:
-    """Provenance of a summary; one that no stage made where files of the report are missing."""
+    """Provenance of a summary; None if there is none."""
     summary = load_json(path)
     try:
-        if not all((path.parent / name).exists() for name in summary.get("files", ())):
-            return dataclasses.replace(Stamp(**summary["provenance"]), digest="", stage="")
         return Stamp(**summary["provenance"])
     except (KeyError, TypeError):
         return None
+
+
+def load_summary(path: Path) -> dict[str, Any]:
+    """Read a summary, or that of a results folder, and compare it with its digest if it has one.
+
+    Raises:
+        ArtifactError: It is missing, damaged, or no summary.
+    """
+    if path.is_dir():
+        path /= SUMMARY
+    summary = load_json(path)
+    if not isinstance(summary, dict):
+        raise ArtifactError(f"{path}: is no summary.json.")
+    stamp = summary_stamp(path)
+    if stamp is not None and stamp.schema == SCHEMA and stamp.digest != _digest(summary):
+        raise ArtifactError(
+            f"{path}: is damaged or was changed: its digest does not fit. Make it again with "
+            "`paramreduce report`."
+        )
+    return summary
+
+
+def verify_report(path: Path) -> None:
+    """Compare a summary, and the files it lists, with their digests.
+
+    Raises:
+        ArtifactError: One of them is missing, damaged or changed.
+    """
+    for name, digest in load_summary(path)["files"].items():
+        try:
+            found = hashlib.sha256((path.parent / name).read_bytes()).hexdigest()
+        except OSError as error:
+            raise ArtifactError(f"{path.parent / name}: cannot be read: {error}.") from error
+        if found != digest:
+            raise ArtifactError(f"{path.parent / name}: is damaged or was changed.")
 
 
 def load_json(path: Path) -> Any:
@@ -78,9 +118,11 @@ def load_json(path: Path) -> Any:
     Raises:
         ArtifactError: It is missing or not JSON.
     """
+    if path.exists() and not path.is_file():
+        raise ArtifactError(f"{path}: is no file.")
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
         raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise ArtifactError(f"{path}: is not JSON: {error}.") from error

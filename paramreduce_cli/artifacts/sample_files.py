@@ -103,8 +103,8 @@ class StoredSet:
             owner = self._column(reader, "trajectory")
             time = self._column(reader, "time")
             for start, stop in _slices(owner, BLOCK_SAMPLES):
-                tau_block = tau[start:stop]
-                W_block = W[start * self.n_dof : stop * self.n_dof]
+                tau_block = tau[start:stop].astype(float)
+                W_block = W[start * self.n_dof : stop * self.n_dof].astype(float)
                 if not (np.isfinite(tau_block).all() and np.isfinite(W_block).all()):
                     raise ArtifactError(
                         f"{self._path}: /{base} holds numbers that are not finite between samples "

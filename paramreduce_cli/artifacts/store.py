@@ -12,8 +12,15 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.atomic import remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
-from paramreduce_cli.artifacts.report_files import SUMMARY, load_json, save_report, summary_stamp
+from paramreduce_cli.artifacts.report_files import (
+    SUMMARY,
+    load_json,
+    save_report,
+    summary_stamp,
+    verify_report,
+)
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Model, Reduction, Report, Samples, Trajectories, Validation
@@ -71,6 +78,18 @@ class Store:
         except ArtifactError:
             return None
 
+    def is_whole(self, record: type) -> bool:
+        """Whether a record's file can be read to its end: no checksum in it is wrong."""
+        try:
+            if record is Report:
+                verify_report(self.path(record))
+            else:
+                with reading(self.path(record)) as reader:
+                    reader.verify()
+        except ArtifactError:
+            return False
+        return True
+
     def refuse_to_replace(self, record: type, robot: str) -> None:
         """Keep what is not this robot's from being overwritten.
 
@@ -104,7 +123,8 @@ class Store:
 
     def touch(self, record: type) -> None:
         """Make a file look new, so that Make agrees that it is current."""
-        os.utime(self.path(record))
+        with contextlib.suppress(OSError):  # where nobody may write Make cannot be told
+            os.utime(self.path(record))
 
     @contextlib.contextmanager
     def locked(self) -> Iterator[None]:
@@ -123,8 +143,12 @@ class Store:
                 "with --results."
             ) from error
         except OSError as error:
-            raise ArtifactError(f"{self.folder}: cannot be used: {error}.") from error
+            if not self.folder.is_dir():
+                raise ArtifactError(f"{self.folder}: cannot be used: {error}.") from error
+            yield  # nobody writes to it, so what is up to date may be looked at
+            return
         try:
+            remove_leftovers(self.folder)
             yield
         finally:
             lock.release()
@@ -178,6 +202,8 @@ def file_digest(path: Path) -> str:
     Raises:
         ArtifactError: It cannot be read.
     """
+    if path.exists() and not path.is_file():
+        raise ArtifactError(f"{path}: is no file.")
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

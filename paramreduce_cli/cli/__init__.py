@@ -8,7 +8,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.terminal import err, interruption, say, show_errors, show_warning
+from paramreduce_cli.cli.terminal import complain, err, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
 from paramreduce_cli.stages import stages
 
@@ -46,10 +46,9 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("PARAMREDUCE_DEBUG"):
             raise
-        err.print(
+        complain(
             f"Error: something went wrong inside paramreduce ({type(error).__name__}: {error}). "
-            "This is a bug; PARAMREDUCE_DEBUG=1 shows where.",
-            markup=False,
+            "This is a bug; PARAMREDUCE_DEBUG=1 shows where."
         )
         code = INTERNAL
     sys.exit(code if isinstance(code, int) else 0)

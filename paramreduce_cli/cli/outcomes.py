@@ -1,6 +1,6 @@
 """What is said of stages that have run."""
 
-from paramreduce_cli.cli.terminal import err, say
+from paramreduce_cli.cli.terminal import complain, say
 from paramreduce_cli.runner import Outcome
 
 NOT_ACCEPTED = 1
@@ -15,7 +15,7 @@ def say_outcome(outcome: Outcome) -> None:
 def say_verdict(accepted: bool, verdict: str, quiet: bool) -> int:
     """Say whether the selected model is accepted; returns the exit code."""
     if not accepted:
-        err.print(f"Not accepted: {verdict}", markup=False)
+        complain(f"Not accepted: {verdict}")
         return NOT_ACCEPTED
     if not quiet:
         say(verdict)

@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import io
+import os
+import re
 import signal
+import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -25,24 +29,40 @@ class _Console(rich.console.Console):
         raise BrokenPipeError
 
 
+if os.environ.get("COLUMNS", "").strip("0") == "":
+    os.environ.pop("COLUMNS", None)  # no terminal is that narrow, and nothing would be shown
+for stream in (sys.stdout, sys.stderr):
+    if isinstance(stream, io.TextIOWrapper):
+        stream.reconfigure(errors="replace")  # a terminal that knows no Greek is no reason to stop
+
 out = _Console(highlight=False, soft_wrap=True, emoji=False)
 err = _Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
 def say(message: str) -> None:
-    """Print to standard output as it is, without markup."""
-    out.print(message, markup=False)
+    """Print to standard output, without markup."""
+    out.print(harmless(message), markup=False)
+
+
+def complain(message: str) -> None:
+    """Print to standard error, without markup."""
+    err.print(harmless(message), markup=False)
+
+
+def harmless(text: str) -> str:
+    """A text in which what would steer a terminal is spelled out; names in files may hold it."""
+    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: ascii(found[0])[1:-1], text)
 
 
 def show_errors(text: str) -> None:
     """Print each line of an error's message."""
     for line in text.splitlines():
-        err.print(f"Error: {line}", markup=False)
+        complain(f"Error: {line}")
 
 
 def remark(message: str) -> None:
     """Tell the user something that does not stop the work."""
-    err.print(f"Warning: {message}.", markup=False)
+    complain(f"Warning: {message}.")
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -123,4 +143,4 @@ def _shown_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 def _plain_line(p: Progress) -> None:
     if p.done >= p.total:
-        err.print(f"{p.task}: done{', ' + p.remark if p.remark else ''}", markup=False)
+        complain(f"{p.task}: done{', ' + p.remark if p.remark else ''}")

@@ -19,6 +19,8 @@ from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.numbers import read_constants
 
 Problem = tuple[Key, str]
+_MOST_PROBLEMS = 30
+"""That are listed at once."""
 
 
 def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
@@ -44,7 +46,11 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
     lines += [_line(document, problem) for problem in problems]
     if lines or config is None:
-        raise ConfigError("\n".join(dict.fromkeys(lines)))
+        lines = list(dict.fromkeys(lines))
+        more = len(lines) - _MOST_PROBLEMS
+        if more > 0:
+            lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]
+        raise ConfigError("\n".join(lines))
     return _with_paths(config, path.parent)
 
 
@@ -73,6 +79,8 @@ def config_schema() -> dict[str, Any]:
 
 
 def _read(path: Path) -> Document:
+    if path.exists() and not path.is_file():
+        raise ConfigError(f"{path}: is no file.")
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:

@@ -8,6 +8,16 @@ import yaml
 from paramreduce_cli.errors import Key
 
 _DEEPEST = 50
+_MOST_TEXT = 1_000_000
+"""Characters; a config of a hundred bodies has a hundred thousand."""
+_MOST_VALUES = 20_000
+"""Of a config, as often as aliases repeat them."""
+_LARGEST_INTEGER = 2**53
+"""Beyond it an integer is no exact number of a computer's arithmetic."""
+_SHOWN = 60
+"""Characters of a value in a message."""
+_UNREADABLE = (ValueError, KeyError, AttributeError, TypeError, OverflowError)
+"""What PyYAML raises where a value does not fit the tag it is given."""
 
 
 @dataclass
@@ -42,20 +52,41 @@ def read_yaml(text: str, source: str) -> Document:
     Raises:
         yaml.YAMLError: It is not YAML.
     """
+    if len(text) > _MOST_TEXT:
+        raise yaml.YAMLError(f"it has {len(text)} characters, which is more than a config needs")
     loader = yaml.SafeLoader(text)
     try:
         node = loader.get_single_node()
         document = Document(source, None)
         if node is not None:
+            if _count(node, {}, 0) > _MOST_VALUES:
+                raise yaml.YAMLError(
+                    f"it holds more than {_MOST_VALUES} values, aliases written out"
+                )
             document.data = _build(loader, node, (), document)
         return document
+    except RecursionError as error:
+        raise yaml.YAMLError(_TOO_DEEP) from error
     finally:
         loader.dispose()
 
 
+_TOO_DEEP = "it refers to itself, or is nested too deep"
+
+
+def _count(node: yaml.Node, known: dict[int, int], depth: int) -> int:
+    """Values in a node, as often as aliases repeat them; each node is looked at once."""
+    if depth > _DEEPEST:
+        raise yaml.YAMLError(_TOO_DEEP)
+    if id(node) not in known:
+        inner = node.value if isinstance(node, yaml.CollectionNode) else []
+        if isinstance(node, yaml.MappingNode):
+            inner = [part for pair in node.value for part in pair]
+        known[id(node)] = 1 + sum(_count(part, known, depth + 1) for part in inner)
+    return known[id(node)]
+
+
 def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Document) -> Any:
-    if len(path) > _DEEPEST:
-        raise yaml.YAMLError("it refers to itself, or is nested too deep")
     document.lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         own = {id(key) for key, _ in node.value}
@@ -74,12 +105,19 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Docume
         return result
     if isinstance(node, yaml.SequenceNode):
         return [_build(loader, item, (*path, k), document) for k, item in enumerate(node.value)]
+    line = node.start_mark.line + 1
+    shown = repr(node.value if len(node.value) <= _SHOWN else f"{node.value[:_SHOWN]}...")
     try:
-        return loader.construct_object(node, deep=True)
-    except ValueError as error:
-        line = node.start_mark.line + 1
-        document.problems.append((line, f"{node.value!r} cannot be read: {error}"))
+        value = loader.construct_object(node, deep=True)
+    except _UNREADABLE as error:
+        kind = node.tag.rpartition(":")[2]
+        reason = error if isinstance(error, ValueError) else f"it is no {kind}"
+        document.problems.append((line, f"{shown} cannot be read: {reason}"))
         return None
+    if isinstance(value, int) and abs(value) > _LARGEST_INTEGER:
+        document.problems.append((line, f"{shown} is too large"))
+        return None
+    return value
 
 
 def apply_override(document: Document, text: str) -> None:
@@ -92,9 +130,11 @@ def apply_override(document: Document, text: str) -> None:
     if not separator or not key.strip():
         raise ValueError(f"--set {text}: write KEY=VALUE, such as trajectories.count=3")
     try:
-        parsed = yaml.safe_load(value)
+        given = read_yaml(value, "")
     except yaml.YAMLError as error:
         raise ValueError(f"--set {text}: the value is not YAML") from error
+    if given.problems:
+        raise ValueError(f"--set {text}: {given.problems[0][1]}")
     steps: list[str | int] = []
     where = document.data
     names = key.strip().split(".")
@@ -108,7 +148,7 @@ def apply_override(document: Document, text: str) -> None:
             raise ValueError(f"--set {text}: {'.'.join(names[:k])} has no keys of its own")
         steps.append(step)
         if k == len(names) - 1:
-            where[step] = parsed
+            where[step] = given.data
         else:
             if isinstance(where, dict) and where.get(name) is None:
                 where[step] = {}

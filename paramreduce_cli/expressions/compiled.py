@@ -20,7 +20,8 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.expressions.cache import cache_folder, keep, kept
 from paramreduce_cli.records import FloatArray
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
@@ -115,7 +116,12 @@ def _pointers(arrays: list[FloatArray]) -> ctypes.Array:
 @cache
 def compiler() -> tuple[str, ...] | None:
     """The C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none."""
-    wanted = shlex.split(os.environ.get("CC", ""))
+    try:
+        wanted = shlex.split(os.environ.get("CC", ""))
+    except ValueError as error:
+        raise ConfigError(
+            f"the variable CC holds no command: {error}. Unset it or mend it."
+        ) from error
     names = [wanted[0]] if wanted else ["gcc", "cc"]
     path = next((path for name in names if (path := shutil.which(name))), None)
     found = (path, *wanted[1:]) if path is not None else None
@@ -127,24 +133,6 @@ def compiler() -> tuple[str, ...] | None:
             stacklevel=2,
         )
     return found
-
-
-def cache_folder() -> Path:
-    """Where compiled models are kept: ``$PARAMREDUCE_CACHE`` or the user's cache."""
-    named = os.environ.get("PARAMREDUCE_CACHE")
-    if named:
-        return Path(named)
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
-
-
-@cache
-def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
-    return tempfile.TemporaryDirectory(prefix="paramreduce-")
-
-
-def _folder_of_this_process() -> Path:
-    """Where compiled models go if the user's cache cannot be written; removed at the end."""
-    return Path(_temporary_folder().name)
 
 
 def load(text: str) -> ctypes.CDLL | None:
@@ -162,19 +150,10 @@ def load(text: str) -> ctypes.CDLL | None:
     digest = hashlib.sha256(
         "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
     ).hexdigest()
+    library = cache_folder() / f"{digest[:32]}.so"
     try:
-        folder = cache_folder()
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError:
-        folder = _folder_of_this_process()
-    library = folder / f"{digest[:32]}.so"
-    try:
-        if library.exists():
-            try:
-                return ctypes.CDLL(str(library))
-            except OSError:
-                library.unlink(missing_ok=True)  # damaged: compile it again
-        _compile([*cc, *_FLAGS], text, library)
+        if not kept(library):
+            _compile([*cc, *_FLAGS], text, library)
         return ctypes.CDLL(str(library))
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)
@@ -200,7 +179,7 @@ def _c_text(function: ca.Function) -> str:
 
 
 def _compile(command: list[str], text: str, library: Path) -> None:
-    """Compile beside the target and rename, so that parallel runs never load half a file."""
+    """Compile beside the target, so that parallel runs never load half a file."""
     with tempfile.TemporaryDirectory(dir=library.parent) as folder:
         source = Path(folder, "kernel.c")
         source.write_text(text)
@@ -211,4 +190,4 @@ def _compile(command: list[str], text: str, library: Path) -> None:
             capture_output=True,
             text=True,
         )
-        built.replace(library)
+        keep(built, library)

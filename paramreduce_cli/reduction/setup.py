@@ -1,11 +1,13 @@
 """What a config asks of a selection: columns and groups, effort, and the problem of an estimation set."""
 
+import warnings
+
 import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.multibody.base_parameters import affecting_columns
-from paramreduce_cli.records import FloatArray, Model, Run, Samples
+from paramreduce_cli.records import BoolArray, FloatArray, Model, Run, Samples
 from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort
@@ -34,6 +36,35 @@ def effort(wanted: ReductionSection, run: Run) -> Effort:
     )
 
 
+SIZES = (1e-100, 1e100)
+"""Of numbers whose squares a computer can hold."""
+
+
+def _check_sizes(what: str, values: FloatArray) -> None:
+    largest = float(np.abs(values).max())
+    small, large = SIZES
+    if np.isnan(largest) or largest > large or 0 < largest < small:
+        raise DataError(
+            f"the {what} of the estimation set: the largest number is {largest:.3g}, which is too "
+            f"{'small' if largest < small else 'large'} to calculate with. Bring SI units."
+        )
+
+
+def _remark_on_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
+    lengths = np.linalg.norm(W, axis=0)
+    small = np.flatnonzero((lengths > 0) & ~affecting)
+    if small.size:
+        largest = int(np.argmax(lengths))
+        warnings.warn(
+            f"{small.size} columns of the observation matrix count as zero beside {names[largest]}, "
+            f"which is up to {lengths[largest] / lengths[small].min():.2g} times longer: "
+            f"{', '.join(names[k] for k in small[:5])}{', ...' if small.size > 5 else ''}; give that "
+            "parameter another unit if they matter",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+
+
 def selection_problem(
     factor: FloatArray, model: Model | None, grouped: GroupedColumns
 ) -> SelectionProblem:
@@ -43,13 +74,15 @@ def selection_problem(
         DataError: There is nothing to choose from, or nothing to explain.
     """
     W, chi = factor[:, :-1], factor[:, -1]
-    if not np.isfinite(factor).all():
-        raise DataError("the observation matrix holds numbers too large to calculate with.")
+    _check_sizes("observation matrix", W)
     if not np.any(chi):
         raise DataError("the torques of the estimation set are all zero: nothing to explain.")
-    affecting = affecting_columns(W)
+    _check_sizes("torques", chi)
     if model is not None:
         affecting = model.affecting @ grouped.columns.expansion > 0
+    else:
+        affecting = affecting_columns(W)
+        _remark_on_small_columns(W, affecting, grouped.columns.names)
     candidates = np.flatnonzero(affecting)
     if candidates.size == 0:
         raise DataError("no column of the observation matrix differs from zero: nothing to choose.")

@@ -37,7 +37,7 @@ from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
 from paramreduce_cli.reduction.objective import Objective
-from paramreduce_cli.reduction.setup import effort, selection_columns, selection_problem
+from paramreduce_cli.reduction.setup import SIZES, effort, selection_columns, selection_problem
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
@@ -97,10 +97,13 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
         weights = samples.nominal_torque
     else:
         weights = standard_deviation(block.tau for block in samples.estimation.blocks())
-    if not np.all(weights > 0):
+    small, large = SIZES
+    good = (weights > small) & (weights < large)
+    if not good.all():
         raise DataError(
-            f"joint {int(np.argmin(weights)) + 1} has no torque to weigh its errors by. Give "
-            "nominal_torque, in N m (N for a prismatic joint)."
+            f"joint {int(np.argmin(good)) + 1} has no torque to weigh its errors by, or one too "
+            "small or too large to calculate with. Bring SI units, or give nominal_torque, in N m (N "
+            "for a prismatic joint)."
         )
     return weights
 

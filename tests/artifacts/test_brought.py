@@ -11,7 +11,9 @@ HEADER = "t,z1,z2,dz1,dz2,ddz1,ddz2,tau1,tau2"
 
 
 def table(rows=20, columns=9):
-    return np.random.default_rng(0).normal(size=(rows, columns))
+    data = np.random.default_rng(0).normal(size=(rows, columns))
+    data[:, 0].sort()  # time goes on
+    return data
 
 
 def write_csv(path, header=HEADER, data=None):
@@ -54,6 +56,9 @@ def test_states_from_hdf5(tmp_path):
         (HEADER, table(3), "3 samples are too few"),
         (HEADER, np.where(np.arange(180).reshape(20, 9) == 58, np.nan, table()), "data row 7"),
         (HEADER, np.where(np.arange(180).reshape(20, 9) == 58, np.inf, table()), "data row 7"),
+        (HEADER.replace("dz1", "z3", 1), None, "a column z3, but the robot has 2 joints"),
+        (HEADER, table()[::-1], "the time does not go on from data row 1 to 2"),
+        (HEADER, table() * [0, 1, 1, 1, 1, 1, 1, 1, 1], "the time does not go on"),
         (HEADER + ",extra", None, "line 2: 9 values under 10 headings"),
     ],
 )

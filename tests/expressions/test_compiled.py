@@ -1,3 +1,4 @@
+import os
 import warnings
 
 import casadi as ca
@@ -62,3 +63,47 @@ def test_a_compiler_that_fails_is_survived(monkeypatch, tmp_path):
 def test_states_that_do_not_fit_are_refused():
     with pytest.raises(ValueError):
         example()(np.zeros((4, 2)), np.zeros((4, 4)))
+
+
+def libraries():
+    return sorted(compiled.cache_folder().glob("*.so"))
+
+
+needs_compiler = pytest.mark.skipif(compiled.compiler() is None, reason="there is no C compiler")
+
+
+@needs_compiler
+@pytest.mark.parametrize("place", [0, 0.3, 0.5, 0.99, None])
+def test_a_damaged_library_is_never_loaded(place):
+    check(example())
+    (library,) = libraries()
+    whole = library.read_bytes()
+    wrong = bytearray(whole)
+    if place is None:
+        del wrong[-10:]
+    else:
+        wrong[int(place * len(whole))] ^= 1
+    library.unlink()  # the mapped one lives on
+    library.write_bytes(wrong)
+    check(example())
+    assert libraries() == [library]
+    assert library.read_bytes() != wrong
+
+
+@needs_compiler
+def test_a_folder_that_others_can_write_to_is_not_trusted():
+    folder = compiled.cache_folder()
+    folder.chmod(0o777)
+    with pytest.warns(ParamreduceWarning, match="can be written by others"):
+        check(example())
+    assert not list(folder.glob("*.so"))
+
+
+@needs_compiler
+def test_libraries_that_were_not_used_for_long_go():
+    old = compiled.cache_folder() / "old.so"
+    old.write_bytes(b"something")
+    os.utime(old, (0, 0))
+    check(example())
+    assert len(libraries()) == 1
+    assert not old.exists()

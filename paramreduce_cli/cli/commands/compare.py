@@ -4,7 +4,7 @@ from pathlib import Path
 
 import click
 
-from paramreduce_cli.cli.summaries import load_summary
+from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
@@ -32,7 +32,8 @@ def compare(first: Path, second: Path, given: tuple[str, ...], only: tuple[str, 
     """
     summaries = [load_summary(path) for path in (first, second)]
     for path, summary in zip((first, second), summaries, strict=True):
-        if "proofs" not in summary.get("reduction", {}):
+        reduction = summary.get("reduction")
+        if not isinstance(reduction, dict) or "proofs" not in reduction:
             raise ConfigError(
                 f"{path}: is a summary of an older version; make it again with `paramreduce run`."
             )

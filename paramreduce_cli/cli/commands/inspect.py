@@ -7,8 +7,8 @@ import rich.markup
 import rich.table
 
 from paramreduce_cli.artifacts.inspection import contents
-from paramreduce_cli.cli.summaries import load_summary
-from paramreduce_cli.cli.terminal import out, say
+from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.cli.terminal import harmless, out, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import ModelChoice, Reduction
 
@@ -36,7 +36,7 @@ def inspect(file: Path, chosen: str | None) -> None:
     for heading in ("dataset", "shape", "content"):
         table.add_column(heading, overflow="fold")
     for row in datasets:
-        table.add_row(*(rich.markup.escape(cell) for cell in row))
+        table.add_row(*(rich.markup.escape(harmless(cell)) for cell in row))
     out.print(table)
 
 

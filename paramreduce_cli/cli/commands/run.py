@@ -8,7 +8,7 @@ import click
 import rich.box
 import rich.table
 
-from paramreduce_cli.artifacts.report_files import load_json
+from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.options import (
     CONFIG,
     FORCE,
@@ -63,7 +63,7 @@ def run(
                 outcome = runner.run(stage, force=force)
             if not quiet:
                 say_outcome(outcome)
-    summary = load_json(store.path(Report))
+    summary = load_summary(store.path(Report))
     if not quiet:
         _say_summary(summary)
         say(f"Report: {store.path(Report).with_name('index.html')}")

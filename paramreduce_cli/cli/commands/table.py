@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.atomic import atomically
-from paramreduce_cli.cli.summaries import load_summary
+from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.overview import overview, overview_row

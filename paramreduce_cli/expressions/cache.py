@@ -1,0 +1,100 @@
+"""Compiled libraries in the user's cache: checked before they are loaded, and not kept for ever.
+
+A library is kept with its SHA-256 behind it, which a loader of programs does not look at.
+"""
+
+import hashlib
+import os
+import stat
+import tempfile
+import time
+import warnings
+from functools import cache
+from pathlib import Path
+
+from paramreduce_cli.errors import ParamreduceWarning
+
+_DIGEST = 32
+"""Bytes of a SHA-256."""
+_OLDEST = 90 * 24 * 3600.0
+"""Seconds after its last use that a library is kept."""
+_MOST = 512 * 2**20
+"""Bytes of all libraries together; of more the ones used longest ago go."""
+
+
+def cache_folder() -> Path:
+    """Where compiled models are kept: ``$PARAMREDUCE_CACHE`` or the user's cache.
+
+    A temporary folder of this process where that cannot be made, or where others could put
+    something there that would be run.
+    """
+    try:
+        folder = _wanted_folder()
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = folder.stat()
+    except (OSError, RuntimeError):  # the latter where there is no home
+        return Path(_temporary_folder().name)
+    others = stat.S_IWGRP | stat.S_IWOTH
+    if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & others):
+        warnings.warn(
+            f"{folder} can be written by others, so no compiled models are taken from there or kept; "
+            "`chmod go-w` it, or name another folder in PARAMREDUCE_CACHE",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+        return Path(_temporary_folder().name)
+    return folder
+
+
+def _wanted_folder() -> Path:
+    named = os.environ.get("PARAMREDUCE_CACHE")
+    if named:
+        return Path(named)
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
+
+
+@cache
+def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="paramreduce-")
+
+
+def kept(library: Path) -> bool:
+    """Whether a library is there and whole; it counts as used, one that is damaged is removed."""
+    try:
+        content = library.read_bytes()
+        if hashlib.sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]:
+            os.utime(library)
+            return True
+        library.unlink(missing_ok=True)
+    except OSError:
+        pass
+    return False
+
+
+def keep(built: Path, library: Path) -> None:
+    """Put a library that was built beside it in its place, whole or not at all; old ones go.
+
+    Raises:
+        OSError: It cannot be written.
+    """
+    with built.open("r+b") as file:
+        digest = hashlib.sha256(file.read()).digest()
+        file.write(digest)
+        file.flush()
+        os.fsync(file.fileno())
+    _prune(library.parent, library)
+    built.replace(library)
+
+
+def _prune(folder: Path, new: Path) -> None:
+    found = []
+    for path in folder.glob(f"*{new.suffix}"):
+        try:
+            found.append((path.stat().st_mtime, path.stat().st_size, path))
+        except OSError:  # another process was faster
+            continue
+    total, oldest = 0, time.time() - _OLDEST
+    for used, size, path in sorted(found, reverse=True):
+        total += size
+        if used < oldest or total > _MOST:
+            path.unlink(missing_ok=True)

@@ -1,0 +1,184 @@
+"""Input that nobody means to give: one message each and exit code 2, at once and in little memory."""
+
+import os
+import resource
+import subprocess
+import sys
+
+import h5py
+import numpy as np
+import pytest
+from conftest import TWO_LINK
+
+ALIASES = "a0: &a0 [x, x]\n" + "".join(
+    f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 9)
+)
+MERGES = "a0: &a0 {x: 1}\n" + "".join(
+    f"a{k}: &a{k}\n  <<: [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 40)
+)
+SECONDS, MEGABYTES = 5, 400  # with 1 s and 200 MB asked for; a busy machine takes longer
+
+
+def limited():
+    resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS))
+
+
+def command(*arguments, **options):
+    """The command line in a process of its own."""
+    return subprocess.run(
+        [sys.executable, "-m", "paramreduce_cli", *map(str, arguments)],
+        capture_output=True, check=False, timeout=120, **options,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (ALIASES, "holds more than"),
+        (MERGES, "holds more than"),
+        ("a: &a [*a]", "refers to itself"),
+        ("[" * 900, "nested too deep"),
+        ("x: " + "[" * 5000 + "]" * 5000, "nested too deep"),
+        ("robot: !unknown 3", "could not determine a constructor"),
+        ("".join(f"k{k}: 1\n" for k in range(30_000)), "holds more than"),
+        ("".join(f"k{k}: 1\n" for k in range(3_000)), "more problems like these"),
+        ("x: '" + "y" * 2_000_000 + "'", "more than a config needs"),
+    ],
+    ids=["aliases", "merges", "itself", "brackets", "nesting", "tag", "keys", "fewer keys", "long"],
+)
+def test_yaml_that_would_take_for_ever(tmp_path, text, says):
+    path = tmp_path / "bomb.yaml"
+    path.write_text(text)
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    done = command("build-model", path, preexec_fn=limited)
+    assert done.returncode == 2
+    assert says in done.stderr.decode()
+    assert len(done.stderr) < 20_000
+    after = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    assert after == before or after < MEGABYTES * 1024
+
+
+@pytest.mark.parametrize(
+    "value",
+    ["1" + "0" * 400, "9" * 5000, "!!bool x", "!!timestamp x", "!!int x", "!!float x", "2001-99-99",
+     "1e400", "{[1]: 2}", "null", "[1]"],
+)  # fmt: skip
+@pytest.mark.parametrize("key", ["gravity: [0, -9.81, 0]", "  count: 2", "  seed: 0"])
+def test_values_that_do_not_fit(invoke, write_config, value, key):
+    name, separator, _ = key.partition(": ")
+    if key not in TWO_LINK.read_text():
+        pytest.skip(f"the config has no {key}")
+    refused = invoke("build-model", write_config((key, f"{name}{separator}{value}")), code=2)
+    assert "Error: " in refused.err
+    assert len(refused.err) < 2000
+    refused = invoke("build-model", TWO_LINK, settings=[f"{name.strip()}={value}"], code=2)
+    assert "Error: " in refused.err
+
+
+@pytest.mark.parametrize("text", ["[1]", "null", "3", '"a"', "{}", "[" * 900, '{"reduction": 1}'])
+@pytest.mark.parametrize("command", ["compare", "table", "inspect"])
+def test_summaries_that_are_none(invoke, tmp_path, text, command):
+    path = tmp_path / "summary.json"
+    path.write_text(text)
+    if command == "inspect" and text in ("{}", '{"reduction": 1}'):
+        pytest.skip("nothing is asked of it")
+    assert "Error: " in invoke(command, *[path] * (1 + (command == "compare")), code=2).err
+
+
+@pytest.fixture
+def brought(tmp_path):
+    """Writes an observation matrix with torques; returns what to call."""
+
+    def write(W, tau, links=()):
+        path = tmp_path / "samples.h5"
+        with h5py.File(path, "w") as file:
+            for name, value in (("estimation/W", W), ("estimation/tau", tau)):
+                if isinstance(value, tuple):
+                    file.create_dataset(name, value, "f8", chunks=(100, value[1]))
+                else:
+                    file[name] = value
+            for name, link in links:
+                file.pop(name, None)
+                file[name] = link
+        return "reduce", "--samples", path, "--results", tmp_path / "r"
+
+    return write
+
+
+W = np.random.default_rng(0).normal(size=(300, 5))
+TAU = (W @ np.arange(1.0, 6)).reshape(150, 2)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "torques", "says"),
+    [
+        (W, TAU * 1e200, "too small or too large to calculate with"),
+        (W, TAU * 1e-300, "too small or too large to calculate with"),
+        (W * 1e160, TAU, "too large to calculate with"),
+        (W * 1e-200, TAU, "too small to calculate with"),
+        ((10**10, 2), (5 * 10**9, 2), "declares 10000000000 x 2 numbers, but holds hardly any"),
+        (W, (150, 2), "no torque to weigh"),
+    ],
+)
+def test_numbers_beyond_all_measure(invoke, brought, matrix, torques, says):
+    assert says in invoke(*brought(matrix, torques), code=2).err
+
+
+def test_long_doubles_are_read(invoke, brought, tmp_path):
+    invoke(*brought(W.astype(np.longdouble), TAU.astype(np.longdouble)))
+    with h5py.File(tmp_path / "r" / "reduction.h5") as file:
+        assert file["forward-selection/torque_error"][4] < 1e-12
+
+
+def test_columns_that_count_as_zero_are_named(invoke, brought):
+    done = invoke(*brought(W * [1, 1e14, 1, 1, 1], TAU))
+    assert "4 columns of the observation matrix count as zero beside p2" in done.err
+
+
+def test_links_out_of_a_file_are_not_followed(invoke, brought, tmp_path):
+    with h5py.File(tmp_path / "other.h5", "w") as file:
+        file["W"] = W
+    link = h5py.ExternalLink(str(tmp_path / "other.h5"), "/W")
+    refused = invoke(*brought(W, TAU, [("estimation/W", link)]), code=2)
+    assert "/estimation/W is in another file" in refused.err
+
+
+def test_a_pipe_is_no_file(invoke, tmp_path):
+    pipe = tmp_path / "pipe.h5"
+    os.mkfifo(pipe)
+    for arguments in (
+        ("inspect", pipe),
+        ("build-model", pipe),
+        ("compare", pipe, pipe),
+        ("reduce", "--samples", pipe, "--results", tmp_path / "r"),
+    ):
+        assert "is no file" in invoke(*arguments, code=2).err
+
+
+def test_names_cannot_steer_the_terminal(invoke, brought, tmp_path):
+    names = np.array(["a", "\x1b[31mred\x1b[0m", "c", "d", "e"], dtype=h5py.string_dtype())
+    invoke(*brought(W, TAU, [("parameters/names", names)]))
+    out = invoke("inspect", tmp_path / "r" / "reduction.h5", "--model", "qr:5").out
+    assert r"\x1b[31mred" in out
+    assert "\x1b" not in out
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{"COLUMNS": "0"}, {"PYTHONIOENCODING": "ascii"}, {"HOME": None, "XDG_CACHE_HOME": None}],
+)
+def test_odd_surroundings(two_link_results, changes):
+    environment = {k: v for k, v in {**os.environ, **changes}.items() if v is not None}
+    environment.pop("PARAMREDUCE_CACHE", None)
+    run = command("run", TWO_LINK, "--results", two_link_results, env=environment)
+    assert run.returncode == 0, run.stderr
+    assert b"forward-selection" in run.stdout
+    done = command("inspect", two_link_results / "model.h5", env=environment)
+    assert b"/parameters/values" in done.stdout
+
+
+def test_a_compiler_that_cannot_be_read(two_link_results, tmp_path):
+    environment = {**os.environ, "CC": "gcc '"}
+    arguments = ("sample", TWO_LINK, "--results", two_link_results, "--force")
+    done = command(*arguments, env=environment)
+    assert (done.returncode, b"CC holds no command" in done.stderr) == (2, True)

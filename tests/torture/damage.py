@@ -1,0 +1,78 @@
+"""Bytes of artifacts flipped and files cut off: what is read is right, or refused."""
+
+import dataclasses
+from collections import Counter
+
+import numpy as np
+
+from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.records import Report
+
+RECORDS = (*LAYOUTS, Report)
+
+
+def read(store, record):
+    """All that a file holds, as something that can be compared."""
+    if record is Report:
+        return load_summary(store.path(record))
+    return plain(load_file(store.path(record), record, None, "")[0])
+
+
+def plain(value):
+    if hasattr(value, "blocks"):  # read in slices
+        return [plain(list(value.blocks())), plain(value.factors())]
+    if dataclasses.is_dataclass(value):
+        return [plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
+    if isinstance(value, np.ndarray):
+        return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, dict):
+        return [[key, plain(entry)] for key, entry in value.items()]
+    return [plain(entry) for entry in value] if isinstance(value, tuple | list) else value
+
+
+def outcome(store, record, expected):
+    """What became of a damaged file: noticed or harmless; or silently wrong, which must not be."""
+    whole = store.is_whole(record)
+    try:
+        same = read(store, record) == expected
+    except ArtifactError:
+        return "noticed" if not whole else "noticed by its reader alone"
+    if same:
+        return "harmless"
+    return "silently wrong"
+
+
+def damaged(content, rng):
+    """A copy with a byte flipped or, one time in ten, cut off."""
+    place = int(rng.integers(len(content)))
+    if rng.random() < 0.1:
+        return content[:place]
+    flipped = content[place] ^ int(rng.integers(1, 256))
+    return content[:place] + bytes([flipped]) + content[place + 1 :]
+
+
+def try_damage(results, count, seed=0):
+    """Damage the files of a finished run, one at a time.
+
+    Args:
+        results: Folder of the run; it is copied.
+        count: How often each file is damaged.
+        seed: Of the places.
+
+    Returns:
+        How often each thing happened, by file.
+    """
+    rng = np.random.default_rng(seed)
+    store = Store(results)
+    found = {}
+    for record in RECORDS:
+        path = store.path(record)
+        content, expected = path.read_bytes(), read(store, record)
+        found[path.name] = Counter()
+        for _ in range(count):
+            path.write_bytes(damaged(content, rng))
+            found[path.name][outcome(store, record, expected)] += 1
+        path.write_bytes(content)
+    return found
