@@ -115,7 +115,7 @@ def _pool(task: ExcitationTask, jobs: int, run: Run) -> Iterator[ProcessPoolExec
     news: Queue[Progress | None] = context.Queue()
     listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
     listener.start()
-    pool = ProcessPoolExecutor(jobs, context, _start_worker, (task, news))
+    pool = ProcessPoolExecutor(jobs, context, _start_worker, (os.getpid(), task, news))
     try:
         yield pool
         pool.shutdown()
@@ -158,10 +158,11 @@ class _Worker:
     news: Queue[Progress | None]
 
 
-def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
+def _start_worker(parent: int, task: ExcitationTask, news: Queue[Progress | None]) -> None:
+    # First of all, with the number that the parent gave: it may be gone already.
+    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
     threadpoolctl.threadpool_limits(1)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
     _Worker.task, _Worker.news = task, news
@@ -171,7 +172,7 @@ def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
 def _end_with(parent: int) -> None:
     """End this process when its parent is gone, however that ended."""
     while os.getppid() == parent:
-        time.sleep(1.0)
+        time.sleep(0.5)
     os._exit(1)
 
 

@@ -3,8 +3,10 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
+from conftest import TWO_LINK
 
 PARAMREDUCE = [sys.executable, "-m", "paramreduce_cli"]
 
@@ -74,3 +76,23 @@ def test_killed_it_leaves_no_lock_behind(arguments, tmp_path):
         os.killpg(process.pid, signal.SIGKILL)
     done = finish("build-model", *arguments)
     assert done.returncode == 0, done.stderr
+
+
+def workers_of(process):
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+    return children.read_text().split() if children.exists() else []
+
+
+@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="processes are seen in /proc")
+@pytest.mark.parametrize("later", [0.0, 0.4, 1.2])
+def test_workers_end_with_a_parent_that_is_killed_while_they_start(tmp_path, later):
+    arguments = [TWO_LINK, "--results", tmp_path]
+    assert finish("build-model", *arguments).returncode == 0
+    many = ["--jobs", "2", "--set", "trajectories.count=200"]
+    with started(["optimize-trajectories", *arguments, *many]) as process:
+        wait_until(lambda: len(workers_of(process)) >= 2)
+        time.sleep(later)
+        process.kill()
+        process.wait()
+        wait_until(lambda: not _session_alive(process.pid), 15)
+        assert not _session_alive(process.pid)
