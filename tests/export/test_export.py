@@ -53,6 +53,33 @@ def c_test(name, folder, code=0):
     return run_c(folder, f"{name}.c", f"{name}_test.c", code=code)
 
 
+WARNINGS = ["-Wall", "-Wextra", "-Wconversion", "-pedantic", "-Werror"]
+COMPILERS = {
+    "gcc": ["gcc", "-std=c99"], "clang": ["clang", "-std=c99"],
+    "g++": ["g++", "-x", "c++", "-std=c++17"], "clang++": ["clang++", "-x", "c++", "-std=c++17"],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("single", [False, True])
+@pytest.mark.parametrize("compiler", list(COMPILERS))
+def test_c_is_clean_at_every_level_of_optimisation(model, tmp_path, compiler, single):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"there is no {compiler}")
+    write(model, tmp_path, "c", single=single)
+    sources = [path.name for path in tmp_path.glob("*.c")]
+    for level in range(4):
+        run([*COMPILERS[compiler], f"-O{level}", *WARNINGS, "-o", "t", *sources, "-lm"], tmp_path)
+
+
+@needs_gcc
+def test_c_is_clean_with_sanitizers(model, tmp_path):
+    write(model, tmp_path, "c")
+    sanitize = ["-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    sources = [path.name for path in tmp_path.glob("*.c")]
+    run(["gcc", "-g", *sanitize, "-o", "t", *sources, "-lm"], tmp_path)
+    run(["./t"], tmp_path)
+
+
 @needs_gcc
 @pytest.mark.parametrize("what", list(Exported))
 @pytest.mark.parametrize("text", ["full", "base"])
