@@ -9,7 +9,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 1)
 PAPER := puma560 hexaglide
 SMALL := two_link four_bar five_bar rssr
 
-.PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark graph clean
+.PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make regression  compare with the committed references"
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios"
+	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
 $(VENV)/.installed: pyproject.toml
@@ -80,6 +81,11 @@ reference: $(REFERENCES)
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
+
+# Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
+SHARE ?= 1
+torture: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.torture --share $(SHARE)
 
 graph: $(VENV)/.installed
 	$(PARAMREDUCE) graph --format make > pipelines/stages.mk

@@ -12,9 +12,9 @@ def say_outcome(outcome: Outcome) -> None:
     say(f"{outcome.stage}: {state}, {outcome.path}")
 
 
-def say_verdict(accepted: bool, verdict: str, quiet: bool) -> int:
+def say_verdict(accepted: bool | None, verdict: str, quiet: bool) -> int:
     """Say whether the selected model is accepted; returns the exit code."""
-    if not accepted:
+    if accepted is False:
         complain(f"Not accepted: {verdict}")
         return NOT_ACCEPTED
     if not quiet:

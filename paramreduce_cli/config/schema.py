@@ -104,6 +104,8 @@ class SamplingSection(Section):
     """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
     validation_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
+    torques: Literal["measured", "model"] = "measured"
+    """Of recorded states: measured ones, which the files must hold, or those of the model, whatever they hold."""
     symmetries: list[Annotated[list[str], Field(min_length=1)]] = []
     """Symmetries of the mechanism that complete the estimation set: each lists, for every independent coordinate in turn, the one that moves in its place, `-NAME` where it moves the other way."""
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"

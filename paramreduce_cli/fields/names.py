@@ -12,13 +12,15 @@ from paramreduce_cli.registry import offered
 
 _HEURISTICS = "reduction/heuristics"
 _TORQUE_ONLY = "reduction/heuristics/torque_only"
+_NEAR = 0.72
+"""Likeness from which on a name is a slip of another, and not a word of its own."""
 _CRITERIA = "reduction/criteria"
 
 
 def nearest(name: str, known: Iterable[str]) -> str | None:
     """The known name most like ``name``, None if none is near."""
     folded = {candidate.lower().replace("_", "-"): candidate for candidate in known}
-    close = difflib.get_close_matches(name.lower().replace("_", "-"), folded, n=1, cutoff=0.55)
+    close = difflib.get_close_matches(name.lower().replace("_", "-"), folded, n=1, cutoff=_NEAR)
     return folded[close[0]] if close else None
 
 

@@ -14,8 +14,10 @@ _NEGLIGIBLE = 1e-6
 
 def verdict(
     limits: Acceptance, selected: Selected, result: HeuristicValidation
-) -> tuple[bool, str]:
-    """Whether the selected model keeps to the limits of the config, and the sentence for it."""
+) -> tuple[bool | None, str]:
+    """Whether the selected model keeps to the limits of the config, None where there are none, and
+    the sentence for it.
+    """
     met: list[str] = []
     missed: list[str] = [selected.missed] if selected.missed else []
     for key in type(limits).model_fields:
@@ -33,7 +35,7 @@ def verdict(
         return False, f"{who} is not accepted: {', '.join(missed)}."
     if met:
         return True, f"{who} is accepted: {', '.join(met)}."
-    return True, f"{who} is not judged: validation.accept sets no limits."
+    return None, f"{who} is not judged: validation.accept sets no limits."
 
 
 def _shown(value: float, relative: bool) -> str:

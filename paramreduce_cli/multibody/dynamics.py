@@ -134,6 +134,18 @@ class Dynamics:
         both = flat.reshape(-1, n * (n + 1), self.n_parameters)
         return both[:, : n * n].reshape(-1, n, n, self.n_parameters), both[:, n * n :]
 
+    def accelerations(self, phi: FloatArray) -> ca.Function:
+        """Accelerations of an open tree by coordinates, velocities and torques, of symbols.
+
+        Args:
+            phi: Values of the standard parameters, (n_parameters,).
+        """
+        M, delta = ca.substitute(list(self._direct_q), [self._phi], [ca.SX(phi)])
+        tau = ca.SX.sym("tau", self.n_dof)
+        D, LT, order = ca.ldl(M)
+        ddq = ca.cse(ca.ldl_solve(tau - delta, D, LT, order))
+        return ca.Function("accelerations", [self._q, self._dq, tau], [ddq])
+
     def observation(self, columns: IntArray) -> ObservationFunction:
         """W of a set of columns along a trajectory, and its adjoint."""
         K = ca.densify(ca.jacobian(self._tau, self._phi))[:, columns.tolist()]

@@ -120,7 +120,8 @@ class Validation:
     """By growing n."""
     stability: Stability | None
     """Of the selected subset, where it was asked for."""
-    accepted: bool
+    accepted: bool | None
+    """None where nothing is judged."""
     verdict: str
     """One sentence that says why."""
     remarks: tuple[Remark, ...]

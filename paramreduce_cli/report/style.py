@@ -66,6 +66,7 @@ def render(
         for name in formats:
             buffer = io.BytesIO()
             drawn.savefig(buffer, format=name, **FORMATS[name])
+            drawn.set_layout_engine("none")  # the others keep what was laid out for the first
             result[name] = buffer.getvalue()
     return result
 

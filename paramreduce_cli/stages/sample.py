@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -40,7 +41,7 @@ def sample(
 
     def observed(name: str, recording: Recording | None, points: int | None) -> ObservedSet:
         if recording is not None:
-            return _recorded(model, dynamics, recording)
+            return _recorded(sampling, model, dynamics, recording)
         if trajectories is None:
             raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
         series = [trajectory.coefficients for trajectory in getattr(trajectories, name)]
@@ -111,8 +112,18 @@ def _generated(
     )
 
 
-def _recorded(model: Model, dynamics: Dynamics, recording: Recording) -> ObservedSet:
+def _recorded(
+    sampling: SamplingSection, model: Model, dynamics: Dynamics, recording: Recording
+) -> ObservedSet:
     _warn_of_still_joints(model, recording)
+    if sampling.torques == "model":
+        recording = replace(recording, tau=None)
+    elif recording.tau is None:
+        raise ConfigError(
+            f"is measured, but {recording.source} holds no tau. Add the columns, or write `model` to "
+            "have torques of the model.",
+            ("sampling", "torques"),
+        )
     return ObservedSet(
         lambda: _recorded_blocks(recording),
         recording.time.size,

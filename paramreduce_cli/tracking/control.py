@@ -4,7 +4,8 @@ The torques tau = d(z, dz, ddz_d + 2 w (dz_d - dz) + w^2 (z_d - z)) come from th
 and are held for a control period; the arm follows the full one.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,35 +16,51 @@ _STEPS = 2
 
 Torque = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """Torques for z, dz and ddz, (n_paths, n_dof) each."""
+Arm = Callable[[FloatArray, FloatArray, FloatArray], Sequence[FloatArray]]
+"""z and dz a control period later, from z, dz and torques that are held, (n_paths, n_dof) each."""
 
 
-def simulate(paths: Paths, model: Torque, arm: Torque, bandwidth: float) -> FloatArray:
+def simulate(paths: Paths, model: Torque, arm: Arm, bandwidth: float) -> FloatArray:
     """Follow paths with computed torques.
 
     Args:
         paths: The motions that are wanted.
         model: Of the controller.
-        arm: Accelerations of the arm at z and dz under torques.
+        arm: What is controlled.
         bandwidth: Of the feedback, rad/s.
 
     Returns:
         z_d - z, (n_samples, n_paths, n_dof).
     """
-    step = float(paths.time[1] - paths.time[0]) / _STEPS
     z, dz = paths.z[0].copy(), paths.dz[0].copy()
     errors = np.empty_like(paths.z)
     for k in range(paths.time.size):
         errors[k] = paths.z[k] - z
         wanted = paths.ddz[k] + 2 * bandwidth * (paths.dz[k] - dz) + bandwidth**2 * errors[k]
-        tau = model(z, dz, wanted)
-        for _ in range(_STEPS):
-            z, dz = _runge_kutta(z, dz, tau, arm, step)
+        z, dz = arm(z, dz, model(z, dz, wanted))
     return errors
 
 
+def advanced(
+    accelerations: Callable[[Any, Any, Any], Any], period: float, z: Any, dz: Any, tau: Any
+) -> tuple[Any, Any]:
+    """Z and dz a control period later, by steps of Runge and Kutta; numbers or symbols.
+
+    Args:
+        accelerations: Of the arm by z, dz and tau.
+        period: s
+        z: Positions.
+        dz: Velocities.
+        tau: Torques, which are held.
+    """
+    for _ in range(_STEPS):
+        z, dz = _runge_kutta(z, dz, tau, accelerations, period / _STEPS)
+    return z, dz
+
+
 def _runge_kutta(
-    z: FloatArray, dz: FloatArray, tau: FloatArray, arm: Torque, h: float
-) -> tuple[FloatArray, FloatArray]:
+    z: Any, dz: Any, tau: Any, arm: Callable[[Any, Any, Any], Any], h: float
+) -> tuple[Any, Any]:
     a1 = arm(z, dz, tau)
     v2 = dz + h / 2 * a1
     a2 = arm(z + h / 2 * dz, v2, tau)

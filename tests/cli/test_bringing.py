@@ -108,5 +108,11 @@ def test_brought_states_and_torques(invoke, two_link_results, tmp_path, write_co
         summary_of(folder)["selected"]["torque_error"]
         for folder in (tmp_path / "r", two_link_results)
     )
+    (tmp_path / "estimation.csv").write_text(
+        (tmp_path / "estimation.csv").read_text().replace("tau", "current")
+    )
+    refused = invoke("run", path, "--results", tmp_path / "r", code=2)
+    assert "estimation.csv holds no tau" in refused.err
+    invoke("sample", path, "--results", tmp_path / "r", settings=["sampling.torques=model"])
     for which in ("estimation", "validation"):
         assert found[which] == pytest.approx(expected[which], rel=1e-6)

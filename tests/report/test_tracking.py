@@ -1,12 +1,14 @@
 """Computed-torque control on a pendulum whose answer is known, and in the report."""
 
+from functools import partial
+
 import numpy as np
 import pytest
 from conftest import CONFIGS, TWO_LINK
 
 from paramreduce_cli.export import running
 from paramreduce_cli.records import Paths, Tracking
-from paramreduce_cli.tracking.control import simulate
+from paramreduce_cli.tracking.control import advanced, simulate
 from paramreduce_cli.tracking.paths import point_to_point
 
 INERTIA, WEIGHT = 0.4, 3.0
@@ -16,8 +18,12 @@ def arm(z, dz, tau):
     return (tau - WEIGHT * np.cos(z)) / INERTIA
 
 
-def model(share=1.0):
-    return lambda z, dz, ddz: share * INERTIA * ddz + share * WEIGHT * np.cos(z)
+def followed(paths, share=1.0):
+    def model(z, dz, ddz):
+        return share * INERTIA * ddz + share * WEIGHT * np.cos(z)
+
+    period = paths.time[1] - paths.time[0]
+    return simulate(paths, model, partial(advanced, arm, period), 20.0)
 
 
 def path(period=1e-3, moves=3, seeds=range(1, 2)):
@@ -45,12 +51,12 @@ def test_a_path_does_not_depend_on_those_beside_it():
     n = alone.samples[0]
     assert together.samples[2] == n
     np.testing.assert_array_equal(alone.z[:n, 0], together.z[:n, 2])
-    one, many = (simulate(paths, model(0.9), arm, 20.0) for paths in (alone, together))
+    one, many = (followed(paths, 0.9) for paths in (alone, together))
     np.testing.assert_allclose(one[:n, 0], many[:n, 2], rtol=1e-12, atol=1e-15)
 
 
 def test_the_right_model_follows_as_well_as_its_period_allows():
-    coarse, fine = (np.abs(simulate(path(h), model(), arm, 20.0)).max() for h in (4e-3, 1e-3))
+    coarse, fine = (np.abs(followed(path(h))).max() for h in (4e-3, 1e-3))
     assert fine < 1e-4
     assert fine < 0.4 * coarse
 
@@ -59,7 +65,7 @@ def test_a_wrong_model_is_off_by_what_feedback_leaves():
     """At rest w^2 e INERTIA share = (1 - share) WEIGHT cos z."""
     still = np.zeros((3000, 1, 1))
     long = Paths(np.arange(3000) * 1e-3, np.array([3000]), still, still, still)
-    errors = simulate(long, model(0.9), arm, 20.0)
+    errors = followed(long, 0.9)
     expected = 0.1 * WEIGHT / (0.9 * INERTIA * 20.0**2)
     assert errors[-1, 0, 0] == pytest.approx(expected, rel=1e-3)
 

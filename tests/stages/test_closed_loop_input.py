@@ -145,6 +145,7 @@ def test_recordings_beyond_the_reach_of_the_loops(run, tmp_path):
     table.write_text("time,z1,dz1,ddz1\n" + rows)
     settings = [
         "description.tree.independent=[q_rocker]",
+        "sampling.torques=model",
         f"sampling.estimation_file={table}",
         f"sampling.validation_file={table}",
     ]

@@ -1,6 +1,9 @@
-"""Bytes of artifacts flipped and files cut off: what is read is right, or refused."""
+"""Bytes of files flipped, and files cut off: what is read is right, or refused."""
 
 import dataclasses
+import os
+import subprocess
+import sys
 from collections import Counter
 
 import numpy as np
@@ -53,11 +56,47 @@ def damaged(content, rng):
     return content[:place] + bytes([flipped]) + content[place + 1 :]
 
 
+def try_cache(folder, count, seed=0):
+    """Damage a compiled function in the cache; it is made anew and computes the same.
+
+    Args:
+        folder: For a cache of its own.
+        count: How often.
+        seed: Of the places.
+
+    Returns:
+        How often each thing happened.
+    """
+    script = """
+import casadi as ca, numpy as np
+from paramreduce_cli.expressions.compiled import BatchFunction
+x = ca.SX.sym("x", 3)
+found, = BatchFunction([x], [ca.vertcat(ca.sin(x[0]) * x[1], x[2] / x[1])])(np.arange(6.0).reshape(2, 3) + 1)
+print(found.tolist())
+"""
+    environment = {**os.environ, "PARAMREDUCE_CACHE": str(folder / "cache")}
+
+    def computed():
+        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True)
+        return done.stdout
+
+    rng, expected = np.random.default_rng(seed), computed()
+    (library,) = (folder / "cache").glob("*.so")
+    content, found = library.read_bytes(), Counter()
+    for _ in range(count):
+        wrong = damaged(content, rng)
+        library.unlink(missing_ok=True)
+        library.write_bytes(wrong)
+        same = computed() == expected and library.read_bytes() != wrong
+        found["noticed" if same else "wrong"] += 1
+    return found
+
+
 def try_damage(results, count, seed=0):
     """Damage the files of a finished run, one at a time.
 
     Args:
-        results: Folder of the run; it is copied.
+        results: Folder of the run; its files are put back.
         count: How often each file is damaged.
         seed: Of the places.
 
