@@ -2,7 +2,33 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import lru_cache
+from typing import Any, TypeVar, cast
+
 from paramreduce_cli.expressions.graph import ZERO, Graph
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+_MOST = 1 << 12
+"""Results that are remembered of each function."""
+_remembering: list[Any] = []
+
+
+def remembered(function: F) -> F:
+    """A function of expressions that is worked out once for equal arguments.
+
+    Formulations that are compared differ at one joint, and most of what they need is the same.
+    """
+    known = lru_cache(_MOST)(function)
+    _remembering.append(known)
+    return cast(F, known)
+
+
+def forget() -> None:
+    """Drop all that is remembered, and the graphs that it is of."""
+    for known in _remembering:
+        known.cache_clear()
 
 
 class Scalar:
@@ -15,18 +41,27 @@ class Scalar:
 
     __slots__ = ("graph", "value")
 
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Scalar) and other.value == self.value and other.graph is self.graph
+
+    def __hash__(self) -> int:
+        return self.value
+
     def __init__(self, graph: Graph, value: int) -> None:
         self.graph = graph
         self.value = value
 
     def __add__(self, other: Scalar | float) -> Scalar:
-        return Scalar(self.graph, self.graph.add(self.value, self._of(other)))
+        value = other.value if isinstance(other, Scalar) else self.graph.constant(other)
+        return Scalar(self.graph, self.graph.add(self.value, value))
 
     def __sub__(self, other: Scalar | float) -> Scalar:
-        return Scalar(self.graph, self.graph.subtract(self.value, self._of(other)))
+        value = other.value if isinstance(other, Scalar) else self.graph.constant(other)
+        return Scalar(self.graph, self.graph.subtract(self.value, value))
 
     def __mul__(self, other: Scalar | float) -> Scalar:
-        return Scalar(self.graph, self.graph.multiply(self.value, self._of(other)))
+        value = other.value if isinstance(other, Scalar) else self.graph.constant(other)
+        return Scalar(self.graph, self.graph.multiply(self.value, value))
 
     __radd__ = __add__
     __rmul__ = __mul__
@@ -37,9 +72,6 @@ class Scalar:
     def __bool__(self) -> bool:
         """Whether it is anything but the constant zero."""
         return self.value != ZERO
-
-    def _of(self, other: Scalar | float) -> int:
-        return other.value if isinstance(other, Scalar) else self.graph.constant(other)
 
     def sine(self) -> Scalar:
         """The sine of an angle."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from paramreduce_cli.expressions.vectors import Vector, add, scale
-from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.algebra import Scalar, remembered
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,7 @@ class Inertia:
     yz: Scalar
     zz: Scalar
 
+    @remembered
     def __add__(self, other: Inertia) -> Inertia:
         return Inertia(
             self.m + other.m,
@@ -41,6 +42,7 @@ class Inertia:
         tensor = (self.xx, self.xy, self.xz, self.yy, self.yz, self.zz)
         return any(bool(value) for value in (self.m, *self.d, *tensor))
 
+    @remembered
     def shifted(self, r: Vector) -> Inertia:
         """The same about another point; r is from that point to the present one.
 

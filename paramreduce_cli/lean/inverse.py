@@ -12,7 +12,7 @@ At the joints that hand it on, only the moment about z of w(U; J) is needed.
 from dataclasses import replace
 
 from paramreduce_cli.expressions.vectors import dot
-from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.algebra import Scalar, remembered
 from paramreduce_cli.lean.choices import JointFormulation, Place
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.kinematics import JointState, Kinematics
@@ -103,6 +103,7 @@ def _no_inertia(body: Inertia) -> Inertia:
     return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
 
+@remembered
 def part(body: Inertia, choice: JointFormulation, place: Place) -> Inertia:
     """The part of an inertia that is met at a place."""
     zero = body.m - body.m

@@ -18,7 +18,7 @@ from paramreduce_cli.lean.motion import (
     turning,
 )
 from paramreduce_cli.lean.tree import Joint, Tree
-from paramreduce_cli.lean.turns import ConstantTurn, Turn, turn_by
+from paramreduce_cli.lean.turns import ConstantTurn, Turn, constant_turn, turn_by
 from paramreduce_cli.records import BASE, INERTIAL, FloatArray, Kind
 
 
@@ -144,13 +144,13 @@ class Kinematics:
         """The parameters of a body in the frame on its joint."""
         described = self.symbols.inertia(i)
         frame = self.tree.joints[i].described_to_axis
-        turned_body = ConstantTurn(self.graph, frame[:3, :3]).inertia(described)
+        turned_body = constant_turn(self.graph, frame[:3, :3].tobytes()).inertia(described)
         return turned_body.shifted(self.symbols.vector(frame[:3, 3]))
 
     def _state(self, i: int) -> JointState:
         joint, choice = self.tree.joints[i], self.choices[i]
         before = None if joint.parent == BASE else self.states[joint.parent]
-        fixed = ConstantTurn(self.graph, joint.turn)
+        fixed = constant_turn(self.graph, joint.turn.tobytes())
         place = self.symbols.vector(joint.place)
         aligned = before is not None and joint.parallel and choice.aligned
         if before is None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from paramreduce_cli.expressions.vectors import Vector, dot
-from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.algebra import Scalar, remembered
 from paramreduce_cli.lean.turns import ConstantTurn, Turn
 
 
@@ -56,11 +56,13 @@ class FrameMotion:
         """U z"""
         return (self.U[0][2], self.U[1][2], self.U[2][2])
 
+    @remembered
     def moved(self, r: Vector) -> Vector:
         """U r"""
         return (dot(self.U[0], r), dot(self.U[1], r), dot(self.U[2], r))
 
 
+@remembered
 def motion(omega: Vector, rate: Vector) -> FrameMotion:
     """From the rates alone."""
     products = (omega[1] * omega[2], omega[0] * omega[2], omega[0] * omega[1])
@@ -70,6 +72,7 @@ def motion(omega: Vector, rate: Vector) -> FrameMotion:
     return FrameMotion(omega, rate, products, U, (yy - zz, zz - xx, xx - yy))
 
 
+@remembered
 def turned(
     frame: FrameMotion,
     turn: Turn,
@@ -122,6 +125,7 @@ def turned(
     return FrameMotion((x, y, z), (rate_x, rate_y, rate_z), (yz, xz, xy), U, steps)
 
 
+@remembered
 def seen_through(turn: ConstantTurn, frame: FrameMotion) -> FrameMotion:
     """The same motion in the components of a frame fixed in it."""
     if not turn.is_permutation:

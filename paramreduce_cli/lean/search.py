@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.lean.algebra import forget
 from paramreduce_cli.lean.choices import JointFormulation, Place, alternatives, to_data
 from paramreduce_cli.lean.direct import mass_matrix
 from paramreduce_cli.lean.inverse import torques
@@ -98,9 +99,11 @@ def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> 
         ]
         return tuple(tuple(map(to_data, one)) for one in dict.fromkeys(map(tuple, found)))
 
-    return Formulations(
+    found = Formulations(
         searched(inverse_outputs, _INVERSE_STARTS), searched(direct_outputs, _DIRECT_STARTS)
     )
+    forget()
+    return found
 
 
 def _main_parameters(tree: Tree) -> set[int]:

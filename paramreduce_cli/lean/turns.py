@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.vectors import Vector
-from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.algebra import Scalar, remembered
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.robots.frames import whole_quarters
@@ -32,6 +32,7 @@ class Turn:
         c, s = self.cosine, self.sine
         return (c * a[0] + s * a[1], c * a[1] - s * a[0], a[2])
 
+    @remembered
     def inertia(self, body: Inertia) -> Inertia:
         """Rz I Rz', with the first moments.
 
@@ -79,6 +80,7 @@ class ConstantTurn:
         self.is_permutation = bool(np.all((rotation == 0) | (np.abs(rotation) == 1)))
         self._slight = 0 < float(np.hypot(rotation[2, 0], rotation[2, 1])) < _SLIGHT
 
+    @remembered
     def out(self, a: Vector) -> Vector:
         """C a"""
         if self.is_permutation or self._slight:
@@ -86,6 +88,7 @@ class ConstantTurn:
         first, middle, last = self._turns
         return last.out(_rolled(middle.out(_unrolled(first.out(a)))))
 
+    @remembered
     def back(self, a: Vector) -> Vector:
         """C' a"""
         if self.is_permutation or self._slight:
@@ -93,6 +96,7 @@ class ConstantTurn:
         first, middle, last = self._turns
         return first.back(_rolled(middle.back(_unrolled(last.back(a)))))
 
+    @remembered
     def inertia(self, body: Inertia) -> Inertia:
         """C I C', with the first moments."""
         if self._slight:
@@ -117,6 +121,12 @@ class ConstantTurn:
         return [
             next((k, int(x)) for k, x in enumerate(column) if x != 0) for column in self._columns
         ]
+
+
+@remembered
+def constant_turn(graph: Graph, rotation: bytes) -> ConstantTurn:
+    """The turn of a rotation, given as the bytes of its matrix."""
+    return ConstantTurn(graph, np.frombuffer(rotation).reshape(3, 3))
 
 
 def _euler(rotation: FloatArray) -> list[tuple[float, float]]:

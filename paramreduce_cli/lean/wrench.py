@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from paramreduce_cli.expressions.vectors import Vector, add, cross, scale
-from paramreduce_cli.lean.algebra import Scalar
+from paramreduce_cli.lean.algebra import Scalar, remembered
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.motion import FrameMotion, Turning
 
@@ -28,6 +28,7 @@ class Gauge(StrEnum):
     YY_ZZ = "yy=zz"
 
 
+@remembered
 def split_off(body: Inertia, gauge: Gauge) -> tuple[Scalar, Inertia]:
     """The part s that is handed on and the rest of a body's inertia."""
     if gauge is Gauge.YY:
@@ -56,14 +57,17 @@ class Wrench:
     force: Vector
     moment: Vector
 
+    @remembered
     def __add__(self, other: Wrench) -> Wrench:
         return Wrench(add(self.force, other.force), add(self.moment, other.moment))
 
+    @remembered
     def moved(self, r: Vector) -> Wrench:
         """About another point, from which r leads to the present one."""
         return Wrench(self.force, add(self.moment, cross(r, self.force)))
 
 
+@remembered
 def inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge: Gauge) -> Wrench:
     """What a body that moves with a frame needs.
 
@@ -100,6 +104,7 @@ def _diagonal_spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
     return (xx * rx + (zz - yy) * yz, yy * ry + (xx - zz) * xz, zz * rz + (yy - xx) * xy)
 
 
+@remembered
 def spin_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
     """The moment about z that a body needs to move with a frame."""
     U, d = frame.U, body.d
@@ -118,6 +123,7 @@ def force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
     return frame.moved(body.d)[2] + body.m * a[2]
 
 
+@remembered
 def turning_wrench(body: Inertia, turning: Turning) -> Wrench:
     """What turning about z adds to what a body needs.
 

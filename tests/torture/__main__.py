@@ -3,11 +3,13 @@
 import argparse
 import sys
 import tempfile
+import warnings
 from pathlib import Path
 
 import rich.console
 import rich.table
 
+from paramreduce_cli.errors import ParamreduceWarning
 from tests.torture.configs import try_configs
 from tests.torture.damage import try_cache, try_damage
 from tests.torture.disk import try_full_disks
@@ -21,6 +23,7 @@ def main():
     parser.add_argument("--share", type=float, default=1.0, help="Of all there is to try.")
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    warnings.simplefilter("ignore", ParamreduceWarning)
 
     def of(count):
         return max(1, round(count * given.share))

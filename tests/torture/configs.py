@@ -1,5 +1,6 @@
 """Configs with parts taken out, doubled or exchanged: a config, or one clear message."""
 
+import copy
 import random
 from collections import Counter
 
@@ -48,7 +49,7 @@ def changed(data, chance):
     if chance.random() < 0.2:
         del data[last]
     else:
-        data[last] = chance.choice(_VALUES)
+        data[last] = copy.deepcopy(chance.choice(_VALUES))
 
 
 def try_configs(folder, count, seed=0):
