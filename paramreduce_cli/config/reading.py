@@ -16,7 +16,7 @@ _LARGEST_INTEGER = 2**53
 """Beyond it an integer is no exact number of a computer's arithmetic."""
 _SHOWN = 60
 """Characters of a value in a message."""
-_UNREADABLE = (ValueError, KeyError, AttributeError, TypeError, OverflowError)
+_UNREADABLE = (ValueError, LookupError, AttributeError, TypeError, OverflowError)
 """What PyYAML raises where a value does not fit the tag it is given."""
 
 

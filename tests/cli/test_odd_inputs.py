@@ -60,7 +60,7 @@ def test_yaml_that_would_take_for_ever(tmp_path, text, says):
 
 @pytest.mark.parametrize(
     "value",
-    ["1" + "0" * 400, "9" * 5000, "!!bool x", "!!timestamp x", "!!int x", "!!float x", "2001-99-99",
+    ["1" + "0" * 400, "9" * 5000, "!!bool x", "!!timestamp x", "!!int x", "!!int ''", "!!float x", "2001-99-99",
      "1e400", "{[1]: 2}", "null", "[1]"],
 )  # fmt: skip
 @pytest.mark.parametrize("key", ["gravity: [0, -9.81, 0]", "  count: 2", "  seed: 0"])
