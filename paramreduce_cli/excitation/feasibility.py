@@ -8,13 +8,11 @@ import numpy as np
 import scipy.optimize
 
 from paramreduce_cli.errors import Concern, ConcernError, DataError
-from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits
 
-FINER = 4
-"""How much finer the grid is on which bounds are checked in the end."""
 _SMALLEST_SHARE = 1e-3
 _SHRINKS = 0.8
 _HALVINGS = 12
@@ -110,7 +108,7 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
 
 
 def drawn_inside(
-    excitation: Excitation, coefficients: FloatArray, rest: FloatArray, period: float, points: int
+    excitation: Excitation, coefficients: FloatArray, rest: FloatArray, basis: FourierBasis
 ) -> FloatArray:
     """Draw a series together towards a resting position until it keeps the bounds on a fine grid.
 
@@ -118,13 +116,11 @@ def drawn_inside(
         excitation: With the bounds.
         coefficients: Of a series, (n_dof, 1 + 2 harmonics).
         rest: Independent coordinates inside all bounds, (n_dof,).
-        period: s
-        points: Of the grid that was optimised on.
+        basis: The series on the fine grid.
 
     Raises:
         ConcernError: Hardly any motion keeps them there.
     """
-    basis = fine_basis(period, (coefficients.shape[1] - 1) // 2, points)
     still = np.zeros_like(coefficients)
     still[:, 0] = rest
 
@@ -154,8 +150,3 @@ def drawn_inside(
             Concern.GRID,
         )
     return drawn(low)
-
-
-def fine_basis(period: float, harmonics: int, points: int) -> FourierBasis:
-    """The series on the grid on which bounds are checked."""
-    return fourier_basis(period, harmonics, sample_times(period, FINER * points))

@@ -10,6 +10,9 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray
 
+FINER = 4
+"""How much finer than the grid of a trajectory the one is on which bounds are checked in the end."""
+
 
 @dataclass(frozen=True)
 class FourierBasis:

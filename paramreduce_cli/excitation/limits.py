@@ -44,13 +44,9 @@ class LimitMap:
         self._mapping = mapping
         self._middle, self._reach = limits.middle, limits.reach
         self._positions = _harmonic_shares(basis.position, limits.reach * self.margin)
-        self._rates = np.concatenate(
-            [
-                _harmonic_shares(basis.velocity, limits.velocity * self.margin),
-                _harmonic_shares(basis.acceleration, limits.acceleration * self.margin),
-            ],
-            axis=1,
-        )
+        speeds = _harmonic_shares(basis.velocity, limits.velocity * self.margin)
+        accelerations = _harmonic_shares(basis.acceleration, limits.acceleration * self.margin)
+        self._rates = np.concatenate([speeds, accelerations], axis=1)
 
     def shares(self, free: FloatArray) -> FloatArray:
         """Largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""

@@ -79,7 +79,7 @@ class Excitation:
         """
         W = self.weighted(q, dz, ddz)
         return {
-            name: condition_from_matrix(scaling(W, self.beta, np.inf)[0])
+            name: float(np.linalg.cond(scaling(W, self.beta, np.inf)[0]))
             for name, scaling in scalings.items()
         }
 
@@ -144,34 +144,21 @@ class Excitation:
         return Bound(float(rows[:, worst].max()), name)
 
 
+@dataclass(frozen=True)
 class FreeObjective:
-    """The criterion over free series, with a barrier at their bounds, for a solver.
+    """The criterion over free series, with a barrier at their bounds, for a solver."""
 
-    Args:
-        excitation: What is measured.
-        basis: Grid on which it is measured.
-        limits: Map from free to admissible series.
-        level: How sharp criterion and limits are.
-        positions: Where the mechanism is along the motion.
-        mixing: From the solver's series to those of the joints, (n_dof, n_dof).
-    """
-
-    def __init__(
-        self,
-        excitation: Excitation,
-        basis: FourierBasis,
-        limits: LimitMap,
-        level: Level,
-        positions: Follower,
-        mixing: FloatArray,
-    ) -> None:
-        self._excitation = excitation
-        self._basis = basis
-        self._limits = limits
-        self._level = level
-        self._positions = positions
-        self._mixing = mixing
-        self._shape = (limits.n_dof, limits.n_columns)
+    excitation: Excitation
+    basis: FourierBasis
+    """Grid on which it is measured."""
+    limits: LimitMap
+    """Map from free to admissible series."""
+    level: Level
+    """How sharp criterion and limits are."""
+    positions: Follower
+    """Where the mechanism is along the motion."""
+    mixing: FloatArray
+    """From the solver's series to those of the joints, (n_dof, n_dof)."""
 
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient at ``x``, the unmixed free series stacked joint by joint.
@@ -179,12 +166,12 @@ class FreeObjective:
         Not a number outside the bounds and where the loops cannot be closed.
         """
         coefficients, pull = self._admissible(x)
-        along = (self._basis, coefficients, self._level, self._positions)
+        along = (self.basis, coefficients, self.level, self.positions)
         try:
-            barrier, barrier_bar = self._excitation.barrier(*along)
+            barrier, barrier_bar = self.excitation.barrier(*along)
             if np.isfinite(barrier):
-                value, bar = self._excitation.value_and_gradient(*along)
-                self._positions.keep()
+                value, bar = self.excitation.value_and_gradient(*along)
+                self.positions.keep()
                 return value + barrier, pull(bar + barrier_bar)
         except DataError:
             pass
@@ -193,15 +180,9 @@ class FreeObjective:
     def worst_bound(self, x: FloatArray) -> Bound:
         """The bound that the series at ``x`` misses by most, or is nearest to."""
         coefficients, _ = self._admissible(x)
-        return self._excitation.worst_bound(self._basis.states(coefficients)[0], self._positions)
+        return self.excitation.worst_bound(self.basis.states(coefficients)[0], self.positions)
 
     def _admissible(self, x: FloatArray) -> tuple[FloatArray, Pullback]:
-        free = self._mixing @ x.reshape(self._shape)
-        coefficients, pull = self._limits.admissible(free, self._level.limits)
-        return coefficients, lambda bar: (self._mixing.T @ pull(bar)).ravel()
-
-
-def condition_from_matrix(W: FloatArray) -> float:
-    """Condition number by singular values, infinite where the columns are dependent."""
-    singular = np.linalg.svd(W, compute_uv=False)
-    return float(singular[0] / singular[-1]) if singular[-1] > 0 else np.inf
+        free = self.mixing @ x.reshape(self.limits.n_dof, self.limits.n_columns)
+        coefficients, pull = self.limits.admissible(free, self.level.limits)
+        return coefficients, lambda bar: (self.mixing.T @ pull(bar)).ravel()

@@ -16,14 +16,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.errors import Concern, ConcernError, DataError, ParamreduceError
-from paramreduce_cli.excitation.feasibility import (
-    FINER,
-    drawn_inside,
-    feasible_start,
-    fine_basis,
-    resting_position,
-)
-from paramreduce_cli.excitation.fourier import FourierBasis, fourier_basis, sample_times
+from paramreduce_cli.excitation.feasibility import drawn_inside, feasible_start, resting_position
+from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
 from paramreduce_cli.excitation.limits import LimitMap, Mapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
@@ -68,6 +62,11 @@ class Settings:
     """Of IPOPT, per level."""
     scaling: str
     """Name of the scaling whose condition number is reported first."""
+
+    def basis(self, finer: int = 1) -> FourierBasis:
+        """The series on the grid, or on one so many times finer."""
+        times = sample_times(self.period, finer * self.points)
+        return fourier_basis(self.period, self.harmonics, times)
 
 
 @dataclass
@@ -147,7 +146,7 @@ class _Search:
 
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings
-        self._basis = settings_basis(settings)
+        self._basis = settings.basis()
         self._limits = LimitMap(settings.limits, self._basis, settings.mapping)
         mechanism = excitation.coordinates.mechanism
         self._bounded = bool(excitation.quantities.constraints) or mechanism.loops is not None
@@ -210,8 +209,7 @@ class _Search:
         series, _ = self._limits.admissible(
             self._mixing @ candidate.free, self.plan.polishing[-1].limits
         )
-        settings = self._settings
-        return drawn_inside(self._excitation, series, self._rest, settings.period, settings.points)
+        return drawn_inside(self._excitation, series, self._rest, self._settings.basis(FINER))
 
     def kappa(self, series: FloatArray) -> float:
         """The condition number that the settings ask for."""
@@ -228,14 +226,8 @@ def fine_positions(
     Raises:
         DataError: The loops cannot be closed along it.
     """
-    fine = fine_basis(settings.period, settings.harmonics, settings.points)
+    fine = settings.basis(FINER)
     return fine.time, excitation.coordinates.positions(fine.states(series)[0], None)
-
-
-def settings_basis(settings: Settings) -> FourierBasis:
-    """The series on the grid that the settings ask for."""
-    times = sample_times(settings.period, settings.points)
-    return fourier_basis(settings.period, settings.harmonics, times)
 
 
 def describe(
@@ -255,7 +247,7 @@ def describe(
     Raises:
         DataError: The loops cannot be closed along it.
     """
-    z, dz, ddz = settings_basis(settings).states(coefficients)
+    z, dz, ddz = settings.basis().states(coefficients)
     times, q = fine_positions(excitation, settings, coefficients)
     excitation.coordinates.check_motion(times, q)
     variants = excitation.condition_numbers(q[::FINER], dz, ddz)

@@ -12,8 +12,6 @@ from itertools import combinations
 
 from paramreduce_cli.expressions.graph import Graph
 
-_MORE_THAN_ONE = 2
-
 
 class _Terms:
     """Sums and products of many terms, by the number of their value.
@@ -29,16 +27,9 @@ class _Terms:
         self.sums: dict[int, list[int]] = {}
         self.products: dict[int, list[int]] = {}
         self._next = len(graph.nodes)
-        self._take_apart()
-
-    def _take_apart(self) -> None:
         uses = Counter(value >> 1 for value in self.outputs)
-        above: dict[int, str] = {}
         for number in self.reached:
-            node = self._graph.nodes[number]
-            for value in node.operands:
-                uses[value >> 1] += 1
-                above[value >> 1] = node.operation
+            uses.update(value >> 1 for value in self._graph.nodes[number].operands)
         for number in self.reached:
             node = self._graph.nodes[number]
             table = self._table(node.operation)
@@ -125,10 +116,8 @@ def _take_out_one(terms: _Terms, number: int, uses: Counter[int]) -> int | None:
     total = terms.sums[number]
     single = [v for v in total if v >> 1 in terms.products and uses[v >> 1] == 1]
     counts = Counter(f for v in single for f in set(terms.products[v >> 1]))
-    if not counts:
-        return None
-    factor, count = min(counts.items(), key=lambda item: (-item[1], item[0]))
-    if count < _MORE_THAN_ONE:
+    factor, count = min(counts.items(), key=lambda item: (-item[1], item[0]), default=(0, 0))
+    if count < 2:
         return None
     inner, left = [], []
     for value in total:
@@ -143,14 +132,13 @@ def _take_out_one(terms: _Terms, number: int, uses: Counter[int]) -> int | None:
     bracket = terms.new(terms.sums, inner)
     uses[factor >> 1] -= count - 1
     uses[bracket >> 1] = 1
-    if left:
-        product = terms.new(terms.products, [factor, bracket])
-        uses[product >> 1] = 1
-        terms.sums[number] = [*left, product]
-    else:
+    if not left:
         del terms.sums[number]
         terms.products[number] = [factor, bracket]
         return None
+    product = terms.new(terms.products, [factor, bracket])
+    uses[product >> 1] = 1
+    terms.sums[number] = [*left, product]
     return bracket >> 1
 
 

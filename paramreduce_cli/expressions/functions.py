@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import prod
 
 from paramreduce_cli.expressions.graph import Graph, Node
 from paramreduce_cli.expressions.operations import Program
@@ -23,10 +24,7 @@ class Argument:
     @property
     def size(self) -> int:
         """Number of its elements."""
-        result = 1
-        for length in self.shape:
-            result *= length
-        return result
+        return prod(self.shape)
 
 
 @dataclass(frozen=True)
@@ -53,20 +51,14 @@ class Function:
         numbers = (int(n.number) for n in self.program.nodes if n.operation == "input")
         return {places[number][0].name for number in numbers}
 
-    def without(self, name: str) -> Function:
-        """The same without an argument that is not used."""
-        kept: list[int] = []
-        start = 0
-        for argument in self.arguments:
-            if argument.name != name:
-                kept += range(start, start + argument.size)
-            start += argument.size
-        place = {old: new for new, old in enumerate(kept)}
+    def taking(self, names: Collection[str]) -> Function:
+        """The same with some of its arguments; the others are not used."""
+        places = enumerate(self.places(self.arguments))
+        kept = [position for position, (argument, _) in places if argument.name in names]
         graph = Graph()
-        outputs = self.program.rebuilt(graph, lambda position: graph.input(place[position]))
-        arguments = tuple(a for a in self.arguments if a.name != name)
-        program = Program.of_graph(graph, outputs)
-        return Function(self.name, self.text, arguments, self.results, program)
+        outputs = self.program.rebuilt(graph, lambda position: graph.input(kept.index(position)))
+        arguments = tuple(a for a in self.arguments if a.name in names)
+        return replace(self, arguments=arguments, program=Program.of_graph(graph, outputs))
 
     def steps(self) -> Iterator[tuple[int, Node]]:
         """Numbers and nodes of the operations, in an order in which they can be done."""

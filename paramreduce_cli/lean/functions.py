@@ -28,45 +28,39 @@ class LeanFunctions:
         self._models = LeanModels(mechanism, model.formulations, independent=True)
         self._reduced = reduced.restricted(model.affecting)
         self._constant = constant
-        loops = mechanism.loops is not None
         q, z = mechanism.n_q, mechanism.n_dof
-        d = q - z
-        self._phi = Argument("phi", (reduced.n,), "parameters")
-        unit = "rad or m"
         self._states = (
-            Argument("q", (q,), f"coordinates, {unit}"),
-            Argument("dq", (q,), f"their velocities, {unit} per s"),
-            Argument("ddq", (q,), f"their accelerations, {unit} per s^2"),
+            Argument("q", (q,), "coordinates, rad or m"),
+            Argument("dq", (q,), "their velocities, rad or m per s"),
+            Argument("ddq", (q,), "their accelerations, rad or m per s^2"),
         )
-        self._R = Argument(
-            "R", (d, z), "derivatives of the dependent by the independent coordinates"
+        self._arguments: tuple[Argument, ...] = (
+            Argument("phi", (reduced.n,), "parameters"),
+            *self._states,
         )
-        self._b = Argument("b", (d,), "accelerations of the dependent coordinates at ddz = 0")
-        self._loops = (self._R, self._b) if loops else ()
+        if mechanism.loops is not None:
+            R = "derivatives of the dependent by the independent coordinates"
+            b = "accelerations of the dependent coordinates at ddz = 0"
+            self._arguments += (Argument("R", (q - z, z), R), Argument("b", (q - z,), b))
 
     def inverse(self) -> Function:
         """Torques of a motion."""
-        z = self._mechanism.n_dof
-        tau = Argument("tau", (z,), "torques or forces, N m or N")
+        tau = Argument("tau", (self._mechanism.n_dof,), "torques or forces, N m or N")
         text = "Torques of the independent coordinates for a motion."
-        return self._function(
-            "inverse_dynamics", text, self._models.inverse, (tau,), lambda outputs: outputs
-        )
+        graph, outputs = self._model(self._models.inverse)
+        return self._function("inverse_dynamics", text, (tau,), graph, outputs)
 
     def direct(self) -> Function:
         """Mass matrix and bias."""
         z = self._mechanism.n_dof
         M = Argument("M", (z, z), "mass matrix")
         delta = Argument("delta", (z,), "torques without acceleration, N m or N")
-
-        def whole(outputs: list[int]) -> list[int]:
-            lower, bias = outputs[:-z], outputs[-z:]
-            rows = range(z)
-            full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
-            return full + bias
-
         text = "Mass matrix and bias: tau = M ddz + delta."
-        return self._function("direct_dynamics", text, self._models.direct, (M, delta), whole)
+        graph, outputs = self._model(self._models.direct)
+        lower, bias = outputs[:-z], outputs[-z:]
+        rows = range(z)
+        full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
+        return self._function("direct_dynamics", text, (M, delta), graph, full + bias)
 
     def regressor(self) -> Function:
         """Torques as a linear map of the parameters."""
@@ -79,63 +73,39 @@ class LeanFunctions:
 
             def substitute(position: int, value: int = value) -> int:
                 if position >= start:
-                    return graph.input(position - start)
+                    return graph.input(position - start + n)
                 return graph.constant(1.0) if place[position] == value else ZERO
 
             columns.append(program.rebuilt(graph, substitute))
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
-        graph, outputs = least(graph, outputs)
         K = Argument("K", (z, n), "torques for unit values of the parameters")
-        function = Function(
-            "regressor",
-            "Torques as a linear map of the parameters: tau = K phi.",
-            (*self._states, *self._loops),
-            (K,),
-            Program.of_graph(graph, outputs),
-        )
-        return self._trimmed(function)
+        text = "Torques as a linear map of the parameters: tau = K phi."
+        return self._function("regressor", text, (K,), *least(graph, outputs))
 
-    def _function(
-        self,
-        name: str,
-        text: str,
-        model: Callable[..., Program],
-        results: tuple[Argument, ...],
-        arranged: Callable[[list[int]], list[int]],
-    ) -> Function:
-        program = model(self._reduced, constant=self._constant)
+    def _model(self, model: Callable[..., Program]) -> tuple[Graph, list[int]]:
+        """Outputs of a lean model, its parameters numbered as those that are kept."""
         start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
         graph = Graph()
 
         def substitute(position: int) -> int:
-            if position >= start:
-                return graph.input(position - start + n)
-            return graph.input(int(place[position]))
+            kept = position - start + n if position >= start else int(place[position])
+            return graph.input(kept)
 
-        outputs = arranged(program.rebuilt(graph, substitute))
-        return self._trimmed(
-            Function(
-                name,
-                text,
-                (self._phi, *self._states, *self._loops),
-                results,
-                Program.of_graph(graph, outputs),
-            )
-        )
+        return graph, model(self._reduced, constant=self._constant).rebuilt(graph, substitute)
 
-    def _trimmed(self, function: Function) -> Function:
+    def _function(
+        self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]
+    ) -> Function:
         """Without arguments that its kind never needs; the others stay, used or not."""
         needed = {
             "inverse_dynamics": {"phi", "q", "dq", "ddq", "R"},
             "direct_dynamics": {"phi", "q", "dq", "R", "b"},
             "regressor": {"q", "dq", "ddq", "R"},
-        }[function.name]
+        }[name]
         if self._constant:
             needed = needed - {"phi"}
-        for argument in function.arguments:
-            if argument.name not in needed:
-                function = function.without(argument.name)
-        return function
+        program = Program.of_graph(graph, outputs)
+        return Function(name, text, self._arguments, results, program).taking(needed)
 
     def closures(self) -> list[Function]:
         """What the position, velocity and acceleration problems of loops are made of."""
@@ -151,27 +121,16 @@ class LeanFunctions:
         J_z = Argument("Phi_z", (n_d, len(z)), "its derivatives by the independent coordinates")
         right = Argument("gamma", (n_d,), "what is left of its second derivative, negative")
         by_d, by_z = (ca.vec(ca.densify(jacobian[:, some]).T) for some in (d, z))
-        states = self._states[:1], self._states[:2]
+
+        def new(name: str, text: str, inputs: list, outputs: list, *results: Argument) -> Function:
+            function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
+            graph = Graph()
+            graph, values = least(graph, Program.of_function(function).rebuilt(graph))
+            states = self._states[: len(inputs)]
+            return Function(name, text, states, results, Program.of_graph(graph, values))
+
         return [
-            _of_casadi("closure", "The equations that close the loops.", [q], states[0],
-                       [equations, by_d], (gap, J_d)),
-            _of_casadi("closure_jacobian", "Derivatives of the equations.", [q], states[0],
-                       [by_d, by_z], (J_d, J_z)),
-            _of_casadi("closure_bias", "Right side of the acceleration problem.", [q, dq],
-                       states[1], [gamma], (right,)),
-        ]  # fmt: skip
-
-
-def _of_casadi(
-    name: str,
-    text: str,
-    inputs: list[ca.SX],
-    arguments: tuple[Argument, ...],
-    outputs: list[ca.SX],
-    results: tuple[Argument, ...],
-) -> Function:
-    function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
-    graph = Graph()
-    values = Program.of_function(function).rebuilt(graph)
-    graph, values = least(graph, values)
-    return Function(name, text, arguments, results, Program.of_graph(graph, values))
+            new("closure", "The equations that close the loops.", [q], [equations, by_d], gap, J_d),
+            new("closure_jacobian", "Derivatives of the equations.", [q], [by_d, by_z], J_d, J_z),
+            new("closure_bias", "Right side of the acceleration problem.", [q, dq], [gamma], right),
+        ]

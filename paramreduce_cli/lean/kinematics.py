@@ -224,18 +224,14 @@ class Kinematics:
         axis = (self._zero, self._zero, one)
         own = (axis, self._none) if before.joint.revolute else (self._none, axis)
         known = self.screws(parent)
+        if not state.aligned:
+            known = {j: (before.turn.back(w), before.turn.back(v)) for j, (w, v) in known.items()}
+        screws = {**known, parent: own}
+        moved = {j: (w, add(v, cross(w, state.reach))) for j, (w, v) in screws.items()}
         if state.aligned:
-            screws = {**known, parent: own}
-            return {j: (w, add(v, cross(w, state.reach))) for j, (w, v) in screws.items()}
-        turned_in = {j: (before.turn.back(w), before.turn.back(v)) for j, (w, v) in known.items()}
-        moved = {
-            j: (w, add(v, cross(w, state.reach)))
-            for j, (w, v) in {**turned_in, parent: own}.items()
-        }
-        return {
-            j: (state.rest_to_parent.back(w), state.rest_to_parent.back(v))
-            for j, (w, v) in moved.items()
-        }
+            return moved
+        back = state.rest_to_parent.back
+        return {j: (back(w), back(v)) for j, (w, v) in moved.items()}
 
     def rest_components(self, i: int) -> FrameMotion:
         """FrameMotion of a body in the components of its frame at rest."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -24,21 +25,17 @@ _NEAR = 1.03
 """Estimates further apart than that are not the wrong way round."""
 
 
+@dataclass
 class _Variants:
-    """The same model in all formulations.
+    """The same model in all formulations."""
 
-    Args:
-        programs: One of each.
-    """
-
-    def __init__(self, programs: list[Program]) -> None:
-        self._programs = programs
+    programs: list[Program]
 
     @cached_property
     def _counts(self) -> list[LiveCount]:
         from paramreduce_cli.expressions.live import LiveCount  # Numba is slow to load
 
-        return [LiveCount(program) for program in self._programs]
+        return [LiveCount(program) for program in self.programs]
 
     def estimates(self, zero: BoolArray) -> list[int]:
         """Operations of each, nearly, with some parameters zero."""
@@ -48,7 +45,7 @@ class _Variants:
         """Those that may turn out to be the leanest."""
         estimates = self.estimates(zero)
         most = _NEAR * min(estimates)
-        return [p for p, count in zip(self._programs, estimates, strict=True) if count <= most]
+        return [p for p, count in zip(self.programs, estimates, strict=True) if count <= most]
 
 
 class LeanModels:
@@ -75,37 +72,26 @@ class LeanModels:
 
     @cached_property
     def _inverse(self) -> _Variants:
-        programs = self._programs(inverse_outputs, self._formulations.inverse)
-        return self._variants(programs, projected_inverse)
+        return self._variants(inverse_outputs, self._formulations.inverse, projected_inverse)
 
     @cached_property
     def _direct(self) -> _Variants:
-        programs = self._programs(direct_outputs, self._formulations.direct)
-        return self._variants(programs, projected_direct)
-
-    def _programs(
-        self, build: Build, choices: tuple[tuple[Mapping[str, str | bool], ...], ...]
-    ) -> list[Program]:
-        result = []
-        for some in choices:
-            graph = Graph()
-            outputs = build(self._tree, [from_data(data) for data in some], graph, ())
-            result.append(Program.of_graph(graph, outputs))
-        return result
+        return self._variants(direct_outputs, self._formulations.direct, projected_direct)
 
     def _variants(
         self,
-        programs: list[Program],
+        build: Build,
+        choices: tuple[tuple[Mapping[str, str | bool], ...], ...],
         project: Callable[[Mechanism, Graph, Sequence[int]], list[int]],
     ) -> _Variants:
-        result = []
-        for program in programs:
+        programs = []
+        for some in choices:
             graph = Graph()
-            outputs = program.rebuilt(graph)
+            outputs = build(self._tree, [from_data(data) for data in some], graph, ())
             if self._projected:
                 outputs = project(self._mechanism, graph, outputs)
-            result.append(Program.of_graph(graph, outputs))
-        return _Variants(result)
+            programs.append(Program.of_graph(graph, outputs))
+        return _Variants(programs)
 
     def inverse(self, model: ReducedModel, *, constant: bool = False) -> Program:
         """The inverse dynamics of a model; the torques, (n_q,) or (n_dof,).

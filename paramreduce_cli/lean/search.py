@@ -79,25 +79,20 @@ def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> 
         Choices for the inverse and for the direct dynamics, each different set once.
     """
     tree = lean_tree(mechanism)
-    everything = set(affecting.nonzero()[0].tolist())
-    few = everything & _main_parameters(tree)
+    everything = set(range(affecting.size))
+    useless = everything - set(affecting.nonzero()[0].tolist())
+    regrouped = everything - set(base.tolist())
+    minor = useless | (everything - _main_parameters(tree))
 
     def searched(
         build: Build, starts: tuple[JointFormulation, ...]
     ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
-        def dropping(kept: Collection[int]) -> set[int]:
-            return set(range(affecting.size)) - set(kept)
-
         same, *others = ([start] * len(tree.joints) for start in starts)
-        full = best_choices(tree, build, same, dropping(everything))
-        found = [
-            full,
-            best_choices(tree, build, full, dropping(base.tolist())),
-            best_choices(tree, build, same, dropping(few)),
-            same,
-            *others,
-        ]
-        return tuple(tuple(map(to_data, one)) for one in dict.fromkeys(map(tuple, found)))
+        full = best_choices(tree, build, same, useless)
+        of_base = best_choices(tree, build, full, regrouped)
+        of_few = best_choices(tree, build, same, minor)
+        found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
+        return tuple(tuple(map(to_data, one)) for one in found)
 
     found = Formulations(
         searched(inverse_outputs, _INVERSE_STARTS), searched(direct_outputs, _DIRECT_STARTS)

@@ -56,11 +56,9 @@ def lean_tree(mechanism: Mechanism) -> Tree:
     joints: list[Joint] = []
     for i, body in enumerate(mechanism.bodies):
         before = None if body.parent == BASE else joints[body.parent]
-        placed = (
-            body.parent_to_joint
-            if before is None
-            else before.described_to_axis @ body.parent_to_joint
-        )
+        placed = body.parent_to_joint
+        if before is not None:
+            placed = before.described_to_axis @ placed
         turn, after, sign = unrounded(placed[:3, :3]), body.joint_to_body.copy(), 1
         parallel = before is not None and not _tilts(turn)
         if parallel and turn[2, 2] < 0:
@@ -103,9 +101,7 @@ def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
     """
     if np.all((turn == 0) | (np.abs(turn) == 1)) and _tilts(turn):
         return turn, 0.0
-    if not _tilts(turn):
-        angle = float(np.arctan2(turn[1, 0], turn[0, 0]))
-    else:
-        angle = float(np.arctan2(turn[2, 0], turn[2, 1]))
+    sine, cosine = (turn[2, 0], turn[2, 1]) if _tilts(turn) else (turn[1, 0], turn[0, 0])
+    angle = float(np.arctan2(sine, cosine))
     c, s = np.cos(angle), np.sin(angle)
     return unrounded(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle

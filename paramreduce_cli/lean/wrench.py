@@ -31,23 +31,18 @@ class Gauge(StrEnum):
 @remembered
 def split_off(body: Inertia, gauge: Gauge) -> tuple[Scalar, Inertia]:
     """The part s that is handed on and the rest of a body's inertia."""
-    if gauge is Gauge.YY:
-        s = body.yy
-        return s, replace(body, xx=body.xx - s, yy=s - s)
-    if gauge is Gauge.XX:
-        s = body.xx
-        return s, replace(body, xx=s - s, yy=body.yy - s)
-    if gauge is Gauge.XX_ZZ:
-        s = body.xx - body.zz
-        return s, replace(body, xx=body.zz, yy=body.yy - s)
-    if gauge is Gauge.YY_ZZ:
-        s = body.yy - body.zz
-        return s, replace(body, xx=body.xx - s, yy=body.zz)
+    zero = body.m - body.m
+    if gauge is Gauge.NONE:
+        return zero, body
+    if gauge in (Gauge.YY, Gauge.YY_ZZ):
+        yy = zero if gauge is Gauge.YY else body.zz
+        s = body.yy - yy
+        return s, replace(body, xx=body.xx - s, yy=yy)
+    xx = zero if gauge is Gauge.XX else body.zz
     if gauge is Gauge.FLAT:
-        half = 0.5 * (body.zz + (body.xx - body.yy))
-        s = body.xx - half
-        return s, replace(body, xx=half, yy=body.yy - s)
-    return body.xx - body.xx, body
+        xx = 0.5 * (body.zz + (body.xx - body.yy))
+    s = body.xx - xx
+    return s, replace(body, xx=xx, yy=body.yy - s)
 
 
 @dataclass(frozen=True)

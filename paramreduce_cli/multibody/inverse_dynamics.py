@@ -94,11 +94,8 @@ def _inertial_wrench(
 ) -> tuple[Vector, Vector]:
     """Force and moment about the frame origin that keep a body on its motion."""
     columns = mechanism.columns(body)
-    if not columns:
-        return ZERO, ZERO
-    values = (phi[columns[kind]] if kind in columns else ca.SX(0) for kind in INERTIAL)
-    m, mx, my, mz, xx, xy, xz, yy, yz, zz = values
-    d: Vector = (mx, my, mz)
+    values = [phi[columns[kind]] if kind in columns else ca.SX(0) for kind in INERTIAL]
+    m, d, (xx, xy, xz, yy, yz, zz) = values[0], values[1:4], values[4:]
     tensor: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     omega, omega_dot, a = rates.omega, rates.omega_dot, rates.acceleration
     swing = add(cross(omega_dot, d), cross(omega, cross(omega, d)))

@@ -7,6 +7,7 @@ of trajectories follows from the factors alone.
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -33,31 +34,23 @@ class StateBlock:
     """Positions z on a grid several times finer, on which loops are followed, (m n_samples, n_dof)."""
 
 
+@dataclass
 class ObservedSet:
-    """A sample set computed from states as it is read.
+    """A sample set computed from states as it is read."""
 
-    Args:
-        states: Called to start reading anew.
-        n_samples: How many samples it yields in all.
-        dynamics: Of the mechanism.
-        phi: Standard parameters, for torques that were not measured.
-        source: What the states are, for messages.
-    """
+    states: Callable[[], Iterable[StateBlock]]
+    """Called to start reading anew."""
+    n_samples: int
+    """How many samples it yields in all."""
+    dynamics: Dynamics
+    phi: FloatArray
+    """Standard parameters, for torques that were not measured."""
+    source: str
+    """What the states are, for messages."""
 
-    def __init__(
-        self,
-        states: Callable[[], Iterable[StateBlock]],
-        n_samples: int,
-        dynamics: Dynamics,
-        phi: FloatArray,
-        source: str,
-    ) -> None:
-        self._source = source
-        self.states = states
-        self.n_samples = n_samples
-        self._coordinates = Coordinates(dynamics.mechanism)
-        self._dynamics = dynamics
-        self._phi = phi
+    @cached_property
+    def _coordinates(self) -> Coordinates:
+        return Coordinates(self.dynamics.mechanism)
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew.
@@ -65,38 +58,34 @@ class ObservedSet:
         Raises:
             DataError: The loops cannot be closed throughout a trajectory.
         """
-        before: tuple[FloatArray, FloatArray] | None = None
-        trajectory = -1
+        nothing = np.empty(0), np.empty((0, self.dynamics.mechanism.n_q))
+        trajectory, before = -1, nothing
         for s in self.states():
             if s.trajectory != trajectory:
-                trajectory, before = s.trajectory, None
+                trajectory, before = s.trajectory, nothing
             try:
                 q, before = self._followed(s, before)
             except DataError as error:
-                raise DataError(f"{self._source}, trajectory {trajectory + 1}: {error}") from error
+                raise DataError(f"{self.source}, trajectory {trajectory + 1}: {error}") from error
             dq, ddq = self._coordinates.rates(q, s.dz, s.ddz)
-            K = self._dynamics.regressor(q, dq, ddq)
-            tau = K @ self._phi if s.tau is None else s.tau
+            K = self.dynamics.regressor(q, dq, ddq)
+            tau = K @ self.phi if s.tau is None else s.tau
             W = K.reshape(-1, K.shape[2])
             yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, q, dq, ddq, W)
 
     def _followed(
-        self, s: StateBlock, before: tuple[FloatArray, FloatArray] | None
+        self, s: StateBlock, before: tuple[FloatArray, FloatArray]
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Generalised coordinates of a block, and where it ends, to go on from there."""
-        if self._dynamics.mechanism.loops is None:
-            return s.z, (s.time[-1:], s.z[-1:])
+        """Generalised coordinates of a block, and time and place of its end, to go on from there."""
+        if self.dynamics.mechanism.loops is None:
+            return s.z, before
         way = s.z if s.way is None else s.way
         finer = way.shape[0] // s.z.shape[0]
         steps = np.arange(way.shape[0]) / finer
         time = np.interp(steps, np.arange(s.time.size), s.time)
-        q = self._coordinates.positions(way, None if before is None else before[1][0])
-        if before is None:
-            self._coordinates.check_motion(time, q)
-        else:
-            self._coordinates.check_motion(
-                np.concatenate([before[0], time]), np.concatenate([before[1], q])
-            )
+        q = self._coordinates.positions(way, before[1][0] if before[1].size else None)
+        times, path = np.concatenate([before[0], time]), np.concatenate([before[1], q])
+        self._coordinates.check_motion(times, path)
         return q[::finer], (time[-1:], q[-1:])
 
     def factors(self) -> FloatArray:
@@ -112,15 +101,12 @@ class FactorAccumulator:
 
     def add(self, block: Block) -> None:
         """Take the rows of one block in."""
-        n_dof = block.tau.shape[1]
-        n = block.W.shape[1]
+        n_dof, n = block.tau.shape[1], block.W.shape[1]
         while len(self._factors) <= block.trajectory:
-            self._factors.append([np.zeros((0, n + 1)) for _ in range(n_dof)])
-        W = block.W.reshape(-1, n_dof, n)
-        for j in range(n_dof):
-            rows = np.column_stack([W[:, j], block.tau[:, j]])
-            factors = self._factors[block.trajectory]
-            factors[j] = append_rows(factors[j], rows)
+            self._factors.append([np.zeros((0, n + 1))] * n_dof)
+        rows = np.dstack([block.W.reshape(-1, n_dof, n), block.tau])
+        factors = self._factors[block.trajectory]
+        factors[:] = [append_rows(factor, rows[:, j]) for j, factor in enumerate(factors)]
 
     def result(self) -> FloatArray:
         """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows."""
@@ -195,17 +181,13 @@ def thinned_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
 
 def standard_deviation(arrays: Iterable[FloatArray]) -> FloatArray:
     """Of the columns over all arrays together, merged pair by pair [Chan1983]."""
-    count, mean, spread = 0, np.zeros(0), np.zeros(0)
+    count, mean, spread = 0, np.zeros(1), np.zeros(1)
     for array in arrays:
-        n = array.shape[0]
-        own_mean = array.mean(axis=0)
-        own_spread = np.sum((array - own_mean) ** 2, axis=0)
-        if count == 0:
-            count, mean, spread = n, own_mean, own_spread
-            continue
+        n, own_mean = array.shape[0], array.mean(axis=0)
         step = own_mean - mean
         total = count + n
         mean = mean + step * (n / total)
+        own_spread = np.sum((array - own_mean) ** 2, axis=0)
         spread = spread + own_spread + step**2 * (count * n / total)
         count = total
     return np.sqrt(spread / max(count, 1))

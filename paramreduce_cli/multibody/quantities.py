@@ -39,19 +39,17 @@ class Quantities:
 
     @cached_property
     def _values(self) -> BatchFunction:
-        q, raw = self._symbols
-        return BatchFunction([q], [_natural(raw, self.constraints)])
+        q, measures = self._symbols
+        return BatchFunction([q], [ca.vertcat(*map(_natural, measures, self.constraints))])
 
     @cached_property
     def _rows(self) -> BatchFunction:
-        q, raw = self._symbols
-        return BatchFunction([q], [self._bounded(raw)])
+        return BatchFunction([self._symbols[0]], [self._bounded])
 
     @cached_property
     def _jacobian(self) -> BatchFunction:
-        q, raw = self._symbols
-        by_q = ca.jacobian(self._bounded(raw), q)
-        loop = self._projection
+        q, loop = self._symbols[0], self._projection
+        by_q = ca.jacobian(self._bounded, q)
         by_z = by_q if loop is None else loop.pulled(q, by_q.T).T
         return BatchFunction([q], [by_z.T])
 
@@ -60,7 +58,7 @@ class Quantities:
         return None if self.mechanism.loops is None else Projection(self.mechanism)
 
     @cached_property
-    def _symbols(self) -> tuple[ca.MX, ca.MX]:
+    def _symbols(self) -> tuple[ca.MX, list[ca.MX]]:
         """Coordinates and one smooth measure for each constraint."""
         q = ca.SX.sym("q", self.mechanism.n_q)
         joints = motions(self.mechanism, q)
@@ -71,13 +69,12 @@ class Quantities:
             if constraint.kind == "singularity":
                 assert self._projection is not None
                 measures[k] = self._projection.distance(symbol)
-        return symbol, ca.vertcat(*measures)
+        return symbol, measures
 
-    def _bounded(self, measures: ca.MX) -> ca.MX:
-        rows = []
-        for k, constraint in enumerate(self.constraints):
-            rows += _bounded_rows(measures[k], constraint)
-        return ca.vertcat(*rows)
+    @cached_property
+    def _bounded(self) -> ca.MX:
+        pairs = zip(self._symbols[1], self.constraints, strict=True)
+        return ca.vertcat(*(row for pair in pairs for row in _bounded_rows(*pair)))
 
     def values(self, q: FloatArray) -> FloatArray:
         """The quantities in their units, (n_samples, n_constraints), at q (n_samples, n_q)."""
@@ -122,16 +119,11 @@ def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.
     return dot(across, across)
 
 
-def _natural(measures: ca.MX, constraints: tuple[Constraint, ...]) -> ca.MX:
-    values = []
-    for k, constraint in enumerate(constraints):
-        value = measures[k]
-        if constraint.kind == "angle":
-            value = ca.acos(ca.fmin(ca.fmax(value, -1), 1))
-        elif constraint.kind in DISTANCES:
-            value = ca.sqrt(value)
-        values.append(value)
-    return ca.vertcat(*values)
+def _natural(measure: ca.MX, constraint: Constraint) -> ca.MX:
+    """The quantity in its unit."""
+    if constraint.kind == "angle":
+        return ca.acos(ca.fmin(ca.fmax(measure, -1), 1))
+    return ca.sqrt(measure) if constraint.kind in DISTANCES else measure
 
 
 def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:

@@ -37,26 +37,16 @@ def random_states(
     dz, ddz = rng.normal(size=shape), rng.normal(size=shape)
     if mechanism.loops is None:
         return z, dz, ddz
-    coordinates = Coordinates(mechanism)
-    q = _wandered(mechanism, coordinates, z, rng)
-    return coordinates.states(q[:, list(mechanism.independent)], dz, ddz, start=q)
-
-
-def _wandered(
-    mechanism: Mechanism, coordinates: Coordinates, moves: FloatArray, rng: np.random.Generator
-) -> FloatArray:
-    """Configurations on the way of random moves of random length, (n_samples, n_q)."""
-    assert mechanism.loops is not None
+    coordinates, independent = Coordinates(mechanism), list(mechanism.independent)
     assembly = mechanism.loops.assembly
-    home = assembly[list(mechanism.independent)]
     least = _NEAREST * float(coordinates.distance(assembly[None])[0])
-    q = np.tile(assembly, (moves.shape[0], 1))
-    lengths: FloatArray = rng.uniform(0, 1, size=(moves.shape[0], 1))
+    moves = rng.uniform(0, 1, size=(count, 1)) * z
+    q = np.tile(assembly, (count, 1))
     for share in _SHARES:
-        reached, _ = coordinates.follow(home + share * lengths * moves, q)
+        reached, _ = coordinates.follow(assembly[independent] + share * moves, q)
         safe = coordinates.distance(reached) >= least
         q[safe] = reached[safe]
-    return q
+    return coordinates.states(q[:, independent], dz, ddz, start=q)
 
 
 def _extent(mechanism: Mechanism) -> float:

@@ -120,15 +120,9 @@ def signed_number(value: float) -> str:
 def _expressions(
     names: Sequence[str], kept: IntArray, beta: FloatArray, term: Callable[[int, int], str]
 ) -> list[str]:
-    others = np.setdiff1d(np.arange(len(names)), kept)
-    return [
-        " ".join(
-            [names[column]]
-            + [
-                f"{term(i, j)} {names[other]}"
-                for j, other in enumerate(others)
-                if abs(beta[i, j]) > _IGNORED
-            ]
-        )
-        for i, column in enumerate(kept)
-    ]
+    others = [names[k] for k in np.setdiff1d(np.arange(len(names)), kept)]
+    result = []
+    for i, column in enumerate(kept):
+        used = np.flatnonzero(np.abs(beta[i]) > _IGNORED).tolist()
+        result.append(" ".join([names[column], *(f"{term(i, j)} {others[j]}" for j in used)]))
+    return result

@@ -107,11 +107,13 @@ class Objective(ABC):
             most: Columns it may have then.
         """
         room = most - self.width(kept)
+        if room <= 0:
+            return kept
         gains = self.gains(kept)
         if not self.single:
             gains = np.where(self.widths <= room, gains, -np.inf)
         best = first_of_the_best(gains)
-        return (*kept, best) if room > 0 and gains[best] > -np.inf else kept
+        return (*kept, best) if gains[best] > -np.inf else kept
 
     def without_least(self, kept: Units) -> Units:
         """The subset without the unit that costs least; ties remove the least preferred."""

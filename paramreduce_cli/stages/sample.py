@@ -8,8 +8,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import SamplingSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.excitation.feasibility import FINER
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.dynamics import Dynamics

@@ -8,7 +8,7 @@ import scipy.linalg
 from paramreduce_cli.excitation.ipopt import minimise
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
-from paramreduce_cli.excitation.optimiser import FREE, settings_basis
+from paramreduce_cli.excitation.optimiser import FREE
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.stages.optimize_trajectories import _settings
@@ -51,7 +51,7 @@ def rows():
         model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
     )
     settings = _settings(wanted, model, wanted.period, wanted.harmonics)
-    basis = settings_basis(settings)
+    basis = settings.basis()
     limits = LimitMap(settings.limits, basis, "gauge")
 
     def objective(level):

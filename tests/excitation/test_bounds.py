@@ -10,7 +10,7 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
-from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory, settings_basis
+from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
@@ -67,7 +67,7 @@ def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
 
 def test_outside_the_bounds_there_is_no_value(case):
     excitation, settings, _ = case
-    basis = settings_basis(settings)
+    basis = settings.basis()
     limits = LimitMap(settings.limits, basis, settings.mapping)
     positions = Follower(excitation.coordinates)
     n = limits.n_dof

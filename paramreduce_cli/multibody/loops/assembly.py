@@ -15,7 +15,7 @@ from paramreduce_cli.errors import Concern, ConcernError
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.closures import closure_equations, equation_owners
 from paramreduce_cli.multibody.orthogonal import independent_columns
-from paramreduce_cli.records import BASE, Closure, FloatArray, IntArray, Loops, Mechanism
+from paramreduce_cli.records import BASE, FloatArray, Loops, Mechanism
 
 _ASSEMBLED = 1e-9
 """Largest gap of an assembled loop, m."""
@@ -46,11 +46,11 @@ def assembled(mechanism: Mechanism) -> Mechanism:
         )
     nearest = _closed(equations, mechanism, loops, range(mechanism.n_q))
     jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
-    _check_redundancy(mechanism, jacobians)
+    _check_redundancy(mechanism, loops, jacobians)
     _check_choice(mechanism, jacobians)
     q = _closed(equations, mechanism, loops, mechanism.dependent)
     _check_regular(mechanism, equations.jacobian(q))
-    _check_hinges(mechanism, q)
+    _check_hinges(mechanism, loops, q)
     return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
 
 
@@ -96,7 +96,7 @@ def _closed(
     gaps = np.abs(equations.gap(q))
     if gaps.max() > _ASSEMBLED:
         worst = int(np.argmax(gaps))
-        open_at = _named(equation_owners(mechanism)[worst])
+        _, open_at = equation_owners(loops.closures)[worst]
         before = float(np.abs(equations.gap(start)).max())
         fixed = ", ".join(
             f"{mechanism.generalised_names[k]} = {start[k]:g}"
@@ -128,74 +128,52 @@ def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:
     return found
 
 
-def _independent(rows: FloatArray) -> IntArray:
-    """Rows that do not depend on those before them; lengths as they are, rows are alike."""
-    return np.array(independent_columns(rows.T, np.arange(rows.shape[0]), _RANK), dtype=np.int64)
+def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
+    """The Jacobian of the largest rank, and its rows that do not depend on those before them."""
+    found = ((J, independent_columns(J.T, np.arange(len(J)), _RANK)) for J in jacobians)
+    return max(found, key=lambda pair: len(pair[1]))
 
 
-def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, IntArray]:
-    """The Jacobian of the largest rank, and its independent rows."""
-    rows = [_independent(jacobian) for jacobian in jacobians]
-    best = max(range(len(rows)), key=lambda k: rows[k].size)
-    return jacobians[best], rows[best]
-
-
-def _check_redundancy(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
-    owners = equation_owners(mechanism)
+def _check_redundancy(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> None:
+    owners = equation_owners(loops.closures)
     _, rows = _generic(jacobians)
-    if rows.size == mechanism.n_q:
+    if len(rows) == mechanism.n_q:
         raise ConcernError(
-            f"the loops are over-constrained: {rows.size} independent "
+            f"the loops are over-constrained: {len(rows)} independent "
             f"equations for {mechanism.n_q} coordinates leave nothing that moves. Leave out a "
             "closure, or use joints or closures with more freedom.",
             Concern.CLOSURES,
         )
-    if rows.size < len(owners):
+    if len(rows) < len(owners):
         extra = [owner for k, owner in enumerate(owners) if k not in rows]
         hint = ""
-        if any(closure.kind in ("point", "revolute") for closure, _ in extra):
+        if any(kind in ("point", "revolute") for kind, _ in extra):
             hint = (
                 " In a mechanism that moves in a plane, a pin is a closure of type planar (two "
                 "equations across the z axis of its first frame)."
             )
         raise ConcernError(
-            f"of the {len(owners)} equations only {rows.size} are "
+            f"of the {len(owners)} equations only {len(rows)} are "
             f"independent; these follow from the ones before them wherever the loops are closed: "
-            f"{', '.join(map(_named, extra))}. Use closures with fewer equations.{hint}",
+            f"{', '.join(name for _, name in extra)}. Use closures with fewer equations.{hint}",
             Concern.CLOSURES,
         )
 
 
-def _named(owner: tuple[Closure, str]) -> str:
-    """An equation for people."""
-    closure, part = owner
-    return f"{closure.name} ({part})"
-
-
-def _closures(mechanism: Mechanism) -> tuple[Closure, ...]:
-    return mechanism.loops.closures if mechanism.loops is not None else ()
-
-
 def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
     jacobian, rows = _generic(jacobians)
-    freedom = mechanism.n_q - rows.size
+    freedom = mechanism.n_q - len(rows)
     names = mechanism.generalised_names
     named = [names[k] for k in mechanism.independent]
     suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
     if len(named) != freedom:
         raise ConcernError(
             f"names {len(named)} coordinates, but {freedom} are "
-            f"independent: {mechanism.n_q} coordinates less {rows.size} independent equations. Name "
+            f"independent: {mechanism.n_q} coordinates less {len(rows)} independent equations. Name "
             f"{freedom}, for example {suggestion}.",
             Concern.INDEPENDENT,
         )
-    dependent = list(mechanism.dependent)
-    ratios = []
-    for entry in jacobians:
-        block = entry[:, dependent]
-        sizes = np.linalg.svd(block, compute_uv=False)
-        ratios.append(sizes[-1] / sizes[0])
-    if max(ratios) <= _RANK:
+    if np.linalg.cond(np.array(jacobians)[:, :, list(mechanism.dependent)]).min() >= 1 / _RANK:
         raise ConcernError(
             f"{', '.join(named)} are not independent: the loops tie "
             "them to each other, and leave others undetermined. Choose others, for example "
@@ -205,8 +183,7 @@ def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
 
 
 def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
-    sizes = np.linalg.svd(jacobian[:, list(mechanism.dependent)], compute_uv=False)
-    if sizes[-1] <= _RANK * sizes[0]:
+    if np.linalg.cond(jacobian[:, list(mechanism.dependent)]) >= 1 / _RANK:
         named = (mechanism.generalised_names[k] for k in mechanism.independent)
         raise ConcernError(
             "the assembly it leads to is a singular configuration, in which "
@@ -215,10 +192,10 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
         )
 
 
-def _check_hinges(mechanism: Mechanism, q: FloatArray) -> None:
+def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
     """Refuse hinges that closed with their axes against each other, which the equations allow."""
     poses = body_poses(mechanism, q)
-    for closure in _closures(mechanism):
+    for closure in loops.closures:
         a, b = (
             frame[:3, 2] if body == BASE else poses[body, :3, :3] @ frame[:3, 2]
             for body, frame in zip(closure.bodies, closure.frames, strict=True)

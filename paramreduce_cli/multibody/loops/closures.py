@@ -4,6 +4,8 @@ Phi(q) = 0 in the generalised coordinates of the open tree; lengths are in m and
 without unit, so that every equation is about as large as the gap it measures.
 """
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Vector, dot, subtract
@@ -37,10 +39,9 @@ def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     return ca.vertcat(*(e for c in mechanism.loops.closures for e in _equations(joints, c)))
 
 
-def equation_owners(mechanism: Mechanism) -> list[tuple[Closure, str]]:
-    """For every equation in order its closure, and what of it the equation measures."""
-    closures = mechanism.loops.closures if mechanism.loops is not None else ()
-    return [(closure, part) for closure in closures for part in EQUATIONS[closure.kind]]
+def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
+    """For every equation in order the kind of its closure, and its name for people."""
+    return [(c.kind, f"{c.name} ({part})") for c in closures for part in EQUATIONS[c.kind]]
 
 
 def _equations(joints: list[JointMotion], closure: Closure) -> list[ca.SX]:

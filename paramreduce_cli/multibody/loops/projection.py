@@ -45,13 +45,10 @@ class Projection:
         equations = closure_equations(mechanism, q)
         jacobian = ca.jacobian(equations, q)
         gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
-        self._equations = _function("closure", [q], [equations])
-        self._jacobian = _function("closure_jacobian", [q], [jacobian])
-        self._gamma = _function("closure_gamma", [q, dq], [gamma])
-
-    def equations(self, q: ca.MX) -> ca.MX:
-        """Phi, (n_equations,)."""
-        return self._equations(q)
+        self.equations = ca.Function("closure", [q], [ca.cse(equations)])
+        """Phi by q, (n_equations,)."""
+        self._jacobian = ca.Function("closure_jacobian", [q], [ca.cse(jacobian)])
+        self._gamma = ca.Function("closure_gamma", [q, dq], [ca.cse(gamma)])
 
     def dependent_jacobian(self, q: ca.MX) -> ca.MX:
         """Phi_d, (n_d, n_d)."""
@@ -93,7 +90,3 @@ class Projection:
         n = len(self._d)
         inverse = self.solve(q, ca.MX(ca.DM.eye(n)))
         return n / ca.sqrt(ca.sumsqr(jacobian) * ca.sumsqr(inverse))
-
-
-def _function(name: str, inputs: list[ca.SX], outputs: list[ca.SX]) -> ca.Function:
-    return ca.Function(name, inputs, ca.cse(outputs))

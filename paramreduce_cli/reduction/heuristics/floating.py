@@ -14,10 +14,7 @@ def floating(task: SelectionTask) -> FoundSubsets:
     objective = task.objective
     best: dict[int, tuple[float, Units]] = {}
     kept: Units = ()
-    while objective.width(kept) < task.limit:
-        longer = objective.with_best(kept, task.limit)
-        if longer == kept:
-            break
+    while (longer := objective.with_best(kept, task.limit)) != kept:
         kept = longer
         _keep_if_better(task, best, kept)
         while len(kept) > 2:

@@ -14,9 +14,6 @@ def forward_selection(task: SelectionTask) -> FoundSubsets:
     """
     objective = task.objective
     order: tuple[int, ...] = ()
-    while objective.width(order) < task.limit:
-        longer = objective.with_best(order, task.limit)
-        if longer == order:
-            break
+    while (longer := objective.with_best(order, task.limit)) != order:
         order = longer
     return nested(task, completed(objective, order))

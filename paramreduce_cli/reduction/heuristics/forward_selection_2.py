@@ -13,10 +13,7 @@ def forward_selection_2(task: SelectionTask) -> FoundSubsets:
     objective = task.objective
     kept = objective.with_best((), task.limit)
     subsets = [kept]
-    while objective.width(kept) < task.limit:
-        longer = objective.with_best(kept, task.limit)
-        if longer == kept:
-            break
+    while (longer := objective.with_best(kept, task.limit)) != kept:
         renewed = objective.with_best(without(longer, kept[-1]), task.limit)
         # With groups the parameter that comes back may be wider or narrower.
         kept = renewed if objective.width(renewed) > objective.width(kept) else longer

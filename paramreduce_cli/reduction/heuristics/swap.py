@@ -1,6 +1,6 @@
 """Local search by exchanges from many starts."""
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -39,21 +39,16 @@ def swap(task: SelectionTask) -> FoundSubsets:
     return by_size(task.objective, search.best.values())
 
 
+@dataclass
 class _Exchanges:
-    """The best subset of each size so far.
+    """The best subset of each number of columns so far."""
 
-    Args:
-        objective: What is minimised.
-        smallest: Number of columns.
-        limit: Largest number of columns.
-    """
-
-    def __init__(self, objective: Objective, smallest: int, limit: int) -> None:
-        self.objective = objective
-        self.smallest, self.limit = smallest, limit
-        self.best: dict[int, Units] = {}
-        self._scores: dict[int, float] = {}
-        self._seen: set[frozenset[int]] = set()
+    objective: Objective
+    smallest: int
+    limit: int
+    best: dict[int, Units] = field(default_factory=dict)
+    _scores: dict[int, float] = field(default_factory=dict)
+    _seen: set[frozenset[int]] = field(default_factory=set)
 
     def offer_all(self, subsets: tuple[IntArray, ...]) -> None:
         """Improve subsets of columns and keep the best."""

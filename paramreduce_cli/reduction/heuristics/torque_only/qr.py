@@ -17,10 +17,7 @@ def qr(task: SelectionTask) -> FoundSubsets:
     rest = Orthogonaliser(problem.X[:, problem.columns])
     weights = problem.lengths[problem.columns] ** 2
     order: tuple[int, ...] = ()
-    while len(order) < len(objective.units):
-        left = objective.per_unit(rest.squared_lengths() * weights)
-        if not left.any():
-            break
+    while (left := objective.per_unit(rest.squared_lengths() * weights)).any():
         unit = first_of_the_best(left)
         for column in np.flatnonzero(objective.owner == unit):
             rest.take(int(column))
