@@ -37,6 +37,16 @@ def atomically(path: Path) -> Iterator[Path]:
             temporary.unlink(missing_ok=True)
 
 
+def check_is_file(path: Path) -> None:
+    """Refuse what would be waited for, such as a pipe; a file that is not there is no matter.
+
+    Raises:
+        ArtifactError: It is no file.
+    """
+    if path.exists() and not path.is_file():
+        raise ArtifactError(f"{path}: is no file.")
+
+
 _LEFT = re.compile(r"\..+\.\w{8}\.tmp")
 """Names of temporary files."""
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from paramreduce_cli.artifacts.atomic import check_is_file
 from paramreduce_cli.artifacts.hdf5 import Reader, reading
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import Coefficients, FloatArray, Recording
@@ -165,8 +166,7 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
 def _table(path: Path) -> tuple[list[str], FloatArray]:
     """Headings and numbers of a CSV, (n_rows, n_columns); held as numbers from the start."""
     numbers = array.array("d")
-    if path.exists() and not path.is_file():
-        raise ArtifactError(f"{path}: is no file.")
+    check_is_file(path)
     try:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(path, "rt", encoding="utf-8-sig", newline="") as file:

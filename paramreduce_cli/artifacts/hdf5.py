@@ -19,7 +19,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import PatientFile, atomically
+from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file
 from paramreduce_cli.errors import ArtifactError
 
 SCHEMA = 6
@@ -245,13 +245,10 @@ class Reader:
         for name in names:
             if isinstance(self.file[name], h5py.Dataset):
                 data = self._dataset(name)
-                step = (
-                    max(1, _READ_AT_ONCE * max(1, len(data)) // max(1, data.nbytes))
-                    if data.shape
-                    else 1
-                )
-                for start in range(0, len(data) if data.shape else 1, step):
-                    data[start : start + step] if data.shape else data[()]
+                rows = len(data) if data.shape else 1
+                step = max(1, _READ_AT_ONCE * rows // max(1, data.nbytes))
+                for start in range(0, rows, step):
+                    data[slice(start, start + step) if data.shape else ()]
 
     def _dataset(self, name: str) -> h5py.Dataset:
         parts = name.split("/")
@@ -289,8 +286,7 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
     """
     if not path.exists():
         raise ArtifactError(f"{path}: there is no such file.{' ' + hint if hint else ''}")
-    if not path.is_file():  # a pipe would be waited for
-        raise ArtifactError(f"{path}: is no file.{' ' + hint if hint else ''}")
+    check_is_file(path)
     try:
         file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)
     except OSError as error:

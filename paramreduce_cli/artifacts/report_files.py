@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.atomic import atomically
+from paramreduce_cli.artifacts.atomic import atomically, check_is_file
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
@@ -118,8 +118,7 @@ def load_json(path: Path) -> Any:
     Raises:
         ArtifactError: It is missing or not JSON.
     """
-    if path.exists() and not path.is_file():
-        raise ArtifactError(f"{path}: is no file.")
+    check_is_file(path)
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:

@@ -12,7 +12,7 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import remove_leftovers
+from paramreduce_cli.artifacts.atomic import check_is_file, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
 from paramreduce_cli.artifacts.report_files import (
     SUMMARY,
@@ -202,8 +202,7 @@ def file_digest(path: Path) -> str:
     Raises:
         ArtifactError: It cannot be read.
     """
-    if path.exists() and not path.is_file():
-        raise ArtifactError(f"{path}: is no file.")
+    check_is_file(path)
     try:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

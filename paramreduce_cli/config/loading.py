@@ -79,8 +79,6 @@ def config_schema() -> dict[str, Any]:
 
 
 def _read(path: Path) -> Document:
-    if path.exists() and not path.is_file():
-        raise ConfigError(f"{path}: is no file.")
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:

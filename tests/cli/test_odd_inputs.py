@@ -148,7 +148,6 @@ def test_a_pipe_is_no_file(invoke, tmp_path):
     os.mkfifo(pipe)
     for arguments in (
         ("inspect", pipe),
-        ("build-model", pipe),
         ("compare", pipe, pipe),
         ("reduce", "--samples", pipe, "--results", tmp_path / "r"),
     ):
