@@ -69,8 +69,15 @@ def save_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def summary_stamp(path: Path) -> Stamp | None:
-    """Provenance of a summary; None if there is none."""
-    summary = load_json(path)
+    """Provenance of a summary; None if there is none.
+
+    Raises:
+        ArtifactError: It is missing, damaged, or no summary.
+    """
+    return _stamp(load_summary(path))
+
+
+def _stamp(summary: Any) -> Stamp | None:
     try:
         return Stamp(**summary["provenance"])
     except (KeyError, TypeError):
@@ -88,7 +95,7 @@ def load_summary(path: Path) -> dict[str, Any]:
     summary = load_json(path)
     if not isinstance(summary, dict):
         raise ArtifactError(f"{path}: is no summary.json.")
-    stamp = summary_stamp(path)
+    stamp = _stamp(summary)
     if stamp is not None and stamp.schema == SCHEMA and stamp.digest != _digest(summary):
         raise ArtifactError(
             f"{path}: is damaged or was changed: its digest does not fit. Make it again with "

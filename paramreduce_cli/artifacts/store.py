@@ -213,11 +213,14 @@ def file_digest(path: Path) -> str:
 
 
 def is_foreign(path: Path) -> bool:
-    """Whether a file without provenance is whole, so that it must be somebody's."""
+    """Whether a file without provenance is somebody's, and not one of ours that is damaged."""
     try:
         if path.suffix == ".json":
-            return load_json(path) is not None
-        with reading(path):
+            data = load_json(path)
+            return not (isinstance(data, dict) and {"provenance", "config_sha256"} & data.keys())
+        with reading(path) as reader:
+            for name in reader.file.attrs:
+                reader.attribute(name)
             return True
     except ArtifactError:
         return False
