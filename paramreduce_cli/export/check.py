@@ -30,7 +30,7 @@ def random_cases(
     plain = Dynamics(mechanism, once=True)
     phi = model.standard
     expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
-    A, B = plain.direct_regressor(q, dq)
+    M, delta = plain.direct(q, dq, phi)
     K = plain.regressor(q, dq, ddq)
     result = {
         "phi": np.tile(model.values, (count, 1)),
@@ -38,8 +38,8 @@ def random_cases(
         "dq": dq,
         "ddq": ddq,
         "tau": K @ phi,
-        "M": A @ phi,
-        "delta": B @ phi,
+        "M": M,
+        "delta": delta,
         "K": K @ expansion,
     }
     if mechanism.loops is None:

@@ -31,10 +31,11 @@ int paramreduce_batch(long long n, const double* const* in, const long long* in_
                       double* const* out, const long long* out_size, double* work) {{
   const double* arg[{n_arg}];
   double* res[{n_res}];
+  casadi_int iw[{n_iw}];
   for (long long k = 0; k < n; ++k) {{
     for (int i = 0; i < {n_in}; ++i) arg[i] = in[i] + k * in_size[i];
     for (int i = 0; i < {n_out}; ++i) res[i] = out[i] + k * out_size[i];
-    if (kernel(arg, res, 0, work, 0)) {{
+    if (kernel(arg, res, iw, work, 0)) {{
       for (int i = 0; i < {n_out}; ++i)
         for (long long j = 0; j < out_size[i]; ++j) out[i][k * out_size[i] + j] = 0.0 / 0.0;
     }}
@@ -54,13 +55,7 @@ class BatchFunction:
         once: Whether it is evaluated so little that compiling it does not pay.
     """
 
-    def __init__(
-        self,
-        inputs: list[ca.SX] | list[ca.MX],
-        outputs: list[ca.SX] | list[ca.MX],
-        *,
-        once: bool = False,
-    ) -> None:
+    def __init__(self, inputs: list[ca.MX], outputs: list[ca.MX], *, once: bool = False) -> None:
         dense = ca.cse([ca.densify(ca.vec(output)) for output in outputs])
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
@@ -172,6 +167,7 @@ def _c_text(function: ca.Function) -> str:
     loop = _LOOP.format(
         n_arg=max(1, function.sz_arg()),
         n_res=max(1, function.sz_res()),
+        n_iw=max(1, function.sz_iw()),
         n_in=function.n_in(),
         n_out=function.n_out(),
     )

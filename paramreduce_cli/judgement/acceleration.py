@@ -8,8 +8,8 @@ import numpy as np
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS
 from paramreduce_cli.records import Block, FloatArray
 
-DirectRegressor = Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
-"""Generalised coordinates and velocities to the linear maps of [M | delta] by the parameters."""
+Direct = Callable[[FloatArray, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+"""Generalised coordinates, velocities and the parameters of models to their M and delta."""
 
 _VALUES_AT_ONCE = 4_000_000
 """Mass-matrix elements held in memory at a time."""
@@ -30,7 +30,7 @@ class AccelerationErrors:
 
 def acceleration_errors(
     blocks: Iterable[Block],
-    direct_regressor: DirectRegressor,
+    direct: Direct,
     parameters: FloatArray,
     nominal_acceleration: FloatArray,
 ) -> AccelerationErrors:
@@ -38,7 +38,7 @@ def acceleration_errors(
 
     Args:
         blocks: The samples.
-        direct_regressor: Linear maps of M and delta.
+        direct: Mass matrices and biases of models.
         parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
         nominal_acceleration: (n_dof,)
 
@@ -52,9 +52,8 @@ def acceleration_errors(
     for block in blocks:
         for start in range(0, block.time.size, step):
             part = slice(start, start + step)
-            A, B = direct_regressor(block.q[part], block.dq[part])
-            M = np.moveaxis(A @ parameters, -1, 1)
-            bias = np.moveaxis(B @ parameters, -1, 1)
+            found = direct(block.q[part], block.dq[part], parameters)
+            M, bias = (np.moveaxis(values, -1, 1) for values in found)
             values, vectors = np.linalg.eigh(M)
             sizes = np.abs(values)
             largest = sizes.max(axis=2)

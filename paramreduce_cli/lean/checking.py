@@ -41,11 +41,11 @@ def check_formulations(
     phi = np.zeros(mechanism.n_parameters)
     phi[kept] = rng.normal(size=kept.size)
     plain = Dynamics(dataclasses.replace(mechanism, loops=None), once=True)
-    A, B = plain.direct_regressor(q, dq)
+    M, delta = plain.direct(q, dq, phi)
     rows, columns = np.tril_indices(mechanism.n_q)
     expected = {
         "inverse": plain.inverse(q, dq, ddq, phi),
-        "direct": np.hstack([(A @ phi)[:, rows, columns], B @ phi]),
+        "direct": np.hstack([M[:, rows, columns], delta]),
     }
     inputs = [*np.broadcast_to(phi, (q.shape[0], phi.size)).T, *q.T, *dq.T, *ddq.T]
     tree = lean_tree(mechanism)

@@ -3,7 +3,7 @@
 from functools import cached_property
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import BoolArray, CountedDynamics, IntArray, Model, ReducedModel
 
 COUNTS = (
@@ -31,8 +31,8 @@ class Counts:
         self._known: dict[bytes, list[int]] = {}
 
     @cached_property
-    def _plain(self) -> Dynamics:
-        return Dynamics(self._model.mechanism)
+    def _plain(self) -> PlainDynamics:
+        return PlainDynamics(self._model.mechanism)
 
     @cached_property
     def _lean(self) -> LeanModels:

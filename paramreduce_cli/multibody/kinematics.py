@@ -54,7 +54,7 @@ class JointMotion:
 def joint_motion(body: Body, z: ca.SX) -> JointMotion:
     """The motion of one joint at coordinate ``z``."""
     if body.joint == "revolute":
-        (c, s), slide = _cosine_and_sine(z, body.offset), ca.SX(0)
+        (c, s), slide = joint_cosine_and_sine(z, body.offset), ca.SX(0)
     else:
         c, s, slide = ca.SX(1), ca.SX(0), z + body.offset
     after = body.joint_to_body[:3, 3].tolist()
@@ -67,7 +67,7 @@ def joint_motion(body: Body, z: ca.SX) -> JointMotion:
     return JointMotion(body, c, s, origin)
 
 
-def _cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
+def joint_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
     """Of z + offset; whole quarter turns cost nothing and are exact."""
     quarters = whole_quarters(offset)
     if quarters is None:

@@ -142,7 +142,6 @@ def _criterion_inputs(
 
     def accelerations(most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""
-        direct_regressor = dynamics().direct_regressor
         nominal = samples.nominal_acceleration
         if nominal is None:
             raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
@@ -152,8 +151,8 @@ def _criterion_inputs(
             np.concatenate([getattr(block, key) for block in blocks])
             for key in ("q", "dq", "ddz", "tau")
         )
-        A, B = direct_regressor(q, dq)
-        return AccelerationData(A @ columns.expansion, B @ columns.expansion, tau, ddz, nominal)
+        A, B = dynamics().direct(q, dq, columns.expansion)
+        return AccelerationData(A, B, tau, ddz, nominal)
 
     def cost(kept: IntArray) -> int:
         """Operations of the lean inverse dynamics, nearly."""

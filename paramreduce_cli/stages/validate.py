@@ -70,7 +70,7 @@ def validate(
     def errors_on(sample_set: SampleSet) -> tuple[NormErrors, AccelerationErrors]:
         torque = torque_errors(sample_set.blocks(), models.values, reduction.nominal_torque)
         acceleration = acceleration_errors(
-            sample_set.blocks(), dynamics.direct_regressor, models.values, nominal
+            sample_set.blocks(), dynamics.direct, models.values, nominal
         )
         return torque, acceleration
 

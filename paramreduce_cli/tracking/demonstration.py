@@ -8,7 +8,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import TrackingSection
 from paramreduce_cli.expressions.compiled import BatchFunction
-from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import FloatArray, Model, Tracking
 from paramreduce_cli.tracking.control import Arm, advanced, simulate
 from paramreduce_cli.tracking.paths import point_to_point
@@ -70,6 +70,6 @@ def tracked(
 
 def _arm(model: Model, period: float) -> Arm:
     """The full model by plain recursion, compiled as a control period at once."""
-    accelerations = Dynamics(model.mechanism).accelerations(model.values)
+    accelerations = PlainDynamics(model.mechanism).accelerations(model.values)
     states = [ca.MX.sym(name, model.mechanism.n_dof) for name in ("z", "dz", "tau")]
     return BatchFunction(states, list(advanced(accelerations, period, *states)))

@@ -62,6 +62,14 @@ class Projection:
         """Derivative of the dependent coordinates by the independent ones, (n_d, n_dof)."""
         return -self.solve(q, ca.densify(self._jacobian(q)[:, self._z]))
 
+    def whole_tangent(self, q: ca.MX) -> ca.MX:
+        """R, (n_q, n_dof)."""
+        return self._whole(self.tangent(q), ca.MX(ca.DM.eye(len(self._z))))
+
+    def whole_drift(self, q: ca.MX, dq: ca.MX) -> ca.MX:
+        """Accelerations of all coordinates at ddz = 0, b, (n_q,)."""
+        return self._whole(self.drift(q, dq), ca.MX(len(self._z), 1))
+
     def rates(self, q: ca.MX, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Velocities dq and accelerations ddq, each (n_q,)."""
         tangent = self.tangent(q)

@@ -1,0 +1,135 @@
+"""Torques of a tree as a linear map of its parameters, joint by joint and body by body.
+
+In components of the base frame a joint sees the bodies beyond it only through its screw, and
+a body is seen by all joints before it through one matrix: the force, and the moment about the
+base's origin, that unit values of its parameters need [Atkeson1986]. Their products are all
+there is, so that work and code grow no faster than the number of joints times that of parameters.
+"""
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from paramreduce_cli.multibody.kinematics import joint_cosine_and_sine
+from paramreduce_cli.records import BASE, INERTIAL, Body, Mechanism
+
+_FLAT = 500
+"""Entries of the regressor that are not always zero, up to which it is written out as scalars.
+Such code is twice as fast; beyond, compilers take minutes over it, or gigabytes."""
+
+_FrameState = tuple[ca.MX, ...]
+"""Of a frame in components of the base: rotation, origin, angular velocity and acceleration, and
+the acceleration of the origin less gravity."""
+
+
+def tree_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -> ca.Function:
+    """The regressor of an open tree.
+
+    Args:
+        mechanism: The tree; its loops are left open.
+        columns: Indices of the parameters that are asked for; all if left out.
+
+    Returns:
+        A function of q, dq and ddq, each (n_q,), whose value is K', (n_columns, n_q), with
+        tau = K phi.
+    """
+    wanted = range(mechanism.n_parameters) if columns is None else list(columns)
+    q, dq, ddq = (ca.MX.sym(name, mechanism.n_q) for name in ("q", "dq", "ddq"))
+    states, screws = _outwards(mechanism, q, dq, ddq)
+    wrench = _unit_wrenches()
+    parts: list[ca.MX] = []
+    order: list[int] = []
+    for i, state in enumerate(states):
+        present = {kind: c for kind, c in mechanism.columns(i).items() if c in wanted}
+        if present:
+            parts.append(wrench(*state)[:, [INERTIAL.index(kind) for kind in present]])
+            order += present.values()
+    wrenches = ca.horzcat(*parts)[:, [order.index(c) for c in wanted]] if parts else ca.MX(6, 0)
+    reached = _reached(mechanism)[wanted]
+    maps = wrenches.T @ ca.horzcat(*screws) * ca.MX(ca.sparsify(ca.DM(reached)))
+    function = ca.Function("regressor", [q, dq, ddq], [maps])
+    return function.expand() if reached.sum() <= _FLAT else function
+
+
+def _reached(mechanism: Mechanism) -> np.ndarray:
+    """One where the body of a parameter is beyond a joint, (n_parameters, n_q)."""
+    result = np.zeros((mechanism.n_parameters, mechanism.n_q))
+    for i in range(mechanism.n_q):
+        columns, joint = list(mechanism.columns(i).values()), i
+        while joint != BASE:
+            result[columns, joint] = 1.0
+            joint = mechanism.bodies[joint].parent
+    return result
+
+
+def _outwards(
+    mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX
+) -> tuple[list[_FrameState], list[ca.MX]]:
+    """States of the bodies' frames, and screws of the joints, (6,)."""
+    still = ca.MX(3, 1)
+    base = (ca.MX(ca.DM.eye(3)), still, still, still, ca.MX(ca.DM(-mechanism.gravity)))
+    states: list[_FrameState] = []
+    screws = []
+    for i, body in enumerate(mechanism.bodies):
+        before = base if body.parent == BASE else states[body.parent]
+        *state, screw = _joint_step(body)(*before, q[i], dq[i], ddq[i])
+        states.append(tuple(state))
+        screws.append(screw)
+    return states, screws
+
+
+def _frame_symbols() -> list[ca.SX]:
+    vectors = (ca.SX.sym(name, 3) for name in ("p", "omega", "omega_dot", "a"))
+    return [ca.SX.sym("R", 3, 3), *vectors]
+
+
+def _joint_step(body: Body) -> ca.Function:
+    """From the state of the frame before to that of a body's own, and the screw between."""
+    R, p, omega, omega_dot, a = before = _frame_symbols()
+    q, dq, ddq = (ca.SX.sym(name) for name in ("q", "dq", "ddq"))
+    at_joint, to_body = body.parent_to_joint, body.joint_to_body
+    place = R @ at_joint[:3, 3]
+    R = R @ at_joint[:3, :3]
+    z = R[:, 2]
+    a = a + _swing(omega, omega_dot, place)
+    p = p + place
+    if body.joint == "revolute":
+        screw = ca.vertcat(ca.cross(p, z), z)
+        omega_dot = omega_dot + z * ddq + ca.cross(omega, z * dq)
+        omega = omega + z * dq
+        c, s = joint_cosine_and_sine(q, body.offset)
+        R = ca.horzcat(R[:, 0] * c + R[:, 1] * s, R[:, 1] * c - R[:, 0] * s, z)
+    else:
+        screw = ca.vertcat(z, ca.SX(3, 1))
+        slide = z * (q + body.offset)
+        a = a + _swing(omega, omega_dot, slide) + z * ddq + 2 * dq * ca.cross(omega, z)
+        p = p + slide
+    arm = R @ to_body[:3, 3]
+    state = [R @ to_body[:3, :3], p + arm, omega, omega_dot, a + _swing(omega, omega_dot, arm)]
+    outputs = [ca.densify(value) for value in (*state, screw)]
+    return ca.Function("joint", [*before, q, dq, ddq], ca.cse(outputs))
+
+
+def _swing(omega: ca.SX, omega_dot: ca.SX, r: ca.SX) -> ca.SX:
+    """What turning adds to the acceleration of a point at r."""
+    return ca.cross(omega_dot, r) + ca.cross(omega, ca.cross(omega, r))
+
+
+def _unit_wrenches() -> ca.Function:
+    """Force, and moment about the base's origin, for unit values of each kind of parameter, (6, 10)."""
+    R, p, omega, omega_dot, a = state = _frame_symbols()
+    turning = ca.skew(omega_dot) + ca.skew(omega) @ ca.skew(omega)
+    forces = ca.horzcat(a, turning @ R, ca.SX(3, 6))
+    in_body, in_body_dot = R.T @ omega, R.T @ omega_dot
+    spins = _tensor_times(in_body_dot) + ca.skew(in_body) @ _tensor_times(in_body)
+    moments = ca.horzcat(ca.SX(3, 1), -ca.skew(a) @ R, R @ spins)
+    wrenches = ca.vertcat(forces, moments + ca.skew(p) @ forces)
+    return ca.Function("wrenches", state, ca.cse([ca.densify(wrenches)]))
+
+
+def _tensor_times(v: ca.SX) -> ca.SX:
+    """I v as a linear map of Ixx, Ixy, Ixz, Iyy, Iyz, Izz, (3, 6)."""
+    x, y, z = v[0], v[1], v[2]
+    rows = ([x, y, z, 0, 0, 0], [0, x, 0, y, z, 0], [0, 0, x, 0, y, z])
+    return ca.vertcat(*(ca.horzcat(*row) for row in rows))
