@@ -40,7 +40,7 @@ def check_formulations(
     q, dq, ddq = states
     phi = np.zeros(mechanism.n_parameters)
     phi[kept] = rng.normal(size=kept.size)
-    plain = Dynamics(dataclasses.replace(mechanism, loops=None), once=True)
+    plain = Dynamics(dataclasses.replace(mechanism, loops=None))
     M, delta = plain.direct(q, dq, phi)
     rows, columns = np.tril_indices(mechanism.n_q)
     expected = {

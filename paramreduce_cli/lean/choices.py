@@ -81,6 +81,15 @@ def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulatio
     return [c for c in dict.fromkeys(single + together) if c != choice]
 
 
+def far_reaching(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
+    """Alternatives that matter to every wrench that is handed on past a joint, from however far."""
+    return [
+        replace(choice, **{name: not getattr(choice, name)})  # type: ignore[arg-type]
+        for name in ("aligned", "reach_turned", "projected")
+        if name in _effective(choice, joint) or (name == "projected" and joint.parent != BASE)
+    ]
+
+
 def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
     """What makes a difference at a joint."""
     names = list(_PLACED)
@@ -88,8 +97,6 @@ def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
         names += ["gauge", "diagonal", "rates"]
     if joint.parallel:
         names += ["aligned"] + ["reach_turned"] * choice.aligned
-    if joint.parent != BASE:
-        names += ["projected"]
     return names
 
 

@@ -51,6 +51,13 @@ class Symbols:
         position = self._start + derivative * len(self._joints) + i
         return Scalar(self.graph, self.graph.input(position))
 
+    def carrying(self) -> tuple[Vector, Vector, Vector]:
+        """Angular velocity and acceleration, and acceleration less gravity, of a base that moves."""
+        start = self._start + 3 * len(self._joints)
+        values = [Scalar(self.graph, self.graph.input(start + k)) for k in range(9)]
+        x, y, z = ((a, b, c) for a, b, c in zip(*[iter(values)] * 3, strict=True))
+        return x, y, z
+
     def inertia(self, body: int) -> Inertia:
         """The parameters of a body, in its frame as described."""
         m, x, y, z, *tensor = (self.parameter(body, kind) for kind in INERTIAL)
@@ -135,6 +142,10 @@ class Kinematics:
         self._zero = self.symbols.number(0.0)
         self._none = self.symbols.vector((0, 0, 0))
         self._moving = moving
+        omega, rate, acceleration = self._none, self._none, self.symbols.vector(-tree.gravity)
+        if tree.carried:
+            omega, rate, acceleration = self.symbols.carrying()
+        self._base = motion(omega, rate), acceleration
         self._screws: dict[int, dict[int, tuple[Vector, Vector]]] = {}
         self.states: list[JointState] = []
         for i in range(len(tree.joints)):
@@ -153,18 +164,18 @@ class Kinematics:
         fixed = constant_turn(self.graph, joint.turn.tobytes())
         place = self.symbols.vector(joint.place)
         aligned = before is not None and joint.parallel and choice.aligned
-        if before is None:
-            rest, reach, extra = motion(self._none, self._none), self._none, self._none
-            a = fixed.back(self.symbols.vector(-self.tree.gravity))
-        elif aligned:
+        if aligned and before is not None:
             rest, reach = before.rest_motion, before.turn.out(place)
             extra = before.joint_turning.moved(reach)
             a = add(before.rest_acceleration, before.turn.out(before.body_motion.moved(place)))
             if choice.reach_turned:
                 a = add(add(before.rest_acceleration, before.rest_motion.moved(reach)), extra)
         else:
-            rest, reach, extra = seen_through(fixed, before.body_motion), place, self._none
-            a = fixed.back(add(before.body_acceleration, before.body_motion.moved(place)))
+            carrier, a = self._base
+            if before is not None:
+                carrier, a = before.body_motion, before.body_acceleration
+            rest, reach, extra = seen_through(fixed, carrier), place, self._none
+            a = fixed.back(add(a, carrier.moved(place)))
         q, dq, ddq = (joint.sign * self.symbols.coordinate(i, k) for k in range(3))
         if not self._moving:
             ddq = self._zero

@@ -1,20 +1,28 @@
 """Find the choices that take the fewest operations.
 
 One joint after the other, from the tips inwards, the best alternative is taken until none saves
-anything. Subtrees on the base share nothing, so each is searched by itself, and equal ones once.
+anything. What is counted is the part of the tree around the joint, carried by whatever is before it,
+so that the work grows with the number of joints; only what wrenches meet that are handed on from far
+beyond is decided on the whole. Subtrees on the base share nothing, so each is searched by itself, and equal ones once.
 What is best depends on the parameters that are kept; :func:`formulations` searches for all, for
 the base parameters and for the few that matter most: masses, first moments and the moments of
 inertia about the joints' own axes.
 """
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.choices import JointFormulation, Place, alternatives, to_data
+from paramreduce_cli.lean.choices import (
+    JointFormulation,
+    Place,
+    alternatives,
+    far_reaching,
+    to_data,
+)
 from paramreduce_cli.lean.direct import mass_matrix
 from paramreduce_cli.lean.inverse import torques
 from paramreduce_cli.lean.kinematics import Kinematics
@@ -25,6 +33,9 @@ from paramreduce_cli.records import BASE, BoolArray, Formulations, IntArray, Kin
 Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], list[int]]
 """Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
 
+Options = Callable[[JointFormulation, Joint], list[JointFormulation]]
+"""Gives the alternatives to a choice at a joint."""
+
 _FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
 _MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)
 _INVERSE_STARTS = (
@@ -33,6 +44,11 @@ _INVERSE_STARTS = (
     JointFormulation(mass=Place.REST, axial=Place.REST),
     JointFormulation(aligned=True, radial=Place.REST, rates=Rates.DIRECT),
 )
+_BEFORE = 3
+"""Joints before one that are looked at for most of its choices, and those just beyond: what these
+change further away is the same for all alternatives, or nearly."""
+_LOOKS = 4
+"""At a joint, at most: what is best here and what is best there may take turns."""
 _AT_REST = JointFormulation(
     aligned=True, rates=Rates.DIRECT, radial=Place.REST, polar=Place.REST, tilt=Place.REST,
     plane=Place.REST,
@@ -134,30 +150,100 @@ def best_choices(
     return result
 
 
+@dataclass(frozen=True)
+class _Piece:
+    """What is counted to compare the alternatives at a joint."""
+
+    joints: list[int]
+    tree: Tree
+    """These joints alone."""
+    dropped: Collection[int]
+
+
 def _descended(
     tree: Tree, build: Build, start: Sequence[JointFormulation], dropped: Collection[int]
 ) -> list[JointFormulation]:
-    choices, graph = list(start), Graph()
+    pieces = []
+    for i in range(len(start)):
+        joints = _near(tree, i)
+        pieces.append(_Piece(joints, *_restricted(tree, joints, dropped)))
+    whole = _Piece(list(range(len(start))), tree, dropped)
+    choices = _settled(tree, start, build, pieces, alternatives)
+    return _settled(tree, choices, build, [whole] * len(start), far_reaching)
 
-    def count(candidate: Sequence[JointFormulation]) -> int:
-        return graph.count(build(tree, candidate, graph, dropped))
 
-    best = count(choices)
-    waiting = len(choices)
-    i = len(choices) - 1
+def _settled(
+    tree: Tree,
+    start: Sequence[JointFormulation],
+    build: Build,
+    pieces: Sequence[_Piece],
+    options: Options,
+) -> list[JointFormulation]:
+    """Take better choices, from the tips inwards, until there are none.
+
+    Args:
+        tree: The tree.
+        start: One choice per joint.
+        build: The model.
+        pieces: What is counted, per joint.
+        options: What may be chosen instead.
+    """
+    choices = list(start)
+    waiting = set(range(len(choices)))
+    looks = [0] * len(choices)
+    i, piece, graph = 0, None, Graph()
     while waiting:
-        changed = False
-        while True:
-            options = alternatives(choices[i], tree.joints[i])
-            counts = [count([*choices[:i], option, *choices[i + 1 :]]) for option in options]
-            if min(counts, default=best) >= best:
-                break
-            best = min(counts)
-            choices[i] = options[counts.index(best)]
-            changed = True
-        waiting = len(choices) - 1 if changed else waiting - 1
-        i = (i - 1) % len(choices)
+        i = max((k for k in waiting if k < i), default=max(waiting))
+        waiting.remove(i)
+        looks[i] += 1
+        if pieces[i] is not piece:
+            piece, graph = pieces[i], Graph()
+            forget()
+        found = _best_choice(i, choices, build, pieces[i], graph, options)
+        if found != choices[i]:
+            choices[i] = found
+            waiting |= {k for k in _neighbours(tree, i) if looks[k] < _LOOKS}
     return choices
+
+
+def _neighbours(tree: Tree, i: int) -> set[int]:
+    """The joints just before and beyond one."""
+    beyond = {k for k, joint in enumerate(tree.joints) if joint.parent == i}
+    return beyond | ({tree.joints[i].parent} - {BASE})
+
+
+def _best_choice(
+    i: int,
+    choices: Sequence[JointFormulation],
+    build: Build,
+    piece: _Piece,
+    graph: Graph,
+    options: Options,
+) -> JointFormulation:
+    """The choice at joint i from which no single change saves an operation."""
+
+    def count(choice: JointFormulation) -> int:
+        some = [choice if k == i else choices[k] for k in piece.joints]
+        return graph.count(build(piece.tree, some, graph, piece.dropped))
+
+    found = choices[i]
+    best = count(found)
+    joint = piece.tree.joints[piece.joints.index(i)]
+    while True:
+        others = options(found, joint)
+        counts = [count(other) for other in others]
+        if min(counts, default=best) >= best:
+            return found
+        best = min(counts)
+        found = others[counts.index(best)]
+
+
+def _near(tree: Tree, i: int) -> list[int]:
+    """A joint, those shortly before it and those just beyond."""
+    before = [i]
+    while len(before) <= _BEFORE and (parent := tree.joints[before[-1]].parent) != BASE:
+        before.append(parent)
+    return sorted({*before, *_neighbours(tree, i)})
 
 
 def _branches(tree: Tree) -> list[list[int]]:
@@ -183,8 +269,12 @@ def _restricted(
         )
         for joint in (tree.joints[i] for i in branch)
     ]
-    some = frozenset(renumbered[position] for position in positions if position in dropped)
-    return Tree(tuple(joints), tree.gravity, len(positions)), some
+    # What is beyond the tips of a part is of no less kinds than a whole body.
+    beyond = {joint.parent for k, joint in enumerate(tree.joints) if k not in place}
+    full = {p for i in branch if i in beyond for p in tree.joints[i].columns.values()}
+    some = frozenset(renumbered[p] for p in positions if p in dropped and p not in full)
+    carried = tree.carried or tree.joints[branch[0]].parent != BASE
+    return Tree(tuple(joints), tree.gravity, len(positions), carried), some
 
 
 def _signature(tree: Tree) -> tuple:

@@ -49,6 +49,8 @@ class Tree:
     """In the base frame, m/s^2, (3,)."""
     n_parameters: int
     """Number of parameters of all bodies."""
+    carried: bool = False
+    """Whether it is a part of a larger tree, whose motion carries it: the base moves."""
 
 
 def lean_tree(mechanism: Mechanism) -> Tree:

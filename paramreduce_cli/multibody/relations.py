@@ -47,27 +47,25 @@ def _sums_of_squares(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
     return result
 
 
-def named_coefficient(values: Sequence[float], functions: Sequence[dict[str, float]]) -> str | None:
+def named_coefficient(
+    values: FloatArray, texts: Sequence[str], functions: FloatArray
+) -> str | None:
     """Text of the function of the geometry that a coefficient is, with its sign.
 
     Args:
-        values: The coefficient for each of several geometries.
-        functions: :func:`candidates` of the same geometries.
+        values: The coefficient for each of several geometries, (n_geometries,).
+        texts: Of the functions that it may be.
+        functions: :func:`candidates` of the same geometries, (n_geometries, n_functions).
 
     Returns:
         Such as ``- a_3^2``; None where no function fits all geometries, or more than one does.
     """
-    found = [
-        f"{'+' if sign > 0 else '-'} {text}".rstrip()
-        for text in functions[0]
-        for sign in (1.0, -1.0)
-        if all(_same(v, sign * f[text]) for v, f in zip(values, functions, strict=True))
-    ]
-    return found[0] if len(found) == 1 else None
-
-
-def _same(a: float, b: float) -> bool:
-    return abs(a - b) <= _MATCH * abs(b)
+    missed = np.abs(functions - np.array([1.0, -1.0])[:, None, None] * values[:, None])
+    fits = np.argwhere((missed <= _MATCH * np.abs(functions)).all(axis=1))
+    if len(fits) != 1:
+        return None
+    negative, k = fits[0].tolist()
+    return f"{'-' if negative else '+'} {texts[k]}".rstrip()
 
 
 def regrouping_expressions(
@@ -81,11 +79,12 @@ def regrouping_expressions(
         beta: For several geometries of the same structure, the real one first, each (r, n - r).
         lengths: Of the same geometries, by name.
     """
-    functions = [candidates(entry) for entry in lengths]
+    found = [candidates(entry) for entry in lengths]
+    texts, functions = list(found[0]), np.array([list(entry.values()) for entry in found])
 
     def term(row: int, column: int) -> str:
-        values = [float(b[row, column]) for b in beta]
-        return named_coefficient(values, functions) or signed_number(values[0])
+        values = np.array([b[row, column] for b in beta])
+        return named_coefficient(values, texts, functions) or signed_number(values[0])
 
     return _expressions(names, kept, beta[0], term)
 
