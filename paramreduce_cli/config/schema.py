@@ -71,8 +71,8 @@ class TrajectoriesSection(Section):
     """What is minimised."""
     scaling: Scaling = "column-normalised"
     """Scaling of the base columns of W in which the criterion is measured."""
-    starts: Count = 10
-    """Random starts per trajectory."""
+    starts: Count = 4
+    """Starts per trajectory; where nothing but joint limits binds, each is the best of many random motions."""
     polished: Count = 2
     """How many of the most promising starts are optimised to the end."""
     max_iterations: Count = 250

@@ -9,15 +9,15 @@ shares of the limits that their motion uses on the grid:
 Limits are tightened by the grid's margin, so that they hold between its points too.
 """
 
+from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
 
 from paramreduce_cli.excitation.fourier import FourierBasis, grid_margin
-from paramreduce_cli.excitation.scalings import Pullback
 from paramreduce_cli.records import FloatArray, JointLimits
 
-Mapping = Literal["gauge", "ball"]
+LimitMapping = Literal["gauge", "ball"]
 _BALL_POWER = 20
 _FURTHEST = 0.999
 """Share of the position range at which a joint may rest; at the limit itself nothing could move."""
@@ -36,7 +36,7 @@ class LimitMap:
         mapping: ``gauge`` or ``ball``.
     """
 
-    def __init__(self, limits: JointLimits, basis: FourierBasis, mapping: Mapping) -> None:
+    def __init__(self, limits: JointLimits, basis: FourierBasis, mapping: LimitMapping) -> None:
         points, columns = basis.position.shape
         self.n_dof = limits.middle.size
         self.n_columns = columns
@@ -62,7 +62,9 @@ class LimitMap:
         up, down, _ = self._extremes(harmonics)
         return self._with_offset(free[:, 0], harmonics, up, down)
 
-    def admissible(self, free: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
+    def admissible(
+        self, free: FloatArray, norm: float
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
         """Admissible coefficients, and how a derivative by them is pulled back.
 
         Args:

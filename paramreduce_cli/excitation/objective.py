@@ -5,6 +5,7 @@ and so dW = 2 W dG; one reverse sweep through the regressor takes that to the st
 series' transposed basis to the coefficients.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,7 +15,7 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.criteria import Criterion
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.scalings import Pullback, Scaling, scalings
+from paramreduce_cli.excitation.scalings import Scaling, scalings
 from paramreduce_cli.multibody.dynamics import ObservationFunction
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
@@ -64,7 +65,9 @@ class Excitation:
 
     def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
         """W with every row divided by its joint's nominal torque."""
-        return self.observation.forward(q, dz, ddz) * self._row_weights(q.shape[0])
+        W = self.observation.forward(q, dz, ddz)
+        W *= self._row_weights(q.shape[0])
+        return W
 
     def _row_weights(self, points: int) -> FloatArray:
         return np.tile(1 / self.nominal_torque, points)[:, None]
@@ -90,14 +93,14 @@ class Excitation:
         states = basis.states(coefficients)
         weights = self._row_weights(states[0].shape[0])
         q, rates = positions(states[0]), states[1:]
-        W = self.observation.forward(q, *rates) * weights
+        W = self.weighted(q, *rates)
         scaled, pull = self.scaling(W, self.beta, level.maxima)
-        eigenvalues, vectors = scipy.linalg.eigh(
-            scaled.T @ scaled, driver="evd", check_finite=False, overwrite_a=True
-        )
+        gram = scaled.T @ scaled
+        eigenvalues, vectors = scipy.linalg.eigh(gram, driver="evd", check_finite=False)
         value, slope = self.criterion(eigenvalues, level.sharpness)
-        bar = 2 * scaled @ ((vectors * slope) @ vectors.T)
-        z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, pull(bar) * weights)
+        W_bar = pull(gram, (2 * vectors * slope) @ vectors.T)
+        W_bar *= weights
+        z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, W_bar)
         gradient = (
             z_bar.T @ basis.position + dz_bar.T @ basis.velocity + ddz_bar.T @ basis.acceleration
         )
@@ -182,7 +185,7 @@ class FreeObjective:
         coefficients, _ = self._admissible(x)
         return self.excitation.worst_bound(self.basis.states(coefficients)[0], self.positions)
 
-    def _admissible(self, x: FloatArray) -> tuple[FloatArray, Pullback]:
+    def _admissible(self, x: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
         free = self.mixing @ x.reshape(self.limits.n_dof, self.limits.n_columns)
         coefficients, pull = self.limits.admissible(free, self.level.limits)
         return coefficients, lambda bar: (self.mixing.T @ pull(bar)).ravel()

@@ -1,7 +1,7 @@
 """One exciting trajectory: random starts, a smooth objective that sharpens, the best kept.
 
-All starts go through the blunt levels; the most promising ones through the sharp levels,
-with IPOPT's stopping rules tightened. The numbers were chosen by measurement, on serial arms
+Many starts are drawn and the best of them kept; level by level the objective sharpens and the
+most promising go on, with IPOPT's stopping rules tightened at the end. The numbers were chosen by measurement, on serial arms
 for motions that only keep joint limits, on a parallel robot with six legs for those with bounds or loops.
 
 With loops, coordinates are mixed so that equal steps move the whole mechanism equally far:
@@ -10,7 +10,7 @@ ten times as far as others, and neither random starts nor the solver would find 
 """
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,28 +19,51 @@ from paramreduce_cli.errors import Concern, ConcernError, DataError, Paramreduce
 from paramreduce_cli.excitation.feasibility import drawn_inside, feasible_start, resting_position
 from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
-from paramreduce_cli.excitation.limits import LimitMap, Mapping
+from paramreduce_cli.excitation.limits import LimitMap, LimitMapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits, Trajectory
 
 
 @dataclass(frozen=True)
-class Plan:
-    """The levels that all starts go through, and those that the best ones go on to."""
+class Step:
+    """One level, and who goes through it."""
 
-    screening: tuple[Level, ...]
-    polishing: tuple[Level, ...]
+    level: Level
+    share: float
+    """Of the starts beyond those that are polished, 1 for all starts and 0 for these alone."""
+    rule: Mapping[str, float]
+    """When IPOPT stops."""
+    most: int = 1000
+    """Iterations, if no fewer are asked for."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """How a search goes."""
+
+    drawn: int
+    """Random series for every start; the best of them by the first level's objective are starts."""
+    steps: tuple[Step, ...]
 
 
 FREE = Plan(
-    (Level(4, 30, 30), Level(16, 80, 80)),
-    (Level(16, 80, 80), Level(32, 150, 150), Level(64, 300, 300), Level(256, 1000, 1000)),
+    75,
+    (
+        Step(Level(4, 30, 30), 1.0, LOOSE, most=60),
+        Step(Level(16, 80, 80), 0.5, LOOSE, most=100),
+        Step(Level(64, 300, 300), 0.0, TIGHT, most=150),
+        Step(Level(256, 1000, 1000), 0.0, TIGHT, most=120),
+    ),
 )
 BOUNDED = Plan(
     # The limits stay as smooth as they are: sharper ones would change the series they map to.
-    (Level(1, 80, 100, 0.1),),
-    (Level(4, 80, 200, 0.01), Level(16, 80, 400, 0.001)),
+    1,
+    (
+        Step(Level(1, 80, 100, 0.1), 1.0, LOOSE),
+        Step(Level(4, 80, 200, 0.01), 0.0, TIGHT),
+        Step(Level(16, 80, 400, 0.001), 0.0, TIGHT),
+    ),
 )
 
 
@@ -54,14 +77,19 @@ class Settings:
     points: int
     """Of the grid on which the criterion and the limits are evaluated."""
     limits: JointLimits
-    mapping: Mapping
+    mapping: LimitMapping
     starts: int
+    """How many series are optimised at first."""
     polished: int
-    """How many of the starts go on to the sharp levels."""
+    """How many of them go on to the sharp levels."""
     max_iterations: int
     """Of IPOPT, per level."""
     scaling: str
     """Name of the scaling whose condition number is reported first."""
+
+    def going_on(self, share: float) -> int:
+        """How many candidates take a step with this share."""
+        return self.polished + round(share * (self.starts - self.polished))
 
     def basis(self, finer: int = 1) -> FourierBasis:
         """The series on the grid, or on one so many times finer."""
@@ -71,11 +99,12 @@ class Settings:
 
 @dataclass
 class _Candidate:
+    start: FloatArray
+    """The free series that it began with."""
     free: FloatArray
-    kappa_start: float
     value: float
-    curvature: FloatArray | None
-    iterations: int = 0
+    """Of the objective that it went through last."""
+    curvature: FloatArray | None = None
     status: str = ""
 
 
@@ -98,28 +127,19 @@ def optimise_trajectory(
     """
     started = time.process_time()
     search = _Search(excitation, settings)
-    plan = search.plan
-    steps = settings.starts * len(plan.screening) + settings.polished * len(plan.polishing)
-    done = 0
-
-    def descend(candidate: _Candidate, levels: tuple[Level, ...], rule: dict) -> None:
-        nonlocal done
-        for level in levels:
-            search.descend(candidate, level, rule)
+    steps = search.plan.steps
+    counts = [settings.going_on(step.share) for step in steps]
+    candidates = search.starts(seed)
+    done = iterations = 0
+    for step, count in zip(steps, counts, strict=True):
+        candidates = sorted(candidates, key=lambda candidate: candidate.value)[:count]
+        for candidate in candidates:
+            iterations += search.descend(candidate, step)
             done += 1
-            progress(done / steps)
-
-    candidates = []
-    for start in range(settings.starts):
-        candidate = search.start([*seed, start])
-        descend(candidate, plan.screening, LOOSE)
-        candidates.append(candidate)
-    candidates.sort(key=lambda candidate: candidate.value)
-    chosen = candidates[: settings.polished]
+            progress(done / sum(counts))
     results: list[tuple[_Candidate, FloatArray, float]] = []
     failures: list[ParamreduceError] = []
-    for candidate in chosen:
-        descend(candidate, plan.polishing, TIGHT)
+    for candidate in candidates:
         try:
             series = search.result(candidate)
             results.append((candidate, series, search.kappa(series)))
@@ -134,9 +154,9 @@ def optimise_trajectory(
         excitation,
         settings,
         series,
-        kappa_start=best.kappa_start,
+        kappa_start=search.kappa_start(best),
         cpu_seconds=time.process_time() - started,
-        iterations=sum(candidate.iterations for candidate in candidates),
+        iterations=iterations,
         status=best.status,
     )
 
@@ -160,41 +180,51 @@ class _Search:
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
 
-    def start(self, seed: list[int]) -> _Candidate:
+    def starts(self, seed: list[int]) -> list[_Candidate]:
+        """Random series, each with what the first level's objective says of it."""
+        result = []
+        for start in range(self._settings.starts * self.plan.drawn):
+            free = self._drawn(np.random.default_rng([*seed, start]))
+            value, _ = self._objective(self.plan.steps[0].level)(free.ravel())
+            result.append(_Candidate(free, free, value if np.isfinite(value) else np.inf))
+        return result
+
+    def _drawn(self, rng: np.random.Generator) -> FloatArray:
         """A normal random series, scaled to its limits and drawn together to keep its bounds."""
-        rng = np.random.default_rng(seed)
         limits = self._limits
         free = rng.normal(size=(limits.n_dof, limits.n_columns))
         if not self._bounded:  # on a scale of its own for every joint
             free[:, 1:] /= limits.shares(free)[:, None]
-            return _Candidate(free, self.kappa(limits.scaled(free)), np.inf, None)
+            return free
         free[:, 1:] /= limits.shares(self._mixing @ free).max()
         still = np.zeros_like(free)
         still[:, 0] = np.linalg.solve(self._mixing, limits.resting_offset(self._rest))
-        level = self.plan.screening[0]
-        free = feasible_start(free, still, self._objective(level))
-        series, _ = limits.admissible(self._mixing @ free, level.limits)
-        try:
-            kappa = self.kappa(series)
-        except DataError:  # closed on the grid, but not between its points
-            kappa = np.inf
-        return _Candidate(free, kappa, np.inf, None)
+        return feasible_start(free, still, self._objective(self.plan.steps[0].level))
 
-    def descend(self, candidate: _Candidate, level: Level, rule: dict) -> None:
-        """Take a candidate through one level."""
-        objective = self._objective(level)
+    def kappa_start(self, candidate: _Candidate) -> float:
+        """The condition number that a candidate began with."""
+        if not self._bounded:
+            return self.kappa(self._limits.scaled(candidate.start))
+        norm = self.plan.steps[0].level.limits
+        try:
+            return self.kappa(self._limits.admissible(self._mixing @ candidate.start, norm)[0])
+        except DataError:  # closed on the grid, but not between its points
+            return np.inf
+
+    def descend(self, candidate: _Candidate, step: Step) -> int:
+        """Take a candidate through one step; the iterations it took."""
         end = minimise(
-            objective,
+            self._objective(step.level),
             candidate.free.ravel(),
-            self._settings.max_iterations,
+            min(self._settings.max_iterations, step.most),
             candidate.curvature,
-            rule,
+            step.rule,
         )
         candidate.free = end.x.reshape(candidate.free.shape)
         candidate.value = end.value
         candidate.curvature = end.curvature
-        candidate.iterations += end.iterations
         candidate.status = end.status
+        return end.iterations
 
     def _objective(self, level: Level) -> FreeObjective:
         positions = Follower(self._excitation.coordinates)
@@ -207,7 +237,7 @@ class _Search:
         if not self._bounded:
             return self._limits.scaled(candidate.free)
         series, _ = self._limits.admissible(
-            self._mixing @ candidate.free, self.plan.polishing[-1].limits
+            self._mixing @ candidate.free, self.plan.steps[-1].level.limits
         )
         return drawn_inside(self._excitation, series, self._rest, self._settings.basis(FINER))
 

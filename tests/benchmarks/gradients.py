@@ -38,8 +38,8 @@ class Differences:
 def descend(make, start):
     started = time.process_time()
     x, curvature = start, None
-    for level in FREE.screening:
-        end = minimise(make(level), x, 100, curvature)
+    for step in FREE.steps[:2]:
+        end = minimise(make(step.level), x, 100, curvature)
         x, curvature = end.x, end.curvature
     return time.process_time() - started, end.value
 

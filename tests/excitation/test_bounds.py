@@ -36,8 +36,8 @@ def case(request):
 def test_gradient_with_the_barrier_against_finite_differences(case):
     excitation, settings, _ = case
     search = _Search(excitation, settings)
-    start = search.start([0, 3])
-    assert start.kappa_start < 1e5  # beyond, round-off in the Gram matrix shows
+    (start,) = search.starts([3])
+    assert search.kappa_start(start) < 1e5  # beyond, round-off in the Gram matrix shows
     objective = search._objective(Level(4, 80, 50, 0.1))
     x = start.free.ravel()
     value, gradient = objective(x)

@@ -8,10 +8,12 @@ from paramreduce_cli.records import FloatArray
 
 def column_normalised(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
     """Columns divided by their 2-norms."""
-    norms = np.maximum(np.linalg.norm(W, axis=0), np.finfo(float).tiny)
+    norms = np.maximum(np.sqrt(np.einsum("ij,ij->j", W, W)), np.finfo(float).tiny)
     scaled = W / norms
 
-    def pull(bar: FloatArray) -> FloatArray:
-        return (bar - scaled * np.einsum("ij,ij->j", bar, scaled)) / norms
+    def pull(gram: FloatArray, C: FloatArray) -> FloatArray:
+        along = np.einsum("ij,ij->j", gram, C)  # the diagonal of S' (S C)
+        result: FloatArray = scaled @ ((C - np.diag(along)) / norms)
+        return result
 
     return scaled, pull

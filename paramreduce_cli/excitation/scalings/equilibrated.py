@@ -1,5 +1,7 @@
 """Columns and rows of unit size."""
 
+from collections.abc import Callable
+
 import numpy as np
 
 from paramreduce_cli.excitation.scalings import Pullback
@@ -10,10 +12,12 @@ def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArr
     """Columns divided by their largest magnitude, then rows by theirs."""
     columns, pull_columns = _divide_by_largest(W, 0, norm)
     rows, pull_rows = _divide_by_largest(columns, 1, norm)
-    return rows, lambda bar: pull_columns(pull_rows(bar))
+    return rows, lambda _, C: pull_columns(pull_rows(rows @ C))
 
 
-def _divide_by_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, Pullback]:
+def _divide_by_largest(
+    W: FloatArray, axis: int, norm: float
+) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
     size, share = _largest(W, axis, norm)
     scaled = W / size
 

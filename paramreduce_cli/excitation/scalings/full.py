@@ -13,4 +13,4 @@ def full(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pull
     L L' = 1 + beta beta'.
     """
     L = np.linalg.cholesky(np.eye(beta.shape[0]) + beta @ beta.T)
-    return W @ L, lambda bar: bar @ L.T
+    return W @ L, lambda _, C: W @ (L @ C @ L.T)

@@ -6,4 +6,4 @@ from paramreduce_cli.records import FloatArray
 
 def weighted(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
     """Rows weighted by the nominal torques, columns as they are."""
-    return W, lambda bar: bar
+    return W, lambda _, C: W @ C
