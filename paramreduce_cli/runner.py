@@ -126,7 +126,8 @@ class Runner:
         arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
         if stage.previous is not None:
             arguments[stage.previous.name] = previous
-        parts = self._lend_run(stage, arguments, inputs)
+        unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
+        parts = self._lend_run(stage, arguments, inputs, unchanged)
         try:
             record = stage.function(**arguments)
         except ConcernError as error:
@@ -160,6 +161,11 @@ class Runner:
             return False
         return self.store.is_whole(stage.output)
 
+    def made_otherwise(self, stage: Stage) -> bool:
+        """Whether a stage's artifact is there, made from other sections of the config."""
+        stamp = self.store.stamp(stage.output)
+        return self.config is not None and stamp is not None and bool(self._changed_sections(stamp))
+
     def _changed_sections(self, stamp: Stamp) -> list[str]:
         assert self.config is not None
         return [
@@ -167,6 +173,15 @@ class Runner:
             for name, digest in stamp.sections.items()
             if section_digest(self.config, tuple(name.split("."))) != digest
         ]
+
+    def _unchanged(self, stage: Stage, inputs: _Inputs) -> frozenset[str]:
+        """Sections and files that are what they were when the stage ran before."""
+        stamp = self.store.stamp(stage.output)
+        if stamp is None or self.config is None:
+            return frozenset()
+        sections = set(stamp.sections) - set(self._changed_sections(stamp))
+        same = {name for name, digest in inputs.digests.items() if stamp.inputs.get(name) == digest}
+        return frozenset(sections | same)
 
     def _input_digests(self, stage: Stage) -> dict[str, str]:
         inputs = _Inputs(self.config)
@@ -252,7 +267,9 @@ class Runner:
             found[name] = load_recording(path, self.config.n_dof)
         return Recordings(**found)
 
-    def _lend_run(self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs) -> Parts | None:
+    def _lend_run(
+        self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs, unchanged: frozenset[str]
+    ) -> Parts | None:
         """Hand workers, finished parts and progress to a stage that asks for them."""
         if stage.lends_run is None:
             return None
@@ -263,7 +280,7 @@ class Runner:
             stamp = self._stamp(stage, inputs, time.perf_counter())
             parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
         arguments[stage.lends_run.name] = Run(
-            self.jobs, {} if parts is None else parts, self.progress, self.interrupted
+            self.jobs, {} if parts is None else parts, self.progress, self.interrupted, unchanged
         )
         return parts
 

@@ -2,7 +2,7 @@ import h5py
 import pytest
 from conftest import config_of, run_stages
 
-from paramreduce_cli.artifacts.store import Store, file_of
+from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.runner import Runner
@@ -87,3 +87,22 @@ def test_files_of_a_former_report_are_removed(two_link_copy):
     run_stages(two_link_copy, "report.formats=[png]")
     kinds = {p.suffix for p in (two_link_copy / "report" / "figures").iterdir()}
     assert kinds == {".png"}
+
+
+def test_new_limits_are_judged_without_measuring_again(two_link_copy, monkeypatch):
+    def measured_again(*_):
+        raise AssertionError("measured again")
+
+    monkeypatch.setattr("paramreduce_cli.stages.validate.acceleration_errors", measured_again)
+    stage, store = STAGES["validate"], Store(two_link_copy)
+    before, _ = load_file(store.path(stage.output), stage.output, None, "")
+    config = config_of("two_link", "validation.accept.torque_error_validation=1e-6")
+    judged = Runner(config, store).run(stage).record
+    assert judged.accepted is False
+    assert judged.heuristics.keys() == before.heuristics.keys()
+    assert judged.stability.variants == before.stability.variants
+    with pytest.raises(AssertionError, match="measured again"):
+        Runner(config, store).run(stage, force=True)
+    config = config_of("two_link", "validation.operations=independent")
+    with pytest.raises(AssertionError, match="measured again"):
+        Runner(config, store).run(stage)

@@ -35,7 +35,9 @@ def main() -> None:
         error.show()
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
-        err.print("\nInterrupted. What is finished is kept: the same command goes on from there.")
+        err.print(
+            "\nInterrupted. Finished stages, trajectories and proofs are kept: the same command goes on from there."
+        )
         code = INTERRUPTED
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

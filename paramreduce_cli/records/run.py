@@ -45,3 +45,6 @@ class Run:
     progress: Callable[[Progress], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""
+    unchanged: frozenset[str] = frozenset()
+    """Names of the sections and files that are what they were when the stage made what it is given as
+    made before; none of them where everything is to be done again."""

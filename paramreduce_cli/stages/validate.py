@@ -16,6 +16,7 @@ from paramreduce_cli.lean.counting import COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.records import (
+    CountedDynamics,
     DataChange,
     DataVariant,
     FloatArray,
@@ -39,6 +40,10 @@ from paramreduce_cli.reduction.setup import effort, selection_columns, selection
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
+_MEASURED_ON = frozenset(
+    {"model.h5", "samples.h5", "reduction.h5", "reduction", "validation.operations"}
+)
+"""What measurements and stability depend on."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _NODES = 50_000
@@ -47,17 +52,58 @@ _NODES = 50_000
 
 def validate(
     judging: ValidationSection,
+    counted: CountedDynamics,
     wanted: SelectedSection,
     search: ReductionSection,
     model: Model,
     samples: Samples,
     reduction: Reduction,
+    previous: Validation | None,
     run: Run,
 ) -> Validation:
     """Judge the reduced models on both sets.
 
+    What was measured before on the same models and samples is judged anew, not measured again.
+
     Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
     """
+    known = previous if run.unchanged >= _MEASURED_ON else None
+    measured = known or _measured(model, samples, reduction, counted)
+    heuristics, full = measured.heuristics, measured.full
+    selected = select(wanted, model, reduction, heuristics)
+    chosen = (selected.heuristic, selected.n)
+    if not judging.stability:
+        repeated = None
+    elif known and known.stability and (known.selected.heuristic, known.selected.n) == chosen:
+        repeated = known.stability
+    else:
+        repeated = _stability(search, model, samples, reduction, selected, run)
+    accepted, sentence = verdict(judging.accept, selected, heuristics[selected.heuristic])
+    return Validation(
+        heuristics=heuristics,
+        full=full,
+        nominal_acceleration=measured.nominal_acceleration,
+        selected=selected,
+        pareto=pareto_front(heuristics),
+        stability=repeated,
+        accepted=accepted,
+        verdict=sentence,
+        remarks=tuple(remarks(judging, heuristics, full, selected)),
+    )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Measured:
+    """What all models are worth, whichever is selected and whatever is accepted."""
+
+    heuristics: dict[str, HeuristicValidation]
+    full: dict[str, float]
+    nominal_acceleration: FloatArray
+
+
+def _measured(
+    model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics
+) -> _Measured:
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
     dynamics = Dynamics(model.mechanism)
@@ -75,27 +121,12 @@ def validate(
         return torque, acceleration
 
     estimation, validation = errors_on(samples.estimation), errors_on(samples.validation)
-    counts = Counts(model, judging.operations)
+    counts = Counts(model, counted)
     heuristics = {}
     for name, found in reduction.heuristics.items():
         operations = np.array([counts.all(reduction.model(name, k)) for k in range(found.n.size)])
         heuristics[name] = _judged(found.n, operations, estimation, validation, models.rows[name])
-    full = _full_model(model, counts, estimation[1], validation[1])
-    selected = select(wanted, model, reduction, heuristics)
-    accepted, sentence = verdict(judging.accept, selected, heuristics[selected.heuristic])
-    return Validation(
-        heuristics=heuristics,
-        full=full,
-        nominal_acceleration=nominal,
-        selected=selected,
-        pareto=pareto_front(heuristics),
-        stability=_stability(search, model, samples, reduction, selected, run)
-        if judging.stability
-        else None,
-        accepted=accepted,
-        verdict=sentence,
-        remarks=tuple(remarks(judging, heuristics, full, selected)),
-    )
+    return _Measured(heuristics, _full_model(model, counts, estimation[1], validation[1]), nominal)
 
 
 def _check_coordinates(model: Model, samples: Samples) -> None:

@@ -1,5 +1,6 @@
 import json
 import re
+import shutil
 
 import h5py
 import pytest
@@ -149,3 +150,15 @@ def test_schema_is_json_schema(invoke):
 )
 def test_wrong_usage(invoke, arguments):
     assert "Traceback" not in "".join(invoke(*arguments, code=2))
+
+
+def test_run_says_what_settings_replace_in_the_default_folder(
+    two_link_copy, tmp_path, monkeypatch, invoke
+):
+    monkeypatch.chdir(tmp_path)
+    shutil.copytree(two_link_copy, "results/two_link")
+    assert "--set" not in invoke("run", TWO_LINK, "--quiet").err
+    changed = ["report.title=Other", "report.formats=[svg]"]
+    err = " ".join(invoke("run", TWO_LINK, "--quiet", settings=changed).err.split())
+    assert "which --set replaces from report on" in err
+    assert "--set" not in invoke("run", TWO_LINK, "--quiet", "--results", "x", settings=changed).err

@@ -55,6 +55,8 @@ def run(
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
     with placed_errors(config, overrides), store.locked():
+        if overrides and results is None:
+            _say_what_is_replaced(Runner(loaded, store))
         for stage in stages_to_run(loaded):
             with progress_bars(quiet) as progress:
                 runner = Runner(
@@ -73,6 +75,16 @@ def run(
         for text in selected["remarks"]:
             remark(text.rstrip("."))
     return say_verdict(selected["accepted"], selected["verdict"], quiet)
+
+
+def _say_what_is_replaced(runner: Runner) -> None:
+    assert runner.config is not None
+    others = [s.name for s in stages_to_run(runner.config) if runner.made_otherwise(s)]
+    if others:
+        remark(
+            f"{runner.store.folder} holds results of other settings, which --set replaces from "
+            f"{others[0]} on; name another folder in --results to keep both"
+        )
 
 
 def _say_summary(summary: dict[str, Any]) -> None:
