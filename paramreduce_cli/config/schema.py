@@ -71,7 +71,7 @@ class TrajectoriesSection(Section):
     """What is minimised."""
     scaling: Scaling = "column-normalised"
     """Scaling of the base columns of W in which the criterion is measured."""
-    starts: Count = 4
+    starts: Count = 8
     """Starts per trajectory; where nothing but joint limits binds, each is the best of many random motions."""
     polished: Count = 2
     """How many of the most promising starts are optimised to the end."""

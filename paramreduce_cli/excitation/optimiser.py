@@ -48,12 +48,12 @@ class Plan:
 
 
 FREE = Plan(
-    75,
+    25,
     (
-        Step(Level(4, 30, 30), 1.0, LOOSE, most=60),
-        Step(Level(16, 80, 80), 0.5, LOOSE, most=100),
-        Step(Level(64, 300, 300), 0.0, TIGHT, most=150),
-        Step(Level(256, 1000, 1000), 0.0, TIGHT, most=120),
+        Step(Level(4, 30, 30), 1.0, LOOSE, most=50),
+        Step(Level(16, 80, 80), 0.5, LOOSE, most=80),
+        Step(Level(32, 150, 150), 0.0, TIGHT, most=150),
+        Step(Level(256, 1000, 1000), 0.0, TIGHT, most=200),
     ),
 )
 BOUNDED = Plan(
