@@ -1,6 +1,15 @@
 import numpy as np
 import pytest
-from conftest import branching_tree, puma_mechanism, random_states, slope, standard_arm, whole
+from conftest import (
+    branching_tree,
+    dh,
+    mechanism_of,
+    puma_mechanism,
+    random_states,
+    slope,
+    standard_arm,
+    whole,
+)
 from oracles import pinocchio_model
 from oracles.lagrange import Lagrange
 
@@ -38,6 +47,27 @@ def test_observation_matrix_agrees_with_pinocchio(make):
     states = random_states(mechanism, 50)
     found = Dynamics(mechanism).regressor(*states)
     assert relative(found, pinocchio_model.regressor(mechanism, *states)) < 1e-12
+
+
+def test_many_joints_agree_with_pinocchio():
+    """The regressor of so many is not written out as scalars."""
+    angles = (0, np.pi / 2, -0.7, np.pi / 2, 0)
+    rows = [
+        (str(k), str(max(0, k - 1 - k % 2)) if k else None, "prismatic" if k == 5 else "revolute",
+         0.1 * (k % 3), angles[k % 5], 0.2 * (k % 2))
+        for k in range(20)
+    ]  # fmt: skip
+    mechanism = mechanism_of(dh(rows), [1.0, -2.0, -9.0])
+    states = random_states(mechanism, 5)
+    found = Dynamics(mechanism).regressor(*states)
+    assert relative(found, pinocchio_model.regressor(mechanism, *states)) < 1e-12
+    columns = np.array([3, 25, 60, 199])
+    observation = Dynamics(mechanism).observation(columns)
+    assert relative(observation.forward(*states), found[..., columns].reshape(-1, 4)) < 1e-12
+    seed, direction = np.random.default_rng(3).normal(size=(2, 100, 4)), states[1]
+    gradient = observation.adjoint(*states, seed[0])[0]
+    change = slope(lambda *s: np.sum(observation.forward(*s) * seed[0]), states, direction, 0)
+    assert change == pytest.approx(np.sum(gradient * direction), rel=1e-6)
 
 
 @pytest.mark.parametrize("make", [branching_tree, standard_arm])
