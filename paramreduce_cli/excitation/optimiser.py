@@ -1,8 +1,8 @@
 """One exciting trajectory: random starts, a smooth objective that sharpens, the best kept.
 
 Many starts are drawn and the best of them kept; level by level the objective sharpens and the
-most promising go on, with IPOPT's stopping rules tightened at the end. The numbers were chosen by measurement, on serial arms
-for motions that only keep joint limits, on a parallel robot with six legs for those with bounds or loops.
+most promising go on, with IPOPT's stopping rules tightened at the end. The numbers were chosen by
+measurement, on serial arms for motions that only keep joint limits, on a parallel robot with six legs for those with bounds or loops.
 
 With loops, coordinates are mixed so that equal steps move the whole mechanism equally far:
 left to themselves, some combinations of slides of a parallel robot would turn its platform

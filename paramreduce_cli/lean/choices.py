@@ -65,7 +65,10 @@ OPTIONS: dict[str, tuple[Any, ...]] = {
 
 
 def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
-    """What else may be chosen at a joint: one thing differs, or several parts are in one other place."""
+    """What else may be chosen at a joint: one thing differs, or several parts are in one other place.
+
+    Whether wrenches are projected is for :func:`far_reaching` alone.
+    """
     names = _effective(choice, joint)
     places = tuple(Place) if joint.revolute else (Place.OWN, Place.BEFORE)
     single = [
@@ -83,11 +86,8 @@ def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulatio
 
 def far_reaching(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
     """Alternatives that matter to every wrench that is handed on past a joint, from however far."""
-    return [
-        replace(choice, **{name: not getattr(choice, name)})  # type: ignore[arg-type]
-        for name in ("aligned", "reach_turned", "projected")
-        if name in _effective(choice, joint) or (name == "projected" and joint.parent != BASE)
-    ]
+    names = _aligning(choice, joint) + ["projected"] * (joint.parent != BASE)
+    return [replace(choice, **{name: not getattr(choice, name)}) for name in names]  # type: ignore[arg-type]
 
 
 def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
@@ -95,9 +95,11 @@ def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
     names = list(_PLACED)
     if joint.revolute:
         names += ["gauge", "diagonal", "rates"]
-    if joint.parallel:
-        names += ["aligned"] + ["reach_turned"] * choice.aligned
-    return names
+    return names + _aligning(choice, joint)
+
+
+def _aligning(choice: JointFormulation, joint: Joint) -> list[str]:
+    return ["aligned"] * joint.parallel + ["reach_turned"] * (joint.parallel and choice.aligned)
 
 
 def to_data(choice: JointFormulation) -> dict[str, str | bool]:
