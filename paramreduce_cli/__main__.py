@@ -1,6 +1,8 @@
 """Entry of the command line, also as ``python -m paramreduce_cli``.
 
-The libraries take a moment to load; Ctrl-C must not show their insides meanwhile.
+The libraries take a moment to load; Ctrl-C must not show their insides meanwhile. Linear algebra
+keeps to one thread unless the user says otherwise: the matrices here are narrow, and what takes long
+runs in workers.
 """
 
 import os
@@ -9,6 +11,7 @@ import signal
 
 def main() -> None:
     """Load the command line and run it."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
     signal.signal(signal.SIGINT, lambda *_: os._exit(130))
     from paramreduce_cli.cli import main as run
 

@@ -1,9 +1,12 @@
 """Mechanisms and finished runs that several tests look at."""
 
 import json
+import os
 import shutil
 import sys
 from pathlib import Path
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before NumPy is loaded
 
 import numpy as np
 import pytest

@@ -21,8 +21,6 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing.queues import Queue
 
-import threadpoolctl
-
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.objective import Excitation
@@ -163,7 +161,6 @@ def _start_worker(parent: int, task: ExcitationTask, news: Queue[Progress | None
     threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    threadpoolctl.threadpool_limits(1)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
     _Worker.task, _Worker.news = task, news
     _Worker.excitation = _excitation(task)

@@ -54,16 +54,15 @@ def acceleration_errors(
             part = slice(start, start + step)
             found = direct(block.q[part], block.dq[part], parameters)
             M, bias = (np.moveaxis(values, -1, 1) for values in found)
-            values, vectors = np.linalg.eigh(M)
+            values = np.linalg.eigvalsh(M)
             sizes = np.abs(values)
             largest = sizes.max(axis=2)
             singular = sizes.min(axis=2) <= SINGULAR_MASS * np.maximum(
                 largest, np.finfo(float).tiny
             )
-            safe = np.where(singular[..., None], np.nan, values)
+            M[singular] = np.nan
             right = (block.tau[part][:, None, :] - bias)[..., None]
-            along = (vectors.swapaxes(2, 3) @ right)[..., 0] / safe
-            ddz = (vectors @ along[..., None])[..., 0]
+            ddz = np.linalg.solve(M, right)[..., 0]
             error = (ddz - block.ddz[part][:, None, :]) / nominal_acceleration
             squares += np.where(np.isnan(error), np.inf, error**2).sum(axis=0)
             total += np.sum((block.ddz[part] / nominal_acceleration) ** 2, axis=0)

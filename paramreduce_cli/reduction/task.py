@@ -2,10 +2,9 @@
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 
 import numpy as np
-from threadpoolctl import ThreadpoolController
 
 from paramreduce_cli.records import IntArray, Progress, Proofs
 from paramreduce_cli.reduction.heuristics import heuristics
@@ -62,16 +61,9 @@ class FoundSubsets:
     proofs: Proofs | None = None
 
 
-@cache
-def _threads() -> ThreadpoolController:
-    """The libraries that use threads; finding them takes longer than a greedy search."""
-    return ThreadpoolController()
-
-
 def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
-    """Run a heuristic by its name; on one core, as its matrices are too small for more."""
-    with _threads().limit(limits=1):
-        found: FoundSubsets = heuristics[heuristic](task)
+    """Run a heuristic by its name."""
+    found: FoundSubsets = heuristics[heuristic](task)
     return found
 
 

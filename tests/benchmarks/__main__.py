@@ -1,5 +1,9 @@
 """Run all benchmarks and print one table of ratios."""
 
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # NumPy's own; peers choose theirs
+
 import rich.box
 import rich.console
 import rich.table

@@ -5,7 +5,8 @@ import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import Effort, dependent_problem, found, problem
 
-from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
+from paramreduce_cli.reduction.best_subset.parts import PartedSearch
+from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
 
 KINDS = ("generic", "sparse", "proportional", "dependent", "near-dependent", "nearly-parallel")
 
@@ -87,6 +88,49 @@ def test_a_search_can_be_stopped_anywhere_and_continued():
     assert error == pytest.approx(whole.squared_error, rel=1e-9)
     assert whole.nodes > 300
     assert whole.nodes <= nodes < 2 * whole.nodes
+
+
+@pytest.mark.parametrize("threads", [1, 3])
+def test_parts_of_a_search_find_and_prove_what_it_does_alone_and_can_be_continued(threads):
+    p = unit_problem(hard_problem())
+    whole = Search(p, 8, *start(p, 8))
+    whole.advance(10**9)
+    log, error, subset, nodes = BEGINNING, *start(p, 8), 0
+    while True:
+        parted = PartedSearch(lambda log: Search(p, 8, error, subset, log=log), log)  # noqa: B023
+        for _ in range(4):
+            if not parted.finished:
+                parted.advance(23, threads)
+        log, error, subset, nodes = (
+            parted.log,
+            parted.squared_error,
+            parted.subset,
+            nodes + parted.nodes,
+        )
+        assert (log.size == 0) == parted.finished
+        assert parted.bound <= whole.squared_error * (1 + 1e-9)
+        if parted.finished:
+            break
+    assert error == pytest.approx(whole.squared_error, rel=1e-9)
+    assert parted.bound == pytest.approx(whole.squared_error, rel=1e-6)
+    assert whole.nodes <= nodes < 2 * whole.nodes
+
+
+def test_a_split_search_leaves_nothing_out():
+    """Every part is searched alone for a subset worse than the best: one of them finds the best."""
+    p = unit_problem(hard_problem())
+    whole = Search(p, 8, *start(p, 8))
+    whole.advance(10**9)
+    for ahead in (1, 20, 150):
+        own = Search(p, 8, *start(p, 8))
+        own.advance(ahead)
+        parts = [own, own.split(), *([own.split()] if ahead > 1 else [])]
+        known = own.squared_error
+        for part in parts:
+            part.advance(10**9)
+        assert min(part.squared_error for part in parts) == pytest.approx(whole.squared_error)
+        assert whole.squared_error < known
+        assert all(part.split() is None for part in parts)
 
 
 def test_a_search_for_less_proves_a_lower_bound():

@@ -362,7 +362,7 @@ def _exclude_parallel(
 
 
 @numba.njit(cache=True)
-def _go_back(s: State, data: Data) -> None:
+def go_back(s: State, data: Data) -> None:
     """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
     level = s.progress[LEVEL]
@@ -538,7 +538,7 @@ def search(s: State, data: Data, most: int) -> tuple[int, int]:
     singles = data.size.max() == 1
     for nodes in range(most):
         if s.progress[GOING_BACK] == 1:
-            _go_back(s, data)
+            go_back(s, data)
             s.progress[GOING_BACK] = 0
         level = s.progress[LEVEL]
         if level < 0:

@@ -2,14 +2,16 @@
 
 import threading
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
+from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import (
+    BEGINNING,
     Search,
     UnitProblem,
     compile_search,
@@ -45,7 +47,7 @@ class _Proof:
     status: ProofStatus = ProofStatus.BEST_FOUND
     seconds: float = 0.0
     nodes: int = 0
-    log: IntArray = field(default_factory=lambda: np.zeros(0, np.int64))
+    log: IntArray = field(default_factory=BEGINNING.copy)
 
     def take(self, subset: IntArray, squared_error: float) -> None:
         """Remember a better subset."""
@@ -140,12 +142,16 @@ class ProofSearch:
         self, pool: ThreadPoolExecutor, budget: int, deadline: float, stop: threading.Event
     ) -> None:
         """Search for every size that is open up to a number of nodes in all."""
+        waiting = self._open()
 
         def work(proof: _Proof) -> None:
+            before = self._spent.get(proof.n, 0)
             search = self._search(proof)
-            self._advance(search, budget - self._spent.get(proof.n, 0), deadline, stop)
-            self._spent[proof.n] = self._spent.get(proof.n, 0) + search.nodes
+            for nodes in self._slices(proof, search, budget - before, deadline, stop):
+                search.advance(nodes, self._threads(len(waiting)))
+            self._spent[proof.n] = before + search.nodes
             self._take_over(proof, search)
+            waiting.remove(proof)
 
         shown = -1
         for future in as_completed([pool.submit(work, proof) for proof in self._open()]):
@@ -156,17 +162,31 @@ class ProofSearch:
                 self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
                 shown = done
 
-    def _search(self, proof: _Proof, factor: float = 1.0) -> Search:
-        log = proof.log if factor == 1.0 else None
-        return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
+    def _threads(self, waiting: int) -> int:
+        """For one size, when so many are searched or wait for it.
 
-    def _advance(self, search: Search, nodes: int, deadline: float, stop: threading.Event) -> None:
+        A limit of nodes is to stop every machine at the same place, so then a size has but one.
+        """
+        effort = self._task.effort
+        return 1 if effort.node_limit else max(1, effort.jobs // waiting)
+
+    def _search(self, proof: _Proof, factor: float = 1.0) -> PartedSearch:
+        def part(log: IntArray) -> Search:
+            return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
+
+        return PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
+
+    def _slices(
+        self, proof: _Proof, search: PartedSearch, nodes: int, deadline: float,
+        stop: threading.Event,
+    ) -> Iterator[int]:  # fmt: skip
+        """Numbers of nodes to go on for, until there is a reason to stop."""
         started = time.perf_counter()
-        while not search.finished and search.nodes < nodes and not stop.is_set():
+        while search.nodes < nodes and not (search.finished or stop.is_set()):
             if time.monotonic() > deadline:
                 break
-            search.advance(min(_SLICE, nodes - search.nodes))
-        search.seconds = time.perf_counter() - started
+            yield min(_SLICE, nodes - search.nodes)
+        proof.seconds += time.perf_counter() - started
 
     def _raise_bounds(
         self, pool: ThreadPoolExecutor, deadline: float, stop: threading.Event
@@ -180,28 +200,27 @@ class ProofSearch:
             known = np.sqrt(proof.squared_bound / proof.squared_error)
             for share in (share for share in _SHARES if share > known):
                 search = self._search(proof, factor=share**2)
-                self._advance(search, _NODES_PER_SHARE, deadline, stop)
-                proof.seconds += search.seconds
+                for nodes in self._slices(proof, search, _NODES_PER_SHARE, deadline, stop):
+                    search.advance(nodes, threads=1)
                 if not search.finished or not self._certain(search):
                     return
                 proof.squared_bound = max(proof.squared_bound, search.bound)
 
         list(pool.map(work, self._open()))
 
-    def _certain(self, search: Search) -> bool:
+    def _certain(self, search: PartedSearch) -> bool:
         return self._problem.certifiable and not search.doubtful
 
-    def _take_over(self, proof: _Proof, search: Search) -> None:
+    def _take_over(self, proof: _Proof, search: PartedSearch) -> None:
         """Note how far a search has come."""
         if search.squared_error < proof.squared_error and search.subset.size:
             better = self._filled(search.subset, proof.n)
             proof.take(better, self._squared_error(better))
         proof.nodes += search.nodes
-        proof.seconds += search.seconds
         certain = self._certain(search)
         if certain:
             proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
-        proof.log = np.zeros(0, np.int64) if search.finished else search.log
+        proof.log = search.log
         if search.finished or not certain:
             proof.status = ProofStatus.OPTIMAL if certain else ProofStatus.UNCERTIFIED
         if proof.status == ProofStatus.OPTIMAL:

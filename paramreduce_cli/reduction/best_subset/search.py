@@ -26,6 +26,8 @@ _FEW_DEPENDENT = 8
 take half the nodes (6 of 70), those of an arm several times as many (18 of 63)."""
 _PART = 1e-8
 """Coefficient from which on a column is made of another."""
+BEGINNING: IntArray = np.zeros(0, np.int64)
+"""The log of a search that has not begun."""
 _SLACK = 1e-12
 """Round-off of a squared error that is updated step by step; what is as near is calculated anew."""
 
@@ -105,7 +107,7 @@ class Search:
         subset: That subset, numbered as the columns of ``problem``.
         factor: Share of the best squared error that is searched for: below one, a finished
             search proves that much as a lower bound.
-        log: Where an earlier search of the same kind has stopped.
+        log: Where an earlier search of the same kind has stopped; empty at the beginning.
     """
 
     def __init__(
@@ -115,11 +117,11 @@ class Search:
         squared_error: float,
         subset: IntArray,
         factor: float = 1.0,
-        log: IntArray | None = None,
+        log: IntArray = BEGINNING,
     ) -> None:
         from paramreduce_cli.reduction.best_subset import kernel
 
-        self._kernel = kernel
+        self._kernel, self._problem, self._factor = kernel, problem, factor
         self._data = kernel.Data(
             columns=np.ascontiguousarray(problem.X.T),
             chi=problem.chi,
@@ -135,9 +137,7 @@ class Search:
         self._state = self._root(problem, places, squared_error, subset)
         self.finished = False
         self.nodes = 0
-        self.seconds = 0.0
-        if log is not None and log.size:
-            kernel.repeat(self._state, self._data, log.astype(np.int64))
+        kernel.repeat(self._state, self._data, log.astype(np.int64))
 
     def _root(
         self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
@@ -174,6 +174,32 @@ class Search:
         status, visited = self._kernel.search(self._state, self._data, nodes)
         self.nodes += visited
         self.finished = status == self._kernel.DONE
+
+    def split(self) -> Search | None:
+        """Make the branch that waits nearest to the root a search of its own, if there is one."""
+        log = self.log
+        marks = np.flatnonzero(log == 0)
+        if self.finished or not marks.size:
+            return None
+        first = int(marks[0])
+        given = self._from(log[: first + 2])
+        self._kernel.go_back(given._state, given._data)
+        # Without its mark the branch is a decision like those before it, and nothing waits there.
+        own = self._from(np.delete(log, first))._state
+        own.progress[self._kernel.DOUBTFUL] += self._state.progress[self._kernel.DOUBTFUL]
+        self._state = own
+        return given
+
+    def _from(self, log: IntArray) -> Search:
+        places = self._data.places
+        return Search(self._problem, places, self.squared_error, self.subset, self._factor, log)
+
+    def learn(self, squared_error: float, subset: IntArray) -> None:
+        """Take over what another search of the same size has found."""
+        if squared_error < self.squared_error:
+            self._state.best[0] = squared_error
+            self._state.subset[:] = -1
+            self._state.subset[: subset.size] = subset
 
     @property
     def squared_error(self) -> float:
