@@ -21,7 +21,7 @@ help:
 	@echo "make check       lint, format and types"
 	@echo "make regression  compare with the committed references"
 	@echo "make reference   renew the committed references"
-	@echo "make benchmark   measure speed, as ratios"
+	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -81,6 +81,7 @@ reference: $(REFERENCES)
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
+	$(if $(BEFORE),$(BIN)/python -m tests.benchmarks.revisions $(BEFORE))
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1

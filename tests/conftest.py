@@ -15,7 +15,7 @@ from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
 from paramreduce_cli.config import load_config
 from paramreduce_cli.pipeline import stages_to_run
-from paramreduce_cli.records import ReducedModel
+from paramreduce_cli.records import ReducedModel, Run
 from paramreduce_cli.robots import Robot
 from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages.build_model import build_model
@@ -89,7 +89,7 @@ def model_of(robot, *overrides):
 
 def config_and_model(robot, *overrides):
     config = config_of(robot, *overrides)
-    return config, build_model(config, config.model)
+    return config, build_model(config, config.model, Run())
 
 
 def constraints_of(config, mechanism):

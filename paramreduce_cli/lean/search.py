@@ -9,6 +9,7 @@ the base parameters and for the few that matter most: masses, first moments and 
 inertia about the joints' own axes.
 """
 
+import itertools
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -28,7 +29,15 @@ from paramreduce_cli.lean.inverse import torques
 from paramreduce_cli.lean.kinematics import Kinematics
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.tree import Joint, Tree, lean_tree
-from paramreduce_cli.records import BASE, BoolArray, Formulations, IntArray, Kind, Mechanism
+from paramreduce_cli.records import (
+    BASE,
+    BoolArray,
+    Formulations,
+    IntArray,
+    Kind,
+    Mechanism,
+    Progress,
+)
 
 Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], list[int]]
 """Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
@@ -83,13 +92,19 @@ _found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
 
 
-def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> Formulations:
+def formulations(
+    mechanism: Mechanism,
+    affecting: BoolArray,
+    base: IntArray,
+    progress: Callable[[Progress], None] = lambda _: None,
+) -> Formulations:
     """Search the formulations of a mechanism.
 
     Args:
         mechanism: Its tree is what counts.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
+        progress: Told when one of the six searches has ended.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.
@@ -100,13 +115,22 @@ def formulations(mechanism: Mechanism, affecting: BoolArray, base: IntArray) -> 
     regrouped = everything - set(base.tolist())
     minor = useless | (everything - _main_parameters(tree))
 
+    ended = itertools.count(1)
+
+    def best(
+        build: Build, start: list[JointFormulation], dropped: set[int]
+    ) -> list[JointFormulation]:
+        choices = best_choices(tree, build, start, dropped)
+        progress(Progress("search for formulations", next(ended), 6))
+        return choices
+
     def searched(
         build: Build, starts: tuple[JointFormulation, ...]
     ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
         same, *others = ([start] * len(tree.joints) for start in starts)
-        full = best_choices(tree, build, same, useless)
-        of_base = best_choices(tree, build, full, regrouped)
-        of_few = best_choices(tree, build, same, minor)
+        full = best(build, same, useless)
+        of_base = best(build, full, regrouped)
+        of_few = best(build, same, minor)
         found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
         return tuple(tuple(map(to_data, one)) for one in found)
 

@@ -8,7 +8,9 @@
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
+#include <functional>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "arm.h"
@@ -22,20 +24,33 @@
 namespace {
 
 constexpr int N = 256;
-constexpr int repeats = 400;
-constexpr int rounds = 9;
+constexpr int repeats = 8;
+constexpr int rounds = 300;
 
-template <class Work>
-void report(const char *name, Work work) {
+struct Entry {
+  std::string name;
+  std::function<void()> work;
   std::vector<double> times;
-  for (int round = 0; round < rounds; ++round) {
-    const auto start = std::chrono::steady_clock::now();
-    for (int k = 0; k < repeats; ++k) work();
-    const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - start;
-    times.push_back(spent.count() / repeats / N);
+};
+std::vector<Entry> entries;
+
+void enter(const char *name, std::function<void()> work) { entries.push_back({name, work, {}}); }
+
+// All of them in turn, in small turns, so that what disturbs one disturbs its neighbours too.
+void report() {
+  for (int round = 0; round < rounds; ++round)
+    for (Entry &entry : entries) {
+      entry.work();
+      const auto start = std::chrono::steady_clock::now();
+      for (int k = 0; k < repeats; ++k) entry.work();
+      const std::chrono::duration<double, std::nano> spent = std::chrono::steady_clock::now() - start;
+      entry.times.push_back(spent.count() / repeats / N);
+    }
+  for (const Entry &entry : entries) {
+    std::printf("%s", entry.name.c_str());
+    for (double time : entry.times) std::printf(" %.2f", time);
+    std::printf("\n");
   }
-  std::sort(times.begin(), times.end());
-  std::printf("%s %.2f\n", name, times[rounds / 2]);
 }
 
 double q[N][6], dq[N][6], ddq[N][6], tau[N][6], M[N][36], delta[N][6];
@@ -45,21 +60,21 @@ double all_q[6 * N], all_dq[6 * N], all_ddq[6 * N], all_tau[6 * N], all_M[36 * N
 
 #define COMPARE(NAME)                                                                            \
   do {                                                                                           \
-    double phi[NAME##_n_parameters];                                                             \
+    static double phi[NAME##_n_parameters];                                                      \
     static double K[N][6 * NAME##_n_parameters];                                                 \
     NAME##_parameters(phi);                                                                      \
-    report(#NAME "_idm", [&] {                                                                   \
-      for (int k = 0; k < N; ++k) NAME##_inverse_dynamics(phi, q[k], dq[k], ddq[k], tau[k]);      \
+    enter(#NAME "_idm", [&] {                                                                    \
+      for (int k = 0; k < N; ++k) NAME##_inverse_dynamics(phi, q[k], dq[k], ddq[k], tau[k]);     \
     });                                                                                          \
-    report(#NAME "_idm_batch",                                                                   \
-           [&] { NAME##_inverse_dynamics_batch(N, phi, all_q, all_dq, all_ddq, all_tau); });      \
-    report(#NAME "_ddm", [&] {                                                                   \
-      for (int k = 0; k < N; ++k) NAME##_direct_dynamics(phi, q[k], dq[k], M[k], delta[k]);       \
+    enter(#NAME "_idm_batch",                                                                    \
+           [&] { NAME##_inverse_dynamics_batch(N, phi, all_q, all_dq, all_ddq, all_tau); });     \
+    enter(#NAME "_ddm", [&] {                                                                    \
+      for (int k = 0; k < N; ++k) NAME##_direct_dynamics(phi, q[k], dq[k], M[k], delta[k]);      \
     });                                                                                          \
-    report(#NAME "_ddm_batch",                                                                   \
-           [&] { NAME##_direct_dynamics_batch(N, phi, all_q, all_dq, all_M, all_delta); });       \
-    report(#NAME "_regressor", [&] {                                                             \
-      for (int k = 0; k < N; ++k) NAME##_K_regressor(q[k], dq[k], ddq[k], K[k]);                  \
+    enter(#NAME "_ddm_batch",                                                                    \
+           [&] { NAME##_direct_dynamics_batch(N, phi, all_q, all_dq, all_M, all_delta); });      \
+    enter(#NAME "_regressor", [&] {                                                              \
+      for (int k = 0; k < N; ++k) NAME##_K_regressor(q[k], dq[k], ddq[k], K[k]);                 \
     });                                                                                          \
   } while (false)
 
@@ -101,24 +116,25 @@ int main() {
   std::printf("difference %.3e\n", worst);
 
   double sink = 0;
-  report("rnea", [&] {
+  enter("rnea", [&] {
     for (int k = 0; k < N; ++k) sink += pinocchio::rnea(model, data, Q[k], V[k], A[k])[0];
   });
-  report("crba_bias", [&] {
+  enter("crba_bias", [&] {
     for (int k = 0; k < N; ++k) {
       sink += pinocchio::crba(model, data, Q[k])(0, 0);
       sink += pinocchio::nonLinearEffects(model, data, Q[k], V[k])[0];
     }
   });
-  report("aba", [&] {
+  enter("aba", [&] {
     for (int k = 0; k < N; ++k) sink += pinocchio::aba(model, data, Q[k], V[k], A[k])[0];
   });
-  report("regressor", [&] {
+  enter("regressor", [&] {
     for (int k = 0; k < N; ++k)
       sink += pinocchio::computeJointTorqueRegressor(model, data, Q[k], V[k], A[k])(0, 9);
   });
   COMPARE(full);
   COMPARE(base);
   COMPARE(fs18);
+  report();
   return sink == 1e300;
 }

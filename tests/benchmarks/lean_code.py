@@ -9,8 +9,11 @@ import hashlib
 import os
 import shutil
 import subprocess
+import sys
 import warnings
 from pathlib import Path
+
+import numpy as np
 
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
@@ -23,6 +26,7 @@ FLAGS = ["-O3", "-march=native", "-DNDEBUG"]
 DEFINITIONS = ["BOOST_MPL_LIMIT_LIST_SIZE=30", "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
                "BOOST_MPL_CFG_NO_PREPROCESSED_HEADERS", "BOOST_FUSION_INVOKE_MAX_ARITY=12"]  # fmt: skip
 """Of Pinocchio's headers, as its CMake targets say."""
+PINNED = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
 FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
 DYNAMIC = [Kind.of(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
 """Pinocchio's order."""
@@ -100,9 +104,17 @@ def driver():
 
 
 def measured():
-    """Nanoseconds a state by name."""
-    lines = subprocess.run([driver()], capture_output=True, text=True, check=True).stdout
-    return {name: float(value) for name, value in map(str.split, lines.splitlines())}
+    """Nanoseconds a state by name, of all rounds; on one core, which it keeps."""
+    program, core = driver(), max(os.sched_getaffinity(0))
+    command = [sys.executable, "-c", PINNED, str(core), program]
+    lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    return {name: np.array(times, float) for name, *times in map(str.split, lines.splitlines())}
+
+
+def compared(what, ours, theirs, limit):
+    """The ratio of the least times, and how far it spreads over the rounds."""
+    low, high = np.percentile(ours / theirs, [10, 90])
+    return f"{what} ({low:.3f} to {high:.3f})", ours.min() / theirs.min(), limit
 
 
 def rows():
@@ -110,18 +122,19 @@ def rows():
         print("lean code: left out, gcc and g++ are not installed")
         return
     t = measured()
-    if not t["difference"] < 1e-9:
-        raise SystemExit(f"Pinocchio and the exported model differ by {t['difference']}")
+    if not t["difference"][0] < 1e-9:
+        raise SystemExit(f"Pinocchio and the exported model differ by {t['difference'][0]}")
     for name, inverse, direct in (("full", 4, 6), ("base", 4, 6), ("fs18", 6, 8)):
-        yield f"{name} d / rnea", t[f"{name}_idm"] / t["rnea"], 1 / inverse
-        yield f"{name} [M, delta] / crba + bias", t[f"{name}_ddm"] / t["crba_bias"], 1 / direct
-        yield f"{name} [M, delta] / aba", t[f"{name}_ddm"] / t["aba"], 1.0
-        yield f"{name} regressor / Pinocchio's", t[f"{name}_regressor"] / t["regressor"], 1.0
-        for kind, what in (("idm", "d"), ("ddm", "[M, delta]")):
-            ratio = t[f"{name}_{kind}_batch"] / t[f"{name}_{kind}"]
-            yield f"{name} {what}, batched / single", ratio, 1 / 3
+        d, direct_d, K = (t[f"{name}_{what}"] for what in ("idm", "ddm", "regressor"))
+        yield compared(f"{name} d / rnea", d, t["rnea"], 1 / inverse)
+        yield compared(f"{name} [M, delta] / crba + bias", direct_d, t["crba_bias"], 1 / direct)
+        yield compared(f"{name} [M, delta] / aba", direct_d, t["aba"], 1.0)
+        yield compared(f"{name} regressor / Pinocchio's", K, t["regressor"], 1.0)
+        yield compared(f"{name} d, batched / single", t[f"{name}_idm_batch"], d, 1 / 3)
+        batched = t[f"{name}_ddm_batch"]
+        yield compared(f"{name} [M, delta], batched / single", batched, direct_d, 1 / 3)
 
 
 if __name__ == "__main__":
-    for key, value in measured().items():
-        print(key, value)
+    for key, times in measured().items():
+        print(key, times.min())

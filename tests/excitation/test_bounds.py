@@ -15,6 +15,7 @@ from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.records import Run
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import _settings
 
@@ -90,7 +91,7 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
         robot="four_bar",
     )  # fmt: skip
     config = load_config(path)
-    model = build_model(config, config.model)
+    model = build_model(config, config.model, Run())
     excitation = excitation_of(
         model.mechanism, model.base, model.nominal_torque, "condition-number", "weighted"
     )

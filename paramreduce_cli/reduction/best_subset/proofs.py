@@ -26,6 +26,8 @@ _SLICE = 20_000
 _FIRST_ROUND, _GROWTH = 30_000, 8
 """Nodes for each size in the first round, and how many times more in each further one."""
 _UNLIMITED = 10**15
+_LONG = 3.0
+"""Of a compilation, s: longer than to load what has been compiled before."""
 _SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
 """Of the best error, that are tried as lower bounds where the optimum is not proven."""
 _NODES_PER_SHARE = 30_000
@@ -112,7 +114,7 @@ class ProofSearch:
 
         In rounds of growing effort, so that what is easily proven does not wait for the rest.
         """
-        compile_search()
+        self._compile()
         stop = threading.Event()
         deadline = time.monotonic() + self._task.effort.time_limit
         budget = _FIRST_ROUND
@@ -130,6 +132,22 @@ class ProofSearch:
                 stop.set()
                 self._task.interrupted()
         self._spread()
+
+    def _compile(self) -> None:
+        """Compile the search, and say so where that has not been done on this machine before."""
+        said = threading.Event()
+
+        def tell(done: int) -> None:
+            said.set()
+            what = "compile the search for best subsets, once for all runs"
+            self._task.progress(Progress(what, done, 1))
+
+        late = threading.Timer(_LONG, tell, (0,))
+        late.start()
+        compile_search()
+        late.cancel()
+        if said.is_set():
+            tell(1)
 
     def _open(self) -> list[_Proof]:
         return [
