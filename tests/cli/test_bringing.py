@@ -1,7 +1,7 @@
 import h5py
 import numpy as np
 import pytest
-from conftest import CONFIGS, TWO_LINK, summary_of
+from conftest import CONFIGS, ONE_FORMAT, TWO_LINK, summary_of
 
 
 @pytest.fixture
@@ -83,7 +83,7 @@ def test_brought_coefficients_repeat_everything_after_the_optimiser(
     invoke, two_link_results, tmp_path
 ):
     summary = two_link_results / "report" / "summary.json"
-    file = [f"trajectories.file={summary}"]
+    file = [f"trajectories.file={summary}", ONE_FORMAT]
     invoke("run", TWO_LINK, "--results", tmp_path, "--quiet", settings=file)
     invoke("compare", summary, tmp_path)
 
@@ -103,7 +103,8 @@ def test_brought_states_and_torques(invoke, two_link_results, tmp_path, write_co
             np.savetxt(tmp_path / f"{which}.csv", table, delimiter=",", header=header, comments="")
     sampling = "sampling:\n  estimation_file: estimation.csv\n  validation_file: validation.csv\n\nselected:"
     path = write_config(("selected:", sampling))
-    assert "optimize-trajectories" not in invoke("run", path, "--results", tmp_path / "r").out
+    run = invoke("run", path, "--results", tmp_path / "r", settings=[ONE_FORMAT])
+    assert "optimize-trajectories" not in run.out
     found, expected = (
         summary_of(folder)["selected"]["torque_error"]
         for folder in (tmp_path / "r", two_link_results)

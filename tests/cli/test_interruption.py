@@ -14,7 +14,7 @@ PARAMREDUCE = [sys.executable, "-m", "paramreduce_cli"]
 @pytest.fixture
 def arguments(write_config, tmp_path):
     """Of a run that takes a while."""
-    slow = ("  count: 10\n", "  count: 12\n  starts: 2\n  polished: 1\n")
+    slow = ("  count: 10\n", "  count: 6\n  starts: 2\n  polished: 1\n")
     return [write_config(slow, robot="puma560"), "--results", tmp_path / "r"]
 
 

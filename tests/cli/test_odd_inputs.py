@@ -8,7 +8,7 @@ import sys
 import h5py
 import numpy as np
 import pytest
-from conftest import TWO_LINK
+from conftest import ONE_FORMAT, TWO_LINK
 
 ALIASES = "a0: &a0 [x, x]\n" + "".join(
     f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 9)
@@ -170,7 +170,8 @@ def test_names_cannot_steer_the_terminal(invoke, brought, tmp_path):
 def test_odd_surroundings(two_link_results, changes):
     environment = {k: v for k, v in {**os.environ, **changes}.items() if v is not None}
     environment.pop("PARAMREDUCE_CACHE", None)
-    run = command("run", TWO_LINK, "--results", two_link_results, env=environment)
+    same = ("--results", two_link_results, "--set", ONE_FORMAT)
+    run = command("run", TWO_LINK, *same, env=environment)
     assert run.returncode == 0, run.stderr
     assert b"forward-selection" in run.stdout
     done = command("inspect", two_link_results / "model.h5", env=environment)

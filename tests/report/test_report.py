@@ -1,11 +1,13 @@
 import csv
 import io
+import shutil
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
 import h5py
 import numpy as np
 import pytest
+from conftest import run_stages
 
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.table import Table
@@ -17,16 +19,26 @@ def folder(two_link_results):
     return two_link_results / "report"
 
 
+@pytest.fixture(scope="module")
+def in_every_format(two_link_results, tmp_path_factory):
+    """The folder of a report with figures in all formats."""
+    copy = tmp_path_factory.mktemp("formats") / "results"
+    shutil.copytree(two_link_results, copy)
+    run_stages(copy, "report.formats=[pdf, svg, png]")
+    return copy / "report"
+
+
 @pytest.mark.parametrize(
     "name",
     ["trajectory", "torque-error", "operations", "error-vs-operations", "torques",
      "acceleration-error", "poses", "mass-matrix-condition"],
 )  # fmt: skip
-def test_figures_are_there_in_every_format(folder, name):
+def test_figures_are_there_in_every_format(in_every_format, name):
+    folder = in_every_format / "figures"
     assert name in figures
-    assert (folder / "figures" / f"{name}.pdf").read_bytes().startswith(b"%PDF")
-    assert (folder / "figures" / f"{name}.png").read_bytes().startswith(b"\x89PNG")
-    ET.fromstring((folder / "figures" / f"{name}.svg").read_text())
+    assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
+    assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
+    ET.fromstring((folder / f"{name}.svg").read_text())
 
 
 @pytest.mark.parametrize("name", list(tables))
