@@ -21,6 +21,7 @@ LAYERS = [
     {"excitation", "reduction", "lean"},
     {"multibody"},
     {"expressions"},
+    {"importing"},
     {"config"},
     {"robots"},
     {"fields"},

@@ -1,36 +1,86 @@
 """The command that writes a config to begin with."""
 
 import re
+import tempfile
 from pathlib import Path
 
 import click
 
 from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.section import NAME
+from paramreduce_cli.importing.simplified import Choice, simplified
+from paramreduce_cli.importing.urdf import read_urdf
+from paramreduce_cli.importing.writing import config_text
 
 
 @click.command()
-@click.argument("name")
-@click.option("--dh", is_flag=True, required=True, help="A Denavit-Hartenberg description.")
-@click.option("--joints", type=click.IntRange(1, 30), default=6, show_default=True)
-@click.option("--output", type=click.Path(path_type=Path), help="[default: configs/NAME.yaml]")
-def init(name: str, dh: bool, joints: int, output: Path | None) -> None:
-    """Write a commented config for a new arm.
+@click.argument("source", metavar="ROBOT.urdf|NAME")
+@click.option("--dh", is_flag=True, help="A Denavit-Hartenberg description, to be filled in.")
+@click.option(
+    "--joints", type=click.IntRange(1, 30), default=6, show_default=True, help="With --dh."
+)
+@click.option("--root", metavar="LINK", help="What stands still.  [default: the file's root]")
+@click.option("--tip", metavar="LINK", help="The end of a chain; joints beside it are locked at 0.")
+@click.option("--lock", "locked", multiple=True, metavar="JOINT=VALUE",
+              help="A joint that does not move, rad or m; may be repeated.")  # fmt: skip
+@click.option("--ignore", "ignored", multiple=True, metavar="LINK",
+              help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
+@click.option("--floating", is_flag=True, help="The root moves freely.")
+@click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
+def init(
+    source: str, dh: bool, joints: int, root: str | None, tip: str | None,
+    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, output: Path | None,
+) -> None:  # fmt: skip
+    """Write a commented config: from a URDF, or for an arm to be described with --dh.
 
-    Example: paramreduce init --dh my_arm --joints 6
+    Of a URDF links that cannot move against each other become one body, rounded angles are taken
+    for what they were, limits and inertias are taken over. The config is the robot from then on.
+
+    Example: paramreduce init robot.urdf --output configs/robot.yaml
     """
+    if dh:
+        name, text = source, _described(source, joints)
+    else:
+        choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating)
+        robot = simplified(read_urdf(Path(source)), choice)
+        name, text = robot.name, config_text(robot)
+        for remark in robot.remarks:
+            say(f"- {remark}.")
     path = output or Path("configs") / f"{name}.yaml"
+    if path.exists():
+        raise ConfigError(f"{path}: exists already; choose another with --output.")
+    _check(text)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
+    todo = "Fill in what is marked TODO, then: " if "TODO" in text else ""
+    say(f"Wrote {path}. {todo}paramreduce run {path}")
+
+
+def _described(name: str, joints: int) -> str:
     if not re.fullmatch(NAME, name, re.ASCII):
         raise ConfigError(
             f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
         )
-    if path.exists():
-        raise ConfigError(f"{path}: exists already; choose another with --output.")
+    return dh_template(name, joints)
+
+
+def _lock(text: str) -> tuple[str, float]:
+    joint, _, value = text.rpartition("=")
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(dh_template(name, joints), encoding="utf-8")
-    except OSError as error:
-        raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
-    say(f"Wrote {path}. Fill in what is marked TODO, then: paramreduce run {path}")
+        return joint, float(value)
+    except ValueError as error:
+        raise ConfigError(f"--lock {text}: write JOINT=VALUE with a number, rad or m.") from error
+
+
+def _check(text: str) -> None:
+    """See that the config can be loaded, before anything is written."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "config.yaml"
+        path.write_text(text, encoding="utf-8")
+        load_config(path)

@@ -1,0 +1,272 @@
+"""An imported robot as the bodies of a config: what cannot move is one body with what carries it."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.importing.imported import (
+    ImportedJoint,
+    ImportedRobot,
+    Inertial,
+    Steps,
+    matrix,
+    together,
+)
+from paramreduce_cli.robots.tree import rotation_to
+
+BASE = "base"
+"""What configs call the fixed base."""
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What of a robot is wanted."""
+
+    root: str | None = None
+    """The link that stands still; the file's own root if left out."""
+    tip: str | None = None
+    """The last link of a chain; joints beside it are locked."""
+    locked: Mapping[str, float] | None = None
+    """Coordinates of joints that do not move, rad or m."""
+    ignored: tuple[str, ...] = ()
+    """Links that are left out, with all that they carry."""
+    floating: bool = False
+    """Whether the root moves freely."""
+
+
+@dataclass(frozen=True)
+class ImportedBody:
+    """One body of the config, with the joint that carries it."""
+
+    name: str
+    parent: str
+    joint: str
+    """A kind of joint of configs."""
+    axis: tuple[float, ...] | None
+    """None where the joint has none to choose."""
+    at: Steps
+    coordinate: str | None
+    """None where the joint has several, which are called after the body."""
+    inertial: Inertial
+    limits: ImportedJoint | None
+    """The joint of the file, for its limits; None where there is none."""
+    massless: bool = False
+
+
+@dataclass(frozen=True)
+class SimplifiedRobot:
+    """Bodies, parents above their children, and what people should know of them."""
+
+    name: str
+    source: str
+    bodies: tuple[ImportedBody, ...]
+    remarks: tuple[str, ...]
+
+
+def simplified(robot: ImportedRobot, choice: Choice) -> SimplifiedRobot:
+    """Merge what does not move, and name everything as configs allow.
+
+    Raises:
+        ConfigError: A name that is asked for is not there, or nothing moves.
+    """
+    return _Simplification(robot, choice).result()
+
+
+class _Simplification:
+    def __init__(self, robot: ImportedRobot, choice: Choice) -> None:
+        self._robot, self._choice = robot, choice
+        self._remarks = list(robot.remarks)
+        self._children: dict[str, list[ImportedJoint]] = {}
+        for joint in robot.joints:
+            self._children.setdefault(joint.parent, []).append(joint)
+        self._check()
+        self._root = self._found_root()
+        self._locked = dict(choice.locked or {})
+        if choice.tip is not None:
+            self._lock_beside(choice.tip)
+        self._names = _Names(self._remarks)
+
+    def _check(self) -> None:
+        choice = self._choice
+        links, joints = list(self._robot.links), [joint.name for joint in self._robot.joints]
+        asked = [("--root", choice.root, links), ("--tip", choice.tip, links)]
+        asked += [("--ignore", name, links) for name in choice.ignored]
+        asked += [("--lock", name, joints) for name in choice.locked or {}]
+        for option, name, known in asked:
+            if name is not None and name not in known:
+                kind = "joint" if option == "--lock" else "link"
+                raise ConfigError(f"{option} {name}: {unknown(kind, name, known)}.")
+
+    def _found_root(self) -> str:
+        if self._choice.root is not None:
+            return self._choice.root
+        carried = {joint.child for joint in self._robot.joints}
+        roots = [name for name in self._robot.links if name not in carried]
+        if len(roots) > 1:
+            raise ConfigError(
+                f"{self._robot.source}: no joint carries {', '.join(roots)}; a robot has one such link. "
+                "Say which is meant with --root."
+            )
+        return roots[0]
+
+    def _lock_beside(self, tip: str) -> None:
+        above = {joint.child: joint for joint in self._robot.joints}
+        chain, link = set(), tip
+        while link != self._root:
+            if link not in above:
+                raise ConfigError(f"--tip {tip}: is not carried by the root {self._root}.")
+            chain.add(above[link].name)
+            link = above[link].parent
+        beside = [j.name for j in self._robot.joints if j.kind != "fixed" and j.name not in chain]
+        for name in beside:
+            self._locked.setdefault(name, 0.0)
+        if beside:
+            self._remarks.append(f"not on the way to {tip}, so locked at 0: {', '.join(beside)}")
+
+    def result(self) -> SimplifiedRobot:
+        bodies: list[ImportedBody] = []
+        inertials: dict[str, list[Inertial]] = {}
+        if self._choice.floating:
+            name = self._names.body(self._root)
+            bodies.append(ImportedBody(name, BASE, "free", None, (), None, Inertial(), None))
+            waiting: list[tuple[str, str, Steps]] = [(self._root, name, ())]
+        else:
+            waiting = [(self._root, BASE, ())]
+        while waiting:
+            link, carrier, steps = waiting.pop()
+            inertial = self._robot.links[link]
+            if inertial is not None:
+                inertials.setdefault(carrier, []).append(inertial.seen(matrix(steps)))
+            for joint in reversed(self._children.get(link, [])):
+                if joint.child in self._choice.ignored:
+                    continue
+                at = (*steps, *joint.origin)
+                if joint.kind == "fixed" or joint.name in self._locked:
+                    still = _motion(joint, self._locked.get(joint.name, 0.0))
+                    waiting.append((joint.child, carrier, (*at, *still)))
+                else:
+                    waiting.append((joint.child, self._moving(joint, carrier, at, bodies), ()))
+        if not bodies:
+            raise ConfigError(
+                f"{self._robot.source}: no joint is left that moves; give --floating if "
+                "the root moves freely."
+            )
+        filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
+        self._remark_on_mimics()
+        name = self._names.clean(self._robot.name) or "robot"
+        return SimplifiedRobot(name, self._robot.source, tuple(filled), tuple(self._remarks))
+
+    def _moving(
+        self, joint: ImportedJoint, carrier: str, at: Steps, bodies: list[ImportedBody]
+    ) -> str:
+        """Append the bodies of a joint; the name of the last of them, which is the link."""
+        name = self._names.body(joint.child)
+        coordinate = self._names.coordinate(joint.name)
+        if joint.kind == "floating":
+            bodies.append(ImportedBody(name, carrier, "free", None, at, None, Inertial(), None))
+        elif joint.kind == "planar":
+            turn = rotation_to(np.array(joint.axis))
+            for k, letter in enumerate("xy"):
+                slide, axis = self._names.body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
+                bodies.append(
+                    ImportedBody(
+                        slide, carrier, "prismatic", axis, at, f"{coordinate}_{letter}", Inertial(),
+                        None, massless=True,
+                    )
+                )  # fmt: skip
+                carrier, at = slide, ()
+            bodies.append(
+                ImportedBody(
+                    name, carrier, "revolute", joint.axis, at, coordinate, Inertial(), None
+                )
+            )
+        else:
+            kind = "prismatic" if joint.kind == "prismatic" else "revolute"
+            bodies.append(
+                ImportedBody(name, carrier, kind, joint.axis, at, coordinate, Inertial(), joint)
+            )
+        return name
+
+    def _filled(self, body: ImportedBody, parts: list[Inertial]) -> ImportedBody:
+        inertial = together(parts)
+        if not body.massless and not inertial.mass:
+            self._remarks.append(f"{body.name} has no mass in the file: TODO")
+        return ImportedBody(**{**vars(body), "inertial": inertial})
+
+    def _remark_on_mimics(self) -> None:
+        free = [j for j in self._robot.joints if j.mimics and j.name not in self._locked]
+        for joint in free:
+            self._remarks.append(
+                f"{joint.name} follows {joint.mimics} in the file; here it moves on its own. Lock it with "
+                f"--lock {joint.name}=VALUE if it does not move"
+            )
+
+
+def _in_order(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:
+    """Each branch after the body that carries it, in the file's order."""
+    left = list(bodies)
+    by_parent: dict[str, list[ImportedBody]] = {}
+    for body in left:
+        by_parent.setdefault(body.parent, []).append(body)
+    result: list[ImportedBody] = []
+    waiting = list(by_parent.get(BASE, []))
+    while waiting:
+        body = waiting.pop()
+        result.append(body)
+        waiting += by_parent.get(body.name, [])
+    return result
+
+
+def _motion(joint: ImportedJoint, value: float) -> Steps:
+    """Steps of a joint that stays at one coordinate."""
+    if joint.kind in ("fixed", "floating", "planar") or value == 0:
+        return ()
+    if joint.kind == "prismatic":
+        return (("xyz", tuple(value * x for x in joint.axis)),)
+    axis = np.array(joint.axis)
+    for k, key in enumerate(("rx", "ry", "rz")):
+        if abs(axis[k]) == 1.0:
+            return ((key, value * float(axis[k])),)
+    turn = rotation_to(axis)
+    return (*_yaw_pitch_roll(turn), ("rz", value), *_yaw_pitch_roll(turn.T))
+
+
+def _yaw_pitch_roll(R: np.ndarray) -> Steps:
+    pitch = -math.asin(max(-1.0, min(1.0, float(R[2, 0]))))
+    yaw, roll = math.atan2(R[1, 0], R[0, 0]), math.atan2(R[2, 1], R[2, 2])
+    return (("rz", yaw), ("ry", pitch), ("rx", roll))
+
+
+class _Names:
+    """Names that configs allow, each once."""
+
+    def __init__(self, remarks: list[str]) -> None:
+        self._remarks = remarks
+        self._bodies: dict[str, str] = {BASE: BASE}
+        self._coordinates: dict[str, str] = {}
+
+    def body(self, link: str) -> str:
+        return self._own(link, self._bodies, "link")
+
+    def coordinate(self, joint: str) -> str:
+        return self._own(joint, self._coordinates, "joint")
+
+    def _own(self, name: str, taken: dict[str, str], kind: str) -> str:
+        own = self.clean(name) or kind
+        while own in taken:
+            own += "_"
+        taken[own] = name
+        if own != name:
+            self._remarks.append(f"the {kind} {name!r} is called {own} here")
+        return own
+
+    def clean(self, name: str) -> str:
+        """A name with nothing but what configs allow."""
+        return re.sub(r"^[_.-]+", "", re.sub(r"[^A-Za-z0-9_.-]", "_", name))

@@ -1,0 +1,200 @@
+"""A simplified robot as the text of a config that is valid as it is."""
+
+from __future__ import annotations
+
+import math
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from paramreduce_cli.importing.angles import angle_text, number_text
+from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
+from paramreduce_cli.importing.simplified import ImportedBody, SimplifiedRobot
+from paramreduce_cli.records import JOINT_COORDINATES
+
+_NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
+_DIRECTIONS = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+_SPEED = {"revolute": 1.5, "prismatic": 0.5, "free": 0.5}
+"""Where a file has no limit of the velocity, rad/s or m/s."""
+_RANGE = {"revolute": "[-pi, pi]", "prismatic": "[-0.5, 0.5]", "free": "[-0.5, 0.5]"}
+"""Where it has none of the position, rad or m."""
+
+
+def config_text(robot: SimplifiedRobot) -> str:
+    """The config of a robot.
+
+    Args:
+        robot: With names that configs allow.
+    """
+    parts = [_head(robot), _description(robot), _parameters(robot), _limits(robot), _TAIL]
+    return "\n".join(parts)
+
+
+def _head(robot: SimplifiedRobot) -> str:
+    lines = [
+        f"{robot.name}: from {robot.source} by `paramreduce init`; this file is the robot from now on.",
+        "Units are SI; numbers may be written as 1e-3 or pi/2. `paramreduce schema` lists every key.",
+    ]
+    if robot.remarks:
+        lines += ["", "What was done, or is left to do:"]
+        lines += [f"- {remark}." for remark in robot.remarks]
+    text = "".join(_comment(line) for line in lines)
+    return f"{text}robot: {_name(robot.name)}\n"
+
+
+def _comment(line: str) -> str:
+    printable = "".join(c if c.isprintable() else " " for c in line)
+    indent = "  " if line.startswith("- ") else ""
+    return "".join(
+        f"# {part}".rstrip() + "\n"
+        for part in textwrap.wrap(printable, 96, subsequent_indent=indent) or [""]
+    )
+
+
+def _description(robot: SimplifiedRobot) -> str:
+    lines = [
+        "description:",
+        "  gravity: [0, 0, -9.81]        # acceleration of gravity in the base frame, m/s^2",
+        "  tree:",
+        "    # A body's frame is its joint's; `at` is where that is in the parent's frame, step by step.",
+        "    bodies:",
+    ]
+    lines += [f"      - {_body(body)}" for body in robot.bodies]
+    return "\n".join(lines) + "\n"
+
+
+def _body(body: ImportedBody) -> str:
+    items = [f"name: {_name(body.name)}"]
+    if body.parent != "base":
+        items.append(f"parent: {_name(body.parent)}")
+    items.append(f"joint: {body.joint}")
+    if body.axis is not None:
+        items.append(f"axes: {_axis(body.axis)}")
+    if body.at:
+        items.append(f"at: {_steps(body.at)}")
+    if body.coordinate is not None:
+        items.append(f"coordinates: {_name(body.coordinate)}")
+    if body.massless:
+        items.append("massless: true")
+    return f"{{{', '.join(items)}}}"
+
+
+def _axis(axis: Sequence[float]) -> str:
+    for direction, letter in _DIRECTIONS.items():
+        if tuple(axis) == direction:
+            return letter
+        if tuple(-x for x in axis) == direction:
+            return f"-{letter}"
+    return _listed(axis)
+
+
+def _steps(steps: Steps) -> str:
+    shown = [
+        f"{{xyz: {_listed(value)}}}"
+        if isinstance(value, tuple)
+        else f"{{{key}: {angle_text(value)}}}"
+        for key, value in steps
+    ]
+    return f"[{', '.join(shown)}]"
+
+
+def _listed(values: Sequence[float] | np.ndarray) -> str:
+    return f"[{', '.join(number_text(float(value)) for value in values)}]"
+
+
+def _name(name: str) -> str:
+    plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) and name.lower() not in _NOT_PLAIN
+    return name if plain else f'"{name}"'
+
+
+def _parameters(robot: SimplifiedRobot) -> str:
+    lines = [
+        "parameter_sets:",
+        "  # Mass (kg), centre of mass in the body's frame (m), and inertia about the centre of mass",
+        "  # [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] (kg m^2).",
+        "  file:",
+    ]
+    lines += [
+        f"    {_name(b.name)}: {_inertial(b.inertial)}" for b in robot.bodies if not b.massless
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def _inertial(inertial: Inertial) -> str:
+    tensor = inertial.tensor[np.triu_indices(3)]
+    if not inertial.mass and not tensor.any():
+        return "{m: 0}        # TODO"
+    return (
+        f"{{m: {number_text(inertial.mass)}, com: {_listed(inertial.com)}, "
+        f"inertia_com: {_listed(tensor)}}}"
+    )
+
+
+def _limits(robot: SimplifiedRobot) -> str:
+    """Nominal torques and the limits of trajectories, coordinate by coordinate."""
+    coordinates: list[tuple[str, str, ImportedJoint | None]] = []
+    for body in robot.bodies:
+        names = [body.coordinate or body.name] * JOINT_COORDINATES[body.joint]
+        coordinates += [(name, body.joint, body.limits) for name in names]
+    efforts = [limits.effort if limits else None for _, _, limits in coordinates]
+    known = all(effort is not None and effort > 0 for effort in efforts)
+    nominal = (
+        f"nominal_torque: {_listed([e for e in efforts if e is not None])}        # the file's, N m (N)\n"
+        if known
+        else "nominal_torque: standard-deviation   # the file does not give all; or one per joint, N m (N)\n"
+    )
+
+    def rows(shown: Callable[[str, ImportedJoint | None], str]) -> str:
+        width = max(len(shown(kind, limits)) for _, kind, limits in coordinates)
+        return "".join(
+            f"    - {shown(kind, limits):{width}}   # {name}{_unless_given(limits)}\n"
+            for name, kind, limits in coordinates
+        )
+
+    return (
+        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position)}"
+        f"  velocity_limits:              # rad/s or m/s\n{rows(_velocity)}"
+    )
+
+
+def _unless_given(limits: ImportedJoint | None) -> str:
+    given = limits is not None and limits.velocity and _ranged(limits)
+    return "" if given else ": chosen where the file gives none"
+
+
+def _ranged(limits: ImportedJoint) -> bool:
+    lower, upper = limits.lower, limits.upper
+    return limits.kind != "continuous" and lower is not None and upper is not None and lower < upper
+
+
+def _position(kind: str, limits: ImportedJoint | None) -> str:
+    if limits is None or not _ranged(limits):
+        return _RANGE[kind]
+    return f"[{limits.lower:.6g}, {limits.upper:.6g}]"
+
+
+def _velocity(kind: str, limits: ImportedJoint | None) -> str:
+    if limits is None or not limits.velocity or not math.isfinite(limits.velocity):
+        return f"{_SPEED[kind]:g}"
+    return f"{abs(limits.velocity):.6g}"
+
+
+_TRAJECTORIES = """\
+trajectories:
+  count: 10                     # of the estimation set
+  validation_count: 1
+  harmonics: 4
+  period: 2*pi                  # s
+  points: 100                   # samples over a period
+"""
+_TAIL = """\
+selected:
+  heuristic: forward-selection
+  torque_error: 0.01            # the smallest model with an error of at most 1 %; or n: 18
+
+validation:
+  accept:                       # exit code 1 where these are not met
+    torque_error_validation: 0.02
+"""

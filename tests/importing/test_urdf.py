@@ -1,0 +1,265 @@
+"""URDF files: what is read, merged and written, against Pinocchio; and what is refused."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.importing.simplified import Choice, simplified
+from paramreduce_cli.importing.urdf import read_urdf
+from paramreduce_cli.importing.writing import config_text
+from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.random_states import random_states
+
+pin = pytest.importorskip("pinocchio")
+ROBOTS = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), None)
+needs_robots = pytest.mark.skipif(ROBOTS is None, reason="needs the example-robot-data wheel")
+
+ARM = """\
+<robot name="an arm">
+  <link name="world"/>
+  <link name="post"><inertial><mass value="3"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>
+  <link name="upper">
+    <inertial>
+      <origin xyz="0.1 0.02 -0.03" rpy="0.3 -0.2 0.7"/>
+      <mass value="2.5"/>
+      <inertia ixx="0.03" ixy="0.001" ixz="-0.002" iyy="0.04" iyz="0.003" izz="0.05"/>
+    </inertial>
+  </link>
+  <link name="1"><inertial><mass value="0.5"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.02" iyz="0" izz="0.03"/></inertial></link>
+  <link name="slide"><inertial><origin xyz="0 0.1 0"/><mass value="0.7"/><inertia ixx="0.01" ixy="0" ixz="0" iyy="0.01" iyz="0" izz="0.01"/></inertial></link>
+  <link name="finger"><inertial><mass value="0.2"/><inertia ixx="1e-3" ixy="0" ixz="0" iyy="1e-3" iyz="0" izz="1e-3"/></inertial></link>
+  <joint name="stand" type="fixed"><parent link="world"/><child link="post"/><origin xyz="0 0 1"/></joint>
+  <joint name="shoulder" type="revolute">
+    <parent link="post"/><child link="upper"/><origin xyz="0.1 0 0.2" rpy="0.1 0.2 0.3"/>
+    <axis xyz="0 1 1"/><limit lower="-2" upper="1.5" velocity="3" effort="50"/>
+  </joint>
+  <joint name="bracket" type="fixed"><parent link="upper"/><child link="1"/><origin xyz="0.4 0 0" rpy="0 1.2 0"/></joint>
+  <joint name="j&quot;lift" type="prismatic">
+    <parent link="1"/><child link="slide"/><origin xyz="0 0 0.1" rpy="-0.4 0 0"/>
+    <axis xyz="0 0 -1"/><limit lower="0" upper="0.3" velocity="0.5" effort="100"/>
+  </joint>
+  <joint name="grip" type="continuous">
+    <parent link="slide"/><child link="finger"/><origin xyz="0.05 0 0"/><axis xyz="0.6 0 0.8"/>
+  </joint>
+</robot>
+"""
+
+
+def written(tmp_path, text):
+    path = tmp_path / "arm.urdf"
+    path.write_text(text)
+    return path
+
+
+def loaded(path, tmp_path, **choice):
+    config = tmp_path / "config.yaml"
+    config.write_text(config_text(simplified(read_urdf(path), Choice(**choice))))
+    return load_config(config)
+
+
+def pinocchio_torques(model, states):
+    """By RNEA; a continuous joint has its angle alone here, cosine and sine there."""
+    data, result = model.createData(), []
+    for q, dq, ddq in zip(*states, strict=True):
+        full = np.concatenate(
+            [[np.cos(x), np.sin(x)] if joint.nq == 2 else [x]
+             for x, joint in zip(q, model.joints[1:], strict=True)]
+        )  # fmt: skip
+        result.append(pin.rnea(model, data, full, dq, ddq).copy())
+    return np.array(result)
+
+
+def own_torques(config, states):
+    return Dynamics(config.mechanism(), once=True).inverse(*states, config.parameter_values())
+
+
+def states_of(n, count=20):
+    rng = np.random.default_rng(0)
+    return tuple(rng.uniform(-2, 2, (count, n)) for _ in range(3))
+
+
+def test_torques_are_those_of_pinocchio(tmp_path):
+    path = written(tmp_path, ARM)
+    config = loaded(path, tmp_path)
+    model, states = pin.buildModelFromUrdf(str(path)), states_of(3)
+    expected = pinocchio_torques(model, states)
+    assert own_torques(config, states) == pytest.approx(expected, rel=1e-11, abs=1e-11)
+
+
+@pytest.mark.parametrize("locked", [{"shoulder": 0.7}, {'j"lift': 0.2}, {"grip": -1.1}])
+def test_locked_joints_are_part_of_what_carries_them(tmp_path, locked):
+    path = written(tmp_path, ARM)
+    config = loaded(path, tmp_path, locked=locked)
+    whole = pin.buildModelFromUrdf(str(path))
+    ((name, value),) = locked.items()
+    held, q = whole.getJointId(name), pin.neutral(whole)
+    joint = whole.joints[held]
+    q[joint.idx_q : joint.idx_q + joint.nq] = [np.cos(value), np.sin(value)][: joint.nq]
+    if joint.nq == 1:
+        q[joint.idx_q] = value
+    states = states_of(2)
+    expected = pinocchio_torques(pin.buildReducedModel(whole, [held], q), states)
+    assert own_torques(config, states) == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_names_limits_and_torques_are_taken_over(tmp_path):
+    path = written(tmp_path, ARM)
+    config = loaded(path, tmp_path)
+    assert config.robot == "an_arm"
+    assert config.description.bodies.generalised_names() == ["shoulder", "j_lift", "grip"]
+    limits = config.trajectories.limits(3)
+    assert limits.lower == pytest.approx([-2, 0, -np.pi])
+    assert limits.upper == pytest.approx([1.5, 0.3, np.pi])
+    assert limits.velocity == pytest.approx([3, 0.5, 1.5])
+    assert config.nominal_torque == "standard-deviation"  # grip has no effort
+    remarks = " ".join(simplified(read_urdf(path), Choice()).remarks)
+    assert "the joint 'j\"lift' is called j_lift here" in remarks
+
+
+def test_a_chain_a_branch_left_out_and_another_root(tmp_path):
+    path = written(tmp_path, ARM)
+    names = [
+        loaded(path, tmp_path, **choice).description.bodies.body_names()
+        for choice in ({"tip": "1"}, {"ignored": ("slide",)}, {"root": "1"}, {"floating": True})
+    ]
+    assert names == [
+        ["upper"],
+        ["upper"],
+        ["slide", "finger"],
+        ["world", "upper", "slide", "finger"],
+    ]
+
+
+def test_planar_and_floating_joints(tmp_path):
+    planar = ARM.replace('name="shoulder" type="revolute"', 'name="shoulder" type="planar"')
+    config = loaded(written(tmp_path, planar), tmp_path)
+    assert config.n_dof == 5
+    floating = ARM.replace('name="shoulder" type="revolute"', 'name="shoulder" type="floating"')
+    path = written(tmp_path, floating)
+    assert loaded(path, tmp_path).n_dof == 8
+
+
+def test_rounded_angles_are_listed(tmp_path):
+    path = written(tmp_path, ARM.replace('rpy="0 1.2 0"', 'rpy="0 1.5708 3.14159"'))
+    robot = simplified(read_urdf(path), Choice())
+    assert [r for r in robot.remarks if "1.5708" in r or "3.14159" in r]
+    assert "{rz: pi}, {ry: pi/2}" in config_text(robot)
+
+
+@needs_robots
+@pytest.mark.parametrize("floating", [False, True])
+@pytest.mark.parametrize(
+    ("file", "kept", "fixed_counts", "floating_counts"),
+    [
+        ("panda_description/urdf/panda.urdf", 9, (90, 79, 51), (100, 100, 67)),
+        ("panda_description/urdf/panda.urdf", 7, (70, 59, 43), (80, 80, 59)),
+        ("ur_description/urdf/ur10_robot.urdf", 6, (60, 51, 36), (70, 70, 52)),
+        ("kinova_description/robots/kinova.urdf", 6, (60, 51, 36), (70, 70, 52)),
+        ("so_arm_description/urdf/so101.urdf", 6, (60, 51, 36), (70, 70, 52)),
+        ("talos_data/robots/talos_left_arm.urdf", 7, (70, 62, 45), (80, 80, 59)),
+        ("solo_description/robots/solo12.urdf", 12, (120, 92, 68), (130, 130, 94)),
+    ],
+)  # fmt: skip
+def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_counts, floating):
+    """Counts by Pinocchio's regressor on the nominal angles."""
+    robot = read_urdf(ROBOTS / file)
+    moving = [joint.name for joint in robot.joints if joint.kind != "fixed"]
+    locked = dict.fromkeys(moving[kept:], 0.0)
+    config = loaded(ROBOTS / file, tmp_path, locked=locked, floating=floating)
+    mechanism = config.mechanism()
+    states = random_states(mechanism, 150, np.random.default_rng(0))
+    K = Dynamics(mechanism, once=True).regressor(*states)
+    W = K.reshape(-1, K.shape[2])
+    base = base_parameters(W, mechanism.preference_order, 1e-8)
+    found = (mechanism.n_parameters, int(affecting_columns(W).sum()), base.columns.size)
+    assert found == (floating_counts if floating else fixed_counts)
+
+
+@needs_robots
+@pytest.mark.parametrize(
+    "file", ["panda_description/urdf/panda.urdf", "kinova_description/robots/kinova.urdf",
+             "talos_data/robots/talos_left_arm.urdf", "anymal_c_simple_description/urdf/anymal.urdf"],
+)  # fmt: skip
+def test_torques_of_robots(tmp_path, file):
+    config = loaded(ROBOTS / file, tmp_path)
+    model = pin.buildModelFromUrdf(str(ROBOTS / file))
+    names = config.description.bodies.generalised_names()
+    order = [model.names.tolist().index(name) - 1 for name in names]
+    states = states_of(model.njoints - 1)
+    own = own_torques(config, [some[:, order] for some in states])
+    expected = pinocchio_torques(model, states)[:, order]
+    assert own == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+@needs_robots
+def test_every_robot_of_the_wheel_is_read_or_refused_with_a_message(tmp_path):
+    files, refused = sorted(ROBOTS.rglob("*.urdf")), {}
+    for file in files:
+        try:
+            loaded(file, tmp_path)
+        except ConfigError as error:
+            refused[file.name] = str(error)
+    assert len(files) - len(refused) >= 66
+    assert set(refused) <= {"quadrotor_base.urdf", "iris_simple.urdf", "ur3.urdf"}
+    assert all(str(ROBOTS) in message for message in refused.values())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("</robot>", "", "line 28: is no XML"),
+        ("<robot", '<!DOCTYPE robot [<!ENTITY a "b">]><robot', "declares a document type"),
+        ("<robot", "<sdf", "is no XML"),
+        ('child link="finger"', 'child link="thumb"', "has the child 'thumb', which is no link"),
+        ('type="prismatic"', 'type="screw"', "has type='screw'; known are revolute"),
+        ('<axis xyz="0.6 0 0.8"/>', '<axis xyz="0 0 0"/>', "has an axis without a direction"),
+        ('lower="-2" upper="1.5"', 'lower="2" upper="1.5"', "lower limit 2 above its upper 1.5"),
+        ('<mass value="2.5"/>', '<mass value="heavy"/>', "has value='heavy'; a number should stand there"),
+        ('<mass value="2.5"/>', "", "needs <mass> and <inertia>"),
+        ('xyz="0.1 0.02 -0.03"', 'xyz="0.1 0.02"', "3 numbers should stand there"),
+        ('xyz="0.1 0.02 -0.03"', 'xyz="${x} 0 0"', "is xacro that was not expanded"),
+        ('<link name="slide">', '<link name="upper">', "stands there twice"),
+        ('<parent link="world"/><child link="post"/>', '<parent link="world"/><child link="slide"/>', "a URDF is a tree"),
+        ('<parent link="world"/><child link="post"/>', '<parent link="finger"/><child link="post"/>', "closes a circle"),
+        ('<link name="world"/>', '<link name="world"/><link name="lost"/>', "no joint carries world, lost"),
+        ('<link name="world"/>', "<link/>", "has no name"),
+    ],
+)  # fmt: skip
+def test_wrong_files_get_one_message(tmp_path, invoke, old, new, says):
+    assert old in ARM
+    path = written(tmp_path, ARM.replace(old, new, 1))
+    output = tmp_path / "out.yaml"
+    refused = invoke("init", path, "--output", output, code=2)
+    message = " ".join(refused.err.split())
+    assert says in message
+    assert str(path) in message.replace(" ", "") or str(path) in message
+    assert not output.exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--tip", "thumb"], "--tip thumb"),
+        (["--root", "finger"], "no joint is left that moves"),
+        (["--lock", "shoulder"], "write JOINT=VALUE"),
+        (["--lock", "knee=1"], "--lock knee"),
+        (["--ignore", "hand"], "--ignore hand"),
+        (["--root", "slide", "--tip", "upper"], "is not carried by the root slide"),
+    ],
+)
+def test_wrong_choices_get_one_message(tmp_path, invoke, options, says):
+    path = written(tmp_path, ARM)
+    assert says in " ".join(invoke("init", path, *options, code=2).err.split())
+
+
+def test_init_writes_a_config_that_builds(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    out = invoke("init", path, "--output", output).out
+    assert f"paramreduce run {output}" in " ".join(out.split())
+    invoke("build-model", output, "--results", tmp_path / "r")
+    assert "exists already" in invoke("init", path, "--output", output, code=2).err
