@@ -56,6 +56,15 @@ def together(parts: Sequence[Inertial]) -> Inertial:
 
 
 @dataclass(frozen=True)
+class Mimic:
+    """A coordinate is ``ratio`` times that of another joint plus ``offset``."""
+
+    joint: str
+    ratio: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True)
 class ImportedJoint:
     """What a file says of a joint."""
 
@@ -72,8 +81,8 @@ class ImportedJoint:
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
-    mimics: str | None = None
-    """Name of the joint whose coordinate it follows."""
+    mimic: Mimic | None = None
+    """What its coordinate follows, if it is not its own."""
     line: int = 0
 
 

@@ -39,6 +39,8 @@ class Choice:
     """Links that are left out, with all that they carry."""
     floating: bool = False
     """Whether the root moves freely."""
+    uncoupled: bool = False
+    """Whether joints that follow others in the file move on their own."""
 
 
 @dataclass(frozen=True)
@@ -61,12 +63,23 @@ class ImportedBody:
 
 
 @dataclass(frozen=True)
+class Coupling:
+    """The coordinate of one body's joint follows that of another's."""
+
+    leader: ImportedBody
+    follower: ImportedBody
+    ratio: float
+    offset: float
+
+
+@dataclass(frozen=True)
 class SimplifiedRobot:
     """Bodies, parents above their children, and what people should know of them."""
 
     name: str
     source: str
     bodies: tuple[ImportedBody, ...]
+    couplings: tuple[Coupling, ...]
     remarks: tuple[str, ...]
 
 
@@ -91,6 +104,8 @@ class _Simplification:
         self._locked = dict(choice.locked or {})
         if choice.tip is not None:
             self._lock_beside(choice.tip)
+        self._joints = {joint.name: joint for joint in robot.joints}
+        self._lock_followers()
         self._names = _Names(self._remarks)
 
     def _check(self) -> None:
@@ -159,9 +174,11 @@ class _Simplification:
                 "the root moves freely."
             )
         filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
-        self._remark_on_mimics()
+        couplings = () if self._choice.uncoupled else self._couplings(filled)
         name = self._names.clean(self._robot.name) or "robot"
-        return SimplifiedRobot(name, self._robot.source, tuple(filled), tuple(self._remarks))
+        return SimplifiedRobot(
+            name, self._robot.source, tuple(filled), couplings, tuple(self._remarks)
+        )
 
     def _moving(
         self, joint: ImportedJoint, carrier: str, at: Steps, bodies: list[ImportedBody]
@@ -200,13 +217,40 @@ class _Simplification:
             self._remarks.append(f"{body.name} has no mass in the file: TODO")
         return ImportedBody(**{**vars(body), "inertial": inertial})
 
-    def _remark_on_mimics(self) -> None:
-        free = [j for j in self._robot.joints if j.mimics and j.name not in self._locked]
-        for joint in free:
-            self._remarks.append(
-                f"{joint.name} follows {joint.mimics} in the file; here it moves on its own. Lock it with "
-                f"--lock {joint.name}=VALUE if it does not move"
-            )
+    def _led(self, joint: ImportedJoint) -> tuple[ImportedJoint, float, float]:
+        """The joint at the end of those that it follows, and how it does."""
+        ratio, offset = 1.0, 0.0
+        while joint.mimic is not None:
+            offset += ratio * joint.mimic.offset
+            ratio *= joint.mimic.ratio
+            joint = self._joints[joint.mimic.joint]
+        return joint, ratio, offset
+
+    def _lock_followers(self) -> None:
+        """What follows a joint that does not move does not move either."""
+        for joint in self._robot.joints if not self._choice.uncoupled else ():
+            leader, ratio, offset = self._led(joint)
+            if leader.kind == "fixed" or leader.name in self._locked or not ratio:
+                value = ratio * self._locked.get(leader.name, 0.0) + offset
+                if joint is not leader:
+                    self._locked.setdefault(joint.name, value)
+
+    def _couplings(self, bodies: list[ImportedBody]) -> tuple[Coupling, ...]:
+        moved = {body.limits.name: body for body in bodies if body.limits is not None}
+        result = []
+        for name, follower in moved.items():
+            leader, ratio, offset = self._led(self._joints[name])
+            if leader.name == name:
+                continue
+            if leader.name in moved:
+                result.append(Coupling(moved[leader.name], follower, ratio, offset))
+                text = f"{ratio:g} times {leader.name}" + (f" plus {offset:g}" if offset else "")
+                self._remarks.append(f"{name} is {text}, as in the file; --uncouple lets it move")
+            else:
+                self._remarks.append(
+                    f"{name} follows {leader.name}, which is not here: it moves on its own"
+                )
+        return tuple(result)
 
 
 def _in_order(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:

@@ -6,6 +6,7 @@ scene graph along, and knows no lines.
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ from paramreduce_cli.importing.imported import (
     ImportedJoint,
     ImportedRobot,
     Inertial,
+    Mimic,
     Steps,
     matrix,
 )
@@ -95,6 +97,7 @@ class _Reader:
         if not links:
             raise self._wrong(self._root, "has no links")
         self._check_tree(joints)
+        joints = self._followed(joints)
         name = self._root.get("name") or self._path.stem
         return ImportedRobot(name, str(self._path), links, joints, tuple(self._remarks))
 
@@ -164,7 +167,7 @@ class _Reader:
             if link not in links:
                 raise self._wrong(element, f"has the {key} {link!r}, which is no link of the file")
             ends.append(link)
-        limit, mimic = element.find("limit"), element.find("mimic")
+        limit = element.find("limit")
         lower, upper = (self._limit(limit, key, _FARTHEST) for key in ("lower", "upper"))
         if lower is not None and upper is not None and lower > upper:
             raise self._wrong(
@@ -181,9 +184,45 @@ class _Reader:
             upper=upper,
             velocity=self._limit(limit, "velocity", _FASTEST),
             effort=self._limit(limit, "effort", _STRONGEST),
-            mimics=mimic.get("joint") if mimic is not None else None,
+            mimic=self._mimic(element),
             line=element.sourceline,
         )
+
+    def _mimic(self, joint: Any) -> Mimic | None:
+        element = joint.find("mimic")
+        if element is None:
+            return None
+        ratio = float(self._numbers(element, "multiplier", 1, "1")[0])
+        return Mimic(
+            element.get("joint", ""), ratio, float(self._numbers(element, "offset", 1, "0")[0])
+        )
+
+    def _followed(self, joints: tuple[ImportedJoint, ...]) -> tuple[ImportedJoint, ...]:
+        """The joints; those that follow one that is not there move on their own."""
+        names = {joint.name for joint in joints}
+        result = []
+        for joint in joints:
+            lost = joint.mimic is not None and joint.mimic.joint not in names
+            if lost and joint.mimic is not None:
+                self._remarks.append(
+                    f"{joint.name} follows {joint.mimic.joint!r}, which is no joint: it moves on its own"
+                )
+            result.append(dataclasses.replace(joint, mimic=None) if lost else joint)
+        self._check_circles(result)
+        return tuple(result)
+
+    def _check_circles(self, joints: list[ImportedJoint]) -> None:
+        by_name = {joint.name: joint for joint in joints}
+        for joint in joints:
+            seen, follower = {joint.name}, joint
+            while follower.mimic is not None:
+                if follower.mimic.joint in seen:
+                    raise ConfigError(
+                        f"{self._path}, line {follower.line}: <joint name={follower.name!r}> follows itself "
+                        "in a circle."
+                    )
+                seen.add(follower.mimic.joint)
+                follower = by_name[follower.mimic.joint]
 
     def _axis(self, joint: Any, kind: str) -> tuple[float, float, float]:
         element = joint.find("axis")

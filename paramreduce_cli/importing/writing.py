@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.importing.angles import angle_text, number_text
 from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
-from paramreduce_cli.importing.simplified import ImportedBody, SimplifiedRobot
+from paramreduce_cli.importing.simplified import Coupling, ImportedBody, SimplifiedRobot
 from paramreduce_cli.records import JOINT_COORDINATES
 
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
@@ -62,6 +62,10 @@ def _description(robot: SimplifiedRobot) -> str:
         "    bodies:",
     ]
     lines += [f"      - {_body(body)}" for body in robot.bodies]
+    if robot.couplings:
+        lines += ["    closures:", *(f"      - {_coupling(one)}" for one in robot.couplings)]
+        own = [name for body in _independent(robot) for name in _coordinates(body)]
+        lines.append(f"    independent: [{', '.join(map(_name, own))}]")
     return "\n".join(lines) + "\n"
 
 
@@ -79,6 +83,26 @@ def _body(body: ImportedBody) -> str:
     if body.massless:
         items.append("massless: true")
     return f"{{{', '.join(items)}}}"
+
+
+def _coupling(coupling: Coupling) -> str:
+    """Of the joints of two bodies."""
+    bodies = f"[{_name(coupling.leader.name)}, {_name(coupling.follower.name)}]"
+    offset = f", offset: {number_text(coupling.offset)}" if coupling.offset else ""
+    return f"{{type: coupling, bodies: {bodies}, ratio: {number_text(coupling.ratio)}{offset}}}"
+
+
+def _independent(robot: SimplifiedRobot) -> list[ImportedBody]:
+    followers = {coupling.follower.name for coupling in robot.couplings}
+    return [body for body in robot.bodies if body.name not in followers]
+
+
+def _coordinates(body: ImportedBody) -> list[str]:
+    """Names of its joint's coordinates, as configs make them where none is given."""
+    count = JOINT_COORDINATES[body.joint]
+    return (
+        [body.coordinate] if body.coordinate else [f"q_{body.name}_{k + 1}" for k in range(count)]
+    )
 
 
 def _axis(axis: Sequence[float]) -> str:
@@ -135,9 +159,8 @@ def _inertial(inertial: Inertial) -> str:
 def _limits(robot: SimplifiedRobot) -> str:
     """Nominal torques and the limits of trajectories, coordinate by coordinate."""
     coordinates: list[tuple[str, str, ImportedJoint | None]] = []
-    for body in robot.bodies:
-        names = [body.coordinate or body.name] * JOINT_COORDINATES[body.joint]
-        coordinates += [(name, body.joint, body.limits) for name in names]
+    for body in _independent(robot):
+        coordinates += [(name, body.joint, body.limits) for name in _coordinates(body)]
     efforts = [limits.effort if limits else None for _, _, limits in coordinates]
     known = all(effort is not None and effort > 0 for effort in efforts)
     nominal = (

@@ -11,6 +11,7 @@ from paramreduce_cli.records.mechanism import (
     JOINT_COORDINATES,
     Body,
     Closure,
+    ClosureKind,
     Length,
     Loops,
     Mechanism,

@@ -43,26 +43,42 @@ class Body:
     """Whether it is but a frame between the axes of one joint."""
 
 
+ClosureKind = Literal[
+    "fixed", "revolute", "prismatic", "cylindrical", "universal", "point", "planar", "distance",
+    "coupling",
+]  # fmt: skip
+
+
 @dataclass(frozen=True)
 class Closure:
     """What holds two bodies of the tree together and makes a loop of it.
 
     With A and B the frames on the two bodies:
 
+    * ``fixed``: they coincide, six equations;
+    * ``revolute``: their origins and z axes coincide, five equations;
+    * ``prismatic``: they coincide but for a shift along z, five equations;
+    * ``cylindrical``: their z axes coincide, four equations;
+    * ``universal``: their origins coincide, x of A stays perpendicular to y of B, four equations;
     * ``point``: their origins coincide, three equations;
     * ``planar``: the origin of B is on the z axis of A, two equations;
-    * ``revolute``: their origins and z axes coincide, five equations;
-    * ``distance``: their origins are ``length`` apart, one equation.
+    * ``distance``: their origins are ``length`` apart, one equation;
+    * ``coupling``: the coordinate of the second body's joint is ``ratio`` times that of the first one's
+      plus ``offset``, one equation; frames do not matter.
     """
 
     name: str
-    kind: Literal["point", "planar", "revolute", "distance"]
+    kind: ClosureKind
     bodies: tuple[int, int]
     """Indices of the two bodies, :data:`BASE` for the base."""
     frames: tuple[FloatArray, FloatArray]
     """Homogeneous transforms of A and B in the frames of their bodies, (4, 4), m."""
     length: float = 0.0
     """Of a ``distance``, m."""
+    ratio: float = 1.0
+    """Of a ``coupling``."""
+    offset: float = 0.0
+    """Of a ``coupling``, rad or m."""
 
 
 @dataclass(frozen=True)

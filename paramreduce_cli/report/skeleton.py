@@ -65,6 +65,8 @@ def _drawn_as(body: Body) -> str:
 def _closure_path(mechanism: Mechanism, poses: FloatArray) -> Iterator[FloatArray]:
     """From body to body by way of each closure; ends on the base are left out."""
     for closure in mechanism.loops.closures if mechanism.loops is not None else ():
+        if closure.kind == "coupling":
+            continue
         points: list[FloatArray] = []
         for body, frame in zip(closure.bodies, closure.frames, strict=True):
             pose = np.eye(4) if body == BASE else poses[body]

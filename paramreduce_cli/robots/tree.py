@@ -21,6 +21,7 @@ from paramreduce_cli.records import (
     JOINT_COORDINATES,
     Body,
     Closure,
+    ClosureKind,
     FloatArray,
     Loops,
 )
@@ -172,19 +173,28 @@ class ClosureSection(Section):
 
     name: Name | None = None
     """Name for messages; `loop_1`, `loop_2`, ... if left out."""
-    type: Literal["point", "planar", "revolute", "distance"] = "point"
-    """`point`: two points coincide (3 equations); `planar`: the second is on the z axis of the first (2); `revolute`: origins and z axes coincide (5); `distance`: two points keep a distance (1)."""
+    type: ClosureKind = "point"
+    """`point`: two points coincide (3 equations); `planar`: the second is on the z axis of the first (2); `revolute`: origins and z axes coincide (5); `distance`: two points keep a distance (1); `fixed`: the frames coincide (6); `prismatic`: but for a shift along z (5); `cylindrical`: z axes coincide (4); `universal`: origins coincide, x of the first stays perpendicular to y of the second (4); `coupling`: the second body's coordinate is ratio times the first one's, plus offset (1)."""
     bodies: Annotated[list[Name], Field(min_length=2, max_length=2)]
     """The two bodies, `base` for the base."""
-    at: Annotated[list[Placement], Field(min_length=2, max_length=2)]
-    """Where on each of them: a point or steps."""
+    at: Annotated[list[Placement], Field(max_length=2)] = []
+    """Where on each of them: a point or steps; not of a coupling."""
     length: Positive | None = None
     """Of a distance, m."""
+    ratio: Number | None = None
+    """Of a coupling; not zero."""
+    offset: Number | None = None
+    """Of a coupling, rad or m; zero if left out."""
 
     @model_validator(mode="after")
-    def _length(self) -> ClosureSection:
+    def _belongs(self) -> ClosureSection:
+        coupling = self.type == "coupling"
         if (self.type == "distance") != (self.length is not None):
             raise ValueError("length belongs to a closure of type distance, and only there")
+        if coupling != bool(self.ratio) or (self.offset is not None and not coupling):
+            raise ValueError("ratio and offset belong to a coupling, which needs a ratio but zero")
+        if len(self.at) != (0 if coupling else 2):
+            raise ValueError("at says where on each of the two bodies; a coupling has none")
         return self
 
     def closure(self, number: int, index: Mapping[str, int]) -> Closure:
@@ -194,13 +204,15 @@ class ClosureSection(Section):
             number: Of the closure, for its name if it has none.
             index: Of the bodies and the base, by name.
         """
-        (one, other), (first, second) = self.bodies, self.at
+        (one, other), (first, second) = self.bodies, self.at or ([], [])
         return Closure(
             self.name or f"loop_{number}",
             self.type,
             (index[one], index[other]),
             (transform(first), transform(second)),
             self.length or 0.0,
+            self.ratio or 1.0,
+            self.offset or 0.0,
         )
 
 
@@ -279,6 +291,7 @@ class TreeDescription(BodiesDescription):
             for name in body.coordinate_names():
                 if coordinates.count(name) > 1:
                     yield ("bodies", k), f"coordinate {name!r} belongs to several joints"
+        several = {body.name for body in self.bodies if len(body.coordinate_names()) > 1}
         for k, closure in enumerate(self.closures):
             for j, name in enumerate(closure.bodies):
                 if name not in bodies:
@@ -287,6 +300,9 @@ class TreeDescription(BodiesDescription):
                 yield ("closures", k, "name"), f"{closure.name!r} is taken"
             if closure.bodies[0] == closure.bodies[1]:
                 yield ("closures", k, "bodies"), f"ties {closure.bodies[0]!r} to itself"
+            for j, name in enumerate(closure.bodies if closure.type == "coupling" else ()):
+                if name == "base" or name in several:
+                    yield ("closures", k, "bodies", j), f"{name!r} has not just one coordinate"
         for k, name in enumerate(self.independent):
             if name not in coordinates:
                 yield ("independent", k), unknown("coordinate", name, coordinates)
@@ -301,7 +317,8 @@ class TreeDescription(BodiesDescription):
         table: list[tuple[str, ...]] = [("body", "on", "joint", "axes", "at", "coordinates")]
         table += [body.row() for body in self.bodies]
         for k, section in enumerate(self.closures):
-            kind = f"{section.type} {section.length:g}" if section.length else section.type
+            number = section.length or section.ratio
+            kind = f"{section.type} {number:g}" if number else section.type
             places = "; ".join(_placement_text(transform(frame)) for frame in section.at)
             name, bodies = section.name or f"loop_{k + 1}", " - ".join(section.bodies)
             table.append((name, bodies, f"closure: {kind}", "", places, ""))

@@ -13,6 +13,8 @@ from paramreduce_cli.importing.urdf import read_urdf
 from paramreduce_cli.importing.writing import config_text
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import random_states
 
 pin = pytest.importorskip("pinocchio")
@@ -135,6 +137,54 @@ def test_a_chain_a_branch_left_out_and_another_root(tmp_path):
     ]
 
 
+def following(old, *more):
+    """The arm whose slide follows its shoulder, and more changes."""
+    text = ARM.replace(
+        'upper="0.3" velocity="0.5" effort="100"/>',
+        f'upper="0.3" velocity="0.5" effort="100"/>{old}',
+    )
+    for before, after in more:
+        assert before in text
+        text = text.replace(before, after)
+    return text
+
+
+def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
+    path = written(tmp_path, following('<mimic joint="shoulder" multiplier="-0.5" offset="0.1"/>'))
+    config = loaded(path, tmp_path)
+    assert config.description.bodies.independent_names() == ["shoulder", "grip"]
+    mechanism = assembled(config.mechanism())
+    z, dz, ddz = states_of(2)
+    S, offset = np.array([[1, 0], [-0.5, 0], [0, 1]]), np.array([0, 0.1, 0])
+    model = pin.buildModelFromUrdf(str(written(tmp_path, ARM)))
+    expected = pinocchio_torques(model, (z @ S.T + offset, dz @ S.T, ddz @ S.T)) @ S
+    states = Coordinates(mechanism).states(z, dz, ddz)
+    found = Dynamics(mechanism, once=True).inverse(*states, config.parameter_values())
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_a_joint_that_follows_none_moves_on_its_own(tmp_path):
+    robot = simplified(read_urdf(written(tmp_path, following('<mimic joint="lost"/>'))), Choice())
+    assert not robot.couplings
+    assert "j\"lift follows 'lost', which is no joint: it moves on its own" in robot.remarks
+
+
+def test_joints_that_follow_one_that_follows_or_does_not_move(tmp_path):
+    grip = (
+        '<axis xyz="0.6 0 0.8"/>',
+        '<axis xyz="0.6 0 0.8"/><mimic joint="j&quot;lift" multiplier="3"/>',
+    )
+    slide = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
+    path = written(tmp_path, following(slide, grip))
+    robot = simplified(read_urdf(path), Choice())
+    assert [(c.leader.name, c.ratio, c.offset) for c in robot.couplings] == [
+        ("upper", 2.0, 0.1), ("upper", 6.0, pytest.approx(0.3)),
+    ]  # fmt: skip
+    with pytest.raises(ConfigError, match="no joint is left that moves"):
+        simplified(read_urdf(path), Choice(locked={"shoulder": 0.3}))
+    assert loaded(path, tmp_path, uncoupled=True).n_dof == 3
+
+
 def test_planar_and_floating_joints(tmp_path):
     planar = ARM.replace('name="shoulder" type="revolute"', 'name="shoulder" type="planar"')
     config = loaded(written(tmp_path, planar), tmp_path)
@@ -170,7 +220,8 @@ def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_coun
     robot = read_urdf(ROBOTS / file)
     moving = [joint.name for joint in robot.joints if joint.kind != "fixed"]
     locked = dict.fromkeys(moving[kept:], 0.0)
-    config = loaded(ROBOTS / file, tmp_path, locked=locked, floating=floating)
+    choice = {"locked": locked, "floating": floating, "uncoupled": True}
+    config = loaded(ROBOTS / file, tmp_path, **choice)
     mechanism = config.mechanism()
     states = random_states(mechanism, 150, np.random.default_rng(0))
     K = Dynamics(mechanism, once=True).regressor(*states)
@@ -186,7 +237,7 @@ def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_coun
              "talos_data/robots/talos_left_arm.urdf", "anymal_c_simple_description/urdf/anymal.urdf"],
 )  # fmt: skip
 def test_torques_of_robots(tmp_path, file):
-    config = loaded(ROBOTS / file, tmp_path)
+    config = loaded(ROBOTS / file, tmp_path, uncoupled=True)
     model = pin.buildModelFromUrdf(str(ROBOTS / file))
     names = config.description.bodies.generalised_names()
     order = [model.names.tolist().index(name) - 1 for name in names]
@@ -228,6 +279,7 @@ def test_every_robot_of_the_wheel_is_read_or_refused_with_a_message(tmp_path):
         ('<parent link="world"/><child link="post"/>', '<parent link="finger"/><child link="post"/>', "closes a circle"),
         ('<link name="world"/>', '<link name="world"/><link name="lost"/>', "no joint carries world, lost"),
         ('<link name="world"/>', "<link/>", "has no name"),
+        ('effort="50"/>', 'effort="50"/><mimic joint="shoulder"/>', "follows itself in a circle"),
     ],
 )  # fmt: skip
 def test_wrong_files_get_one_message(tmp_path, invoke, old, new, says):

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import scipy.linalg
 from conftest import CLOSED_LOOPS, config_of, constraints_of, model_of, slope
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
@@ -17,7 +18,9 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.records import Constraint
+from paramreduce_cli.records import Constraint, Mechanism
+from paramreduce_cli.robots import Description, Robot
+from paramreduce_cli.robots.frames import translation
 
 REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8}
 """Amplitudes of independent coordinates about the assembly, rad or m, that all loops survive."""
@@ -246,3 +249,96 @@ def test_constraints_of_the_six_legged_robot_at_home():
     values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
     assert values[0] == pytest.approx(0, abs=1e-9)
     assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)
+
+
+EQUATIONS = {"fixed": 6, "revolute": 5, "prismatic": 5, "cylindrical": 4, "universal": 4, "point": 3,
+             "planar": 2, "distance": 1, "coupling": 1}  # fmt: skip
+
+
+TOOL = [0.3, -0.2, 0.25]
+
+
+def chain_with(kind):
+    """Seven hinges in space, the last body tied to the base, or its joint to the first one's."""
+    rng = np.random.default_rng(5)
+    q = rng.uniform(-1, 1, 7)
+    bodies = [
+        {"name": f"b{k}", "parent": f"b{k - 1}" if k else "base", "coordinates": f"q{k}",
+         "axes": rng.normal(size=3).tolist(),
+         "at": [{"xyz": rng.uniform(-0.5, 0.5, 3).tolist()}, {"rx": float(rng.uniform(-1, 1))}]}
+        for k in range(7)
+    ]  # fmt: skip
+    inertia = {
+        "m": 2.0,
+        "com": [0.1, 0.05, -0.02],
+        "inertia_com": [0.03, 1e-3, 2e-3, 0.04, 0, 0.05],
+    }
+    tree = {"bodies": bodies, "closures": [{"type": kind, "bodies": ["base", "b6"]}]}
+    closure = tree["closures"][0]
+    if kind == "coupling":
+        closure |= {"bodies": ["b0", "b6"], "ratio": -2.0, "offset": float(q[6] + 2 * q[0])}
+    else:
+        open_tree = Description.model_validate({"tree": {"bodies": bodies}}).bodies
+        mechanism = Mechanism("chain", open_tree.rigid_bodies(), (), np.zeros(3), (), ())
+        pose = body_poses(mechanism, q)[6] @ translation(*TOOL)
+        angles = rotation_steps(pose[:3, :3])
+        closure["at"] = [[{"xyz": pose[:3, 3].tolist()}, *angles], TOOL]
+        if kind == "universal":  # y of the last body across x of the base's frame
+            closure["at"] = [[{"xyz": pose[:3, 3].tolist()}, *angles, {"rx": 0.7}], TOOL]
+        if kind == "distance":
+            closure["at"] = [[0, 0, 0], TOOL]
+            closure["length"] = float(np.linalg.norm(pose[:3, 3]))
+    tree["independent"] = [f"q{k}" for k in range(7 - EQUATIONS[kind])]
+    tree["guess"] = {f"q{k}": float(value) for k, value in enumerate(q)}
+    sets = {"set": {f"b{k}": inertia for k in range(7)}}
+    text = {"robot": "chain", "description": {"tree": tree}, "parameter_sets": sets}
+    if kind != "coupling":  # depend shall what the equations determine best
+        oracle = Lagrange(Robot.model_validate(text).mechanism())
+        _, J, _ = oracle.closures(q, np.zeros(7))
+        order = scipy.linalg.qr(np.array(J), mode="r", pivoting=True)[1]
+        tree["independent"] = [f"q{k}" for k in sorted(order[EQUATIONS[kind] :])]
+    return Robot.model_validate(text)
+
+
+def rotation_steps(R):
+    yaw, pitch, roll = (
+        np.arctan2(R[1, 0], R[0, 0]),
+        -np.arcsin(R[2, 0]),
+        np.arctan2(R[2, 1], R[2, 2]),
+    )
+    return [{"rz": float(yaw)}, {"ry": float(pitch)}, {"rx": float(roll)}]
+
+
+@pytest.mark.parametrize("kind", list(EQUATIONS))
+def test_every_kind_of_closure_against_lagrange(kind):
+    robot = chain_with(kind)
+    mechanism = assembled(robot.mechanism())
+    assert mechanism.n_dof == 7 - EQUATIONS[kind]
+    oracle, phi = Lagrange(mechanism), robot.parameter_values()
+    rng = np.random.default_rng(2)
+    coordinates = Coordinates(mechanism)
+    z0 = mechanism.loops.assembly[list(mechanism.independent)]
+    z = z0 + rng.uniform(-0.02, 0.02, (5, mechanism.n_dof))
+    q, dq, ddq = coordinates.states(z, *rng.normal(size=(2, 5, mechanism.n_dof)))
+    dynamics = Dynamics(mechanism, once=True)
+    torques = dynamics.inverse(q, dq, ddq, phi)
+    for k in range(5):
+        gap, J, _ = (np.array(part) for part in oracle.closures(q[k], dq[k]))
+        assert np.abs(gap).max() < 1e-11
+        assert np.abs(J @ dq[k]).max() < 1e-10 * np.abs(J).max() * np.abs(dq[k]).max()
+        R = tangent(oracle, mechanism.independent, q[k])
+        expected = R.T @ np.array(oracle.tau(q[k], dq[k], ddq[k], phi)).ravel()
+        assert torques[k] == pytest.approx(expected, rel=1e-8, abs=1e-8 * np.abs(expected).max())
+
+
+def test_coupled_joints_add_up_their_columns():
+    """Of the open chain, with R = d q / d z."""
+    robot = chain_with("coupling")
+    mechanism = assembled(robot.mechanism())
+    states = Coordinates(mechanism).states(*np.random.default_rng(0).normal(size=(3, 4, 6)))
+    open_chain = dataclasses.replace(mechanism, loops=None)
+    whole = Dynamics(open_chain, once=True).regressor(*states)
+    R = np.vstack([np.eye(6), [-2, 0, 0, 0, 0, 0]])
+    expected = np.einsum("qz,kqn->kzn", R, whole)
+    found = Dynamics(mechanism, once=True).regressor(*states)
+    assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)

@@ -28,7 +28,7 @@ class Lagrange:
         momentum = ca.gradient(kinetic, dq)
         rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)
         tau = rate - ca.gradient(kinetic - potential, q)
-        gaps = _gaps(mechanism, poses)
+        gaps = _gaps(mechanism, poses, q)
         jacobian = ca.jacobian(gaps, q)
         drift = ca.jtimes(ca.jtimes(gaps, q, dq), q, dq)
         self.tau = ca.Function("tau", [q, dq, ddq, phi], [tau])
@@ -67,7 +67,7 @@ def _energies(pose, q, dq, phi, gravity):
     return kinetic, -ca.dot(ca.DM(gravity), m * p + R @ moment)
 
 
-def _gaps(mechanism, poses):
+def _gaps(mechanism, poses, q):
     """Closure equations, in whatever form is shortest with homogeneous transforms."""
     gaps = []
     for closure in mechanism.loops.closures if mechanism.loops else ():
@@ -78,10 +78,18 @@ def _gaps(mechanism, poses):
         if closure.kind == "distance":
             gaps.append(ca.norm_2(A[:3, 3] - B[:3, 3]) - closure.length)
             continue
-        seen = A[:3, :3].T @ (B[:3, 3] - A[:3, 3])
-        gaps.append(seen[:2] if closure.kind == "planar" else seen)
-        if closure.kind == "revolute":
-            gaps.append((A[:3, :3].T @ B[:3, 2])[:2])
+        if closure.kind == "coupling":
+            first, second = closure.bodies
+            gaps.append(q[second] - closure.ratio * q[first] - closure.offset)
+            continue
+        seen, turn = A[:3, :3].T @ (B[:3, 3] - A[:3, 3]), A[:3, :3].T @ B[:3, :3]
+        gaps.append(seen[:2] if closure.kind in ("planar", "prismatic", "cylindrical") else seen)
+        if closure.kind in ("revolute", "cylindrical"):
+            gaps.append(turn[:2, 2])
+        elif closure.kind in ("fixed", "prismatic"):
+            gaps.append(ca.inv_skew(turn - turn.T))
+        elif closure.kind == "universal":
+            gaps.append(turn[0, 1])
     return ca.vertcat(*gaps) if gaps else ca.MX(0, 1)
 
 

@@ -29,10 +29,11 @@ from paramreduce_cli.importing.writing import config_text
 @click.option("--ignore", "ignored", multiple=True, metavar="LINK",
               help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
 @click.option("--floating", is_flag=True, help="The root moves freely.")
+@click.option("--uncouple", is_flag=True, help="Joints that follow others move on their own.")
 @click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
 def init(
     source: str, dh: bool, joints: int, root: str | None, tip: str | None,
-    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, output: Path | None,
+    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool, output: Path | None,
 ) -> None:  # fmt: skip
     """Write a commented config: from a URDF, or for an arm to be described with --dh.
 
@@ -44,7 +45,7 @@ def init(
     if dh:
         name, text = source, _described(source, joints)
     else:
-        choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating)
+        choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating, uncouple)
         robot = simplified(read_urdf(Path(source)), choice)
         name, text = robot.name, config_text(robot)
         for remark in robot.remarks:

@@ -25,6 +25,8 @@ _MOVES = 8
 _MOVE = 0.05
 """Length of a random move, rad or m."""
 _SEED = 0
+_ALONG = {"fixed": (2, 0), "prismatic": (2, 0), "revolute": (2,), "cylindrical": (2,)}
+"""Axes that point the same way in a closure of each kind."""
 
 
 def assembled(mechanism: Mechanism) -> Mechanism:
@@ -193,18 +195,19 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
 
 
 def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
-    """Refuse hinges that closed with their axes against each other, which the equations allow."""
+    """Refuse closures whose axes are against each other, which their equations allow."""
     poses = body_poses(mechanism, q)
     for closure in loops.closures:
-        a, b = (
-            frame[:3, 2] if body == BASE else poses[body, :3, :3] @ frame[:3, 2]
+        A, B = (
+            frame[:3, :3] if body == BASE else poses[body, :3, :3] @ frame[:3, :3]
             for body, frame in zip(closure.bodies, closure.frames, strict=True)
         )
-        if closure.kind == "revolute" and a @ b < 0:
-            raise ConcernError(
-                f"{closure.name} closes with its two z axes against each other.",
-                Concern.HINGE_DIRECTION,
-            )
+        for k in _ALONG.get(closure.kind, ()):
+            if A[:, k] @ B[:, k] < 0:
+                raise ConcernError(
+                    f"{closure.name} closes with its two {'xyz'[k]} axes against each other.",
+                    Concern.HINGE_DIRECTION,
+                )
 
 
 def _well_chosen(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:

@@ -17,11 +17,16 @@ from paramreduce_cli.multibody.kinematics import (
 )
 from paramreduce_cli.records import Closure, Mechanism
 
-EQUATIONS = {
+EQUATIONS: dict[str, tuple[str, ...]] = {
+    "fixed": ("x", "y", "z", "tilt x", "tilt y", "turn"),
+    "revolute": ("x", "y", "z", "tilt x", "tilt y"),
+    "prismatic": ("x", "y", "tilt x", "tilt y", "turn"),
+    "cylindrical": ("x", "y", "tilt x", "tilt y"),
+    "universal": ("x", "y", "z", "angle"),
     "point": ("x", "y", "z"),
     "planar": ("x", "y"),
-    "revolute": ("x", "y", "z", "tilt x", "tilt y"),
     "distance": ("distance",),
+    "coupling": ("coordinates",),
 }
 """What each equation of a kind of closure measures."""
 
@@ -36,7 +41,7 @@ def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     if mechanism.loops is None:
         return ca.SX(0, 1)
     joints = motions(mechanism, q)
-    return ca.vertcat(*(e for c in mechanism.loops.closures for e in _equations(joints, c)))
+    return ca.vertcat(*(e for c in mechanism.loops.closures for e in _equations(joints, c, q)))
 
 
 def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
@@ -44,20 +49,30 @@ def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
     return [(c.kind, f"{c.name} ({part})") for c in closures for part in EQUATIONS[c.kind]]
 
 
-def _equations(joints: list[JointMotion], closure: Closure) -> list[ca.SX]:
+def _equations(joints: list[JointMotion], closure: Closure, q: ca.SX) -> list[ca.SX]:
     (a, b), (A, B) = closure.bodies, closure.frames
+    if closure.kind == "coupling":
+        return [q[b] - closure.ratio * q[a] - closure.offset]
     start, end = point_in_base(joints, a, A[:3, 3]), point_in_base(joints, b, B[:3, 3])
     gap = subtract(end, start)
     if closure.kind == "distance":
         length = closure.length
         return [(dot(gap, gap) - length**2) / (2 * length)]
-    if closure.kind == "point":
-        return list(gap)
 
-    def across(other: Vector) -> list[ca.SX]:
-        """Components along the x and y axes of A."""
-        return [dot(direction_in_base(joints, a, A[:3, k]), other) for k in (0, 1)]
+    def along(axes: Sequence[int], other: Vector) -> list[ca.SX]:
+        """Components along some axes of A."""
+        return [dot(direction_in_base(joints, a, A[:3, k]), other) for k in axes]
+
+    def axis(k: int) -> Vector:
+        """Of B."""
+        return direction_in_base(joints, b, B[:3, k])
 
     if closure.kind == "planar":
-        return across(gap)
-    return [*gap, *across(direction_in_base(joints, b, B[:3, 2]))]
+        return along((0, 1), gap)
+    if closure.kind == "point":
+        return list(gap)
+    if closure.kind == "universal":
+        return [*gap, *along((0,), axis(1))]
+    place = along((0, 1), gap) if closure.kind in ("prismatic", "cylindrical") else list(gap)
+    turn = along((1,), axis(0)) if closure.kind in ("prismatic", "fixed") else []
+    return [*place, *along((0, 1), axis(2)), *turn]
