@@ -90,6 +90,8 @@ class Loops:
     """Indices of the bodies whose coordinates are independent; these are actuated."""
     assembly: FloatArray
     """Generalised coordinates near which, or in which, the loops are closed, (n_q,)."""
+    kept: tuple[int, ...] | None = None
+    """Which of the closures' equations, counted through, all others follow from; None for all."""
 
 
 @dataclass(frozen=True)

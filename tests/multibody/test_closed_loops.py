@@ -9,11 +9,11 @@ import scipy.linalg
 from conftest import CLOSED_LOOPS, config_of, constraints_of, model_of, slope
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import ConcernError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import _kept, assembled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
@@ -342,3 +342,27 @@ def test_coupled_joints_add_up_their_columns():
     expected = np.einsum("qz,kqn->kzn", R, whole)
     found = Dynamics(mechanism, once=True).regressor(*states)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
+
+
+def test_equations_that_follow_from_others_are_dropped():
+    """A hinge in space closes a plane four-bar with three equations too many."""
+    closure = "{name: pin, type: revolute, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]}"
+    config = config_of("four_bar", f"description.tree.closures=[{closure}]")
+    with pytest.warns(
+        ParamreduceWarning, match=r"of the 5 equations .* 2 are independent; .*pin \(z\)"
+    ):
+        hinged = assembled(config.mechanism())
+    assert len(hinged.loops.kept) == 2
+    plane = closed("four_bar")
+    states = states_of(plane)
+    found, expected = (Dynamics(m, once=True).regressor(*states) for m in (hinged, plane))
+    assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
+
+
+def test_equations_that_are_needed_elsewhere_are_not_dropped():
+    closure = "{name: pin, type: revolute, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]}"
+    mechanism = config_of("four_bar", f"description.tree.closures=[{closure}]").mechanism()
+    here, there = np.zeros((2, 5, 3))
+    here[0, 0] = here[1, 1] = there[0, 0] = there[2, 2] = 1.0
+    with pytest.raises(ConcernError, match="not the same ones"):
+        _kept(mechanism, mechanism.loops, [here, there])

@@ -28,8 +28,6 @@ def run(invoke, tmp_path):
         ("coupler: 0.9 ", "coupler: 0.1 ", 23, "at best by 0.277, at pin (x)"),
         ("bodies: [coupler, rocker]", "bodies: [coupler, roker]", 21, "did you mean rocker?"),
         ("bodies: [coupler, rocker]", "bodies: [rocker, rocker]", 21, "ties 'rocker' to itself"),
-        ("type: planar", "type: point", 19, "pin (z)"),
-        ("type: planar", "type: revolute", 19, "pin (z), pin (tilt x), pin (tilt y)"),
         ("type: planar", "type: distance", 21, "length belongs to a closure of type distance"),
         ("type: planar", "type: pin", 21, "planar"),
         ("[q_crank]\n", "[q_crank, q_rocker]\n", 22, "but 1 are independent"),

@@ -5,13 +5,15 @@ so that one singular configuration is not taken for a property of the mechanism.
 """
 
 import dataclasses
+import warnings
 from collections.abc import Iterable
 
 import casadi as ca
 import numpy as np
+import scipy.linalg
 import scipy.optimize
 
-from paramreduce_cli.errors import Concern, ConcernError
+from paramreduce_cli.errors import Concern, ConcernError, ParamreduceWarning
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.closures import closure_equations, equation_owners
 from paramreduce_cli.multibody.orthogonal import independent_columns
@@ -48,12 +50,15 @@ def assembled(mechanism: Mechanism) -> Mechanism:
         )
     nearest = _closed(equations, mechanism, loops, range(mechanism.n_q))
     jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
-    _check_redundancy(mechanism, loops, jacobians)
-    _check_choice(mechanism, jacobians)
+    kept = _kept(mechanism, loops, jacobians)
+    rows = [jacobian[kept] for jacobian in jacobians]
+    _check_choice(mechanism, rows)
     q = _closed(equations, mechanism, loops, mechanism.dependent)
-    _check_regular(mechanism, equations.jacobian(q))
+    _check_regular(mechanism, equations.jacobian(q)[kept])
     _check_hinges(mechanism, loops, q)
-    return dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q))
+    whole = len(kept) == len(jacobians[0])
+    found = dataclasses.replace(loops, assembly=q, kept=None if whole else tuple(kept))
+    return dataclasses.replace(mechanism, loops=found)
 
 
 class _Equations:
@@ -136,9 +141,13 @@ def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
     return max(found, key=lambda pair: len(pair[1]))
 
 
-def _check_redundancy(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> None:
-    owners = equation_owners(loops.closures)
-    _, rows = _generic(jacobians)
+def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:
+    """Equations that all others follow from; which are dropped is remarked on.
+
+    Welds of planar or spherical linkages, and rods between two ball joints, have more equations than
+    they take away freedom. They can be dropped if the same ones do wherever the loops are closed.
+    """
+    jacobian, rows = _generic(jacobians)
     if len(rows) == mechanism.n_q:
         raise ConcernError(
             f"the loops are over-constrained: {len(rows)} independent "
@@ -146,20 +155,38 @@ def _check_redundancy(mechanism: Mechanism, loops: Loops, jacobians: list[FloatA
             "closure, or use joints or closures with more freedom.",
             Concern.CLOSURES,
         )
-    if len(rows) < len(owners):
-        extra = [owner for k, owner in enumerate(owners) if k not in rows]
-        hint = ""
-        if any(kind in ("point", "revolute") for kind, _ in extra):
-            hint = (
-                " In a mechanism that moves in a plane, a pin is a closure of type planar (two "
-                "equations across the z axis of its first frame)."
+    owners = equation_owners(loops.closures)
+    if len(rows) == len(owners):
+        return rows
+    kept = sorted(_best_conditioned(jacobian, len(rows)))
+    dropped = ", ".join(name for k, (_, name) in enumerate(owners) if k not in kept)
+    for other in jacobians:
+        if _rank(other) > _rank(other[kept]):
+            raise ConcernError(
+                f"of the {len(owners)} equations {len(rows)} are independent, but not the same ones "
+                f"wherever the loops are closed; {dropped} cannot be left to the others. Use closures "
+                "with fewer equations.",
+                Concern.CLOSURES,
             )
-        raise ConcernError(
-            f"of the {len(owners)} equations only {len(rows)} are "
-            f"independent; these follow from the ones before them wherever the loops are closed: "
-            f"{', '.join(name for _, name in extra)}. Use closures with fewer equations.{hint}",
-            Concern.CLOSURES,
-        )
+    warnings.warn(
+        f"of the {len(owners)} equations that close the loops {len(rows)} are independent; dropped are "
+        f"those that follow from the others: {dropped}",
+        ParamreduceWarning,
+        stacklevel=2,
+    )
+    return kept
+
+
+def _best_conditioned(jacobian: FloatArray, count: int) -> list[int]:
+    """Rows that span all others, chosen by pivoted QR."""
+    _, order = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
+    chosen: list[int] = order[:count].tolist()
+    return chosen
+
+
+def _rank(jacobian: FloatArray) -> int:
+    s = np.linalg.svd(jacobian, compute_uv=False)
+    return int(np.sum(s > _RANK * s[0]))
 
 
 def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:

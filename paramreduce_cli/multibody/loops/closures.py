@@ -32,7 +32,7 @@ EQUATIONS: dict[str, tuple[str, ...]] = {
 
 
 def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
-    """Phi(q), all closures stacked, (n_equations,).
+    """Phi(q), all closures stacked, without what follows from the rest, (n_equations,).
 
     Args:
         mechanism: With loops.
@@ -40,8 +40,9 @@ def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     """
     if mechanism.loops is None:
         return ca.SX(0, 1)
-    joints = motions(mechanism, q)
-    return ca.vertcat(*(e for c in mechanism.loops.closures for e in _equations(joints, c, q)))
+    joints, kept = motions(mechanism, q), mechanism.loops.kept
+    equations = [e for c in mechanism.loops.closures for e in _equations(joints, c, q)]
+    return ca.vertcat(*(e for k, e in enumerate(equations) if kept is None or k in kept))
 
 
 def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
