@@ -1,10 +1,13 @@
 """URDF files: what is read, merged and written, against Pinocchio; and what is refused."""
 
+import contextlib
 import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError
@@ -315,3 +318,25 @@ def test_init_writes_a_config_that_builds(tmp_path, invoke):
     assert f"paramreduce run {output}" in " ".join(out.split())
     invoke("build-model", output, "--results", tmp_path / "r")
     assert "exists already" in invoke("init", path, "--output", output, code=2).err
+
+
+PIECES = ["<", ">", '"', "=", "0", "-", "nan", "inf", "1e999", "<link", "</joint>", "name", "mimic", "é", "\x00",
+          "&a;", "<!--", "]]>", "parent", "base", " ", "1.5708", "<joint/>", "<link name='base'/>"]  # fmt: skip
+
+
+@settings(
+    deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture]
+)
+@given(
+    st.lists(
+        st.tuples(st.integers(0, len(ARM)), st.integers(0, 40), st.sampled_from(PIECES)),
+        min_size=1,
+        max_size=4,
+    )
+)
+def test_whatever_a_file_holds_it_is_read_or_refused_with_a_message(tmp_path, changes):
+    text = ARM
+    for start, length, piece in changes:
+        text = text[:start] + piece + text[start + length :]
+    with contextlib.suppress(ConfigError):
+        loaded(written(tmp_path, text), tmp_path)
