@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 1)
 
 # The paper's two systems; and small cases of seconds, for trying things out.
 PAPER := puma560 hexaglide
-SMALL := two_link four_bar five_bar rssr
+SMALL := two_link four_bar five_bar rssr delta
 
 .PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark torture graph clean
 .DEFAULT_GOAL := help
@@ -16,7 +16,7 @@ help:
 	@echo "make puma560     run the whole pipeline on the PUMA 560"
 	@echo "make hexaglide   the same on the 6-PUS Hexaglide, in a few minutes"
 	@echo "make all         both, and one table over them"
-	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr"
+	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr, delta"
 	@echo "make test        run the tests"
 	@echo "make check       lint, format and types"
 	@echo "make regression  compare with the committed references"
