@@ -7,12 +7,60 @@ robot: "{name}"
 
 description:
   gravity: [0, 0, -9.81]        # acceleration of gravity in the base frame, m/s^2
+"""
+
+_DH = """\
   dh:
     convention: modified        # modified (Khalil, Craig) or standard
     # TODO one row per joint; a and d in m, alpha and theta in rad. A revolute joint adds its
     # coordinate to theta, a prismatic one (type: prismatic) to d. For a tree give each row a
     # name and the name of its parent.
     joints:
+"""
+
+_TREE = """\
+  tree:
+    # TODO one item per body, parents above their children. A body's frame is its joint's: `at` is
+    # where that is in the parent's frame, a point or steps such as [{{xyz: [0, 0, 0.1]}}, {{rz: pi/2}}].
+    # joint: revolute (if left out), prismatic, universal, spherical or free; axes: x, y, z (if left
+    # out), -x, ... or [x, y, z]; the coordinate is q_BODY unless `coordinates` names it.
+    bodies:
+      - {{name: torso, axes: z, at: [0, 0, 0.3]}}
+      - {{name: left, parent: torso, axes: y, at: [0, 0.2, 0.4]}}
+      - {{name: right, parent: torso, axes: y, at: [0, -0.2, 0.4]}}
+
+parameter_sets:
+  # TODO the body's mass (kg), centre of mass in its frame (m) and inertia about the centre
+  # of mass [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] (kg m^2).
+  nominal:
+    torso: {{m: 10, com: [0.02, 0, 0.2], inertia_com: [0.2, 0, 0, 0.2, 0, 0.1]}}
+    left: {{m: 2, com: [0.15, 0.01, 0], inertia_com: [0.002, 0, 0, 0.02, 0, 0.02]}}
+    right: {{m: 2, com: [0.15, -0.01, 0], inertia_com: [0.002, 0, 0, 0.02, 0, 0.02]}}
+"""
+
+_LOOP = """\
+  tree:
+    # TODO the bodies as a tree, each loop cut open at a joint of its own choice; parents above their
+    # children. A body's frame is its joint's: `at` is where that is in the parent's frame.
+    bodies:
+      - {{name: crank, axes: y, coordinates: q_crank}}
+      - {{name: coupler, parent: crank, axes: y, at: [0.4, 0, 0]}}
+      - {{name: rocker, axes: y, at: [1, 0, 0]}}
+    # TODO what closes the loops: two bodies (or base) and where on each. type: fixed, revolute,
+    # prismatic, cylindrical, universal, point, planar, distance (with length), coupling (with ratio).
+    closures:
+      - {{name: pin, type: revolute, bodies: [coupler, rocker],
+         at: [[{{xyz: [0.9, 0, 0]}}, {{rx: -pi/2}}], [{{xyz: [0.7, 0, 0]}}, {{rx: -pi/2}}]]}}
+    independent: [q_crank]      # TODO the actuated coordinates, which determine all others
+    guess: {{q_crank: -1.5, q_coupler: 1, q_rocker: -2}}     # TODO near a closed assembly, rad or m
+
+parameter_sets:
+  # TODO the body's mass (kg), centre of mass in its frame (m) and inertia about the centre
+  # of mass [Ixx, Ixy, Ixz, Iyy, Iyz, Izz] (kg m^2).
+  nominal:
+    crank: {{m: 1.2, com: [0.2, 0, 0], inertia_com: [1e-4, 0, 0, 0.016, 0, 0.016]}}
+    coupler: {{m: 2, com: [0.45, 0.02, 0], inertia_com: [2e-4, 0, 0, 0.135, 0, 0.135]}}
+    rocker: {{m: 1.6, com: [0.35, 0, 0], inertia_com: [2e-4, 0, 0, 0.065, 0, 0.065]}}
 """
 
 _TAIL = """
@@ -61,4 +109,14 @@ def dh_template(name: str, joints: int) -> str:
         "  # Ixx Ixy Ixz Iyy Iyz Izz about the frame's origin.\n"
         "  nominal:\n"
     )
-    return _HEAD.format(name=name) + rows + parameters + bodies + _TAIL
+    return _HEAD.format(name=name) + _DH + rows + parameters + bodies + _TAIL
+
+
+def tree_template(name: str) -> str:
+    """Text of a config for a tree of bodies in frames of one's own choice."""
+    return (_HEAD + _TREE).format(name=name) + _TAIL
+
+
+def loop_template(name: str) -> str:
+    """Text of a config for a mechanism with a closed loop."""
+    return (_HEAD + _LOOP).format(name=name) + _TAIL

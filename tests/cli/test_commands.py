@@ -143,6 +143,26 @@ def test_init_writes_a_config_that_runs(invoke, tmp_path):
     invoke("run", path, "--results", tmp_path / "r", "--quiet", settings=small)
 
 
+@pytest.mark.parametrize("kind", ["--tree", "--loop"])
+def test_init_writes_configs_to_be_filled_in_that_build(invoke, tmp_path, kind):
+    path = tmp_path / "new.yaml"
+    assert "TODO" in invoke("init", kind, "new", "--output", path).out
+    invoke("build-model", path, "--results", tmp_path / "r")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        ([], "say what the robot is"),
+        (["--tree", "arm", "--tip", "hand"], "--tree describes a robot anew"),
+        (["arm"], "is no file; give the path of a URDF"),
+        (["--loop", "a/b"], "is no name"),
+    ],
+)
+def test_init_says_what_it_needs(invoke, arguments, says):
+    assert says in " ".join(invoke("init", *arguments, code=2).err.split())
+
+
 def test_schema_is_json_schema(invoke):
     assert json.loads(invoke("schema").out)["properties"]["robot"]
 

@@ -8,7 +8,7 @@ import click
 
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.loading import load_config
-from paramreduce_cli.config.template import dh_template
+from paramreduce_cli.config.template import dh_template, loop_template, tree_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.simplified import Choice, simplified
@@ -17,8 +17,10 @@ from paramreduce_cli.importing.writing import config_text
 
 
 @click.command()
-@click.argument("source", metavar="ROBOT.urdf|NAME")
-@click.option("--dh", is_flag=True, help="A Denavit-Hartenberg description, to be filled in.")
+@click.argument("source", metavar="ROBOT.urdf|NAME", required=False)
+@click.option("--dh", "kind", flag_value="dh", help="An arm in Denavit-Hartenberg parameters.")
+@click.option("--tree", "kind", flag_value="tree", help="A tree of bodies.")
+@click.option("--loop", "kind", flag_value="loop", help="A mechanism with a closed loop.")
 @click.option(
     "--joints", type=click.IntRange(1, 30), default=6, show_default=True, help="With --dh."
 )
@@ -32,20 +34,28 @@ from paramreduce_cli.importing.writing import config_text
 @click.option("--uncouple", is_flag=True, help="Joints that follow others move on their own.")
 @click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
 def init(
-    source: str, dh: bool, joints: int, root: str | None, tip: str | None,
+    source: str | None, kind: str | None, joints: int, root: str | None, tip: str | None,
     locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool, output: Path | None,
 ) -> None:  # fmt: skip
-    """Write a commented config: from a URDF, or for an arm to be described with --dh.
+    """Write a commented config: from a URDF, or with --dh, --tree or --loop one to be filled in.
 
     Of a URDF links that cannot move against each other become one body, rounded angles are taken
     for what they were, limits and inertias are taken over. The config is the robot from then on.
 
     Example: paramreduce init robot.urdf --output configs/robot.yaml
     """
-    if dh:
-        name, text = source, _described(source, joints)
+    if source is None:
+        raise ConfigError(
+            "say what the robot is: `paramreduce init robot.urdf`; or, to describe it in a config, "
+            "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies) or `--loop NAME` "
+            "(closed loops)."
+        )
+    choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating, uncouple)
+    if kind is not None:
+        if choice != Choice(locked={}):
+            raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
+        name, text = source, _described(source, kind, joints)
     else:
-        choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating, uncouple)
         robot = simplified(read_urdf(Path(source)), choice)
         name, text = robot.name, config_text(robot)
         for remark in robot.remarks:
@@ -63,12 +73,14 @@ def init(
     say(f"Wrote {path}. {todo}paramreduce run {path}")
 
 
-def _described(name: str, joints: int) -> str:
+def _described(name: str, kind: str, joints: int) -> str:
     if not re.fullmatch(NAME, name, re.ASCII):
         raise ConfigError(
             f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
         )
-    return dh_template(name, joints)
+    if kind == "dh":
+        return dh_template(name, joints)
+    return tree_template(name) if kind == "tree" else loop_template(name)
 
 
 def _lock(text: str) -> tuple[str, float]:
