@@ -33,10 +33,11 @@ PUMA_ROWS = [
 ]  # fmt: skip
 
 
-def mechanism_of(description, gravity=(0, 0, -9.81), robot="arm"):
-    """The mechanism of a description, without parameters' values."""
+def mechanism_of(description, gravity=(0, 0, -9.81), robot="arm", **more):
+    """The mechanism of a description, without values of the bodies' parameters."""
     description = {**description, "gravity": [float(g) for g in gravity]}
-    return Robot(robot=robot, description=description, parameter_sets={"none": {}}).mechanism()
+    sections = {"description": description, "parameter_sets": {"none": {}}, **more}
+    return Robot(robot=robot, **sections).mechanism()
 
 
 def dh(rows, convention="modified"):

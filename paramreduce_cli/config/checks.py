@@ -8,6 +8,8 @@ import numpy as np
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key, ParamreduceWarning
 from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.records import Kind, Parameter
+from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import pseudo_inertia
 
 Problem = tuple[Key, str]
@@ -16,12 +18,13 @@ Check = Callable[[Config], Iterator[Problem]]
 
 def check(config: Config) -> list[Problem]:
     """All problems between the parts of a config that is valid part by part."""
-    tree = list(_bodies(config))
+    tree = [*_bodies(config), *_payloads_and_drives(config)]
     if tree:
         return tree
     found = [problem for one in _CHECKS for problem in one(config)]
     if not found:
         _remark_on_physics(config)
+        _remark_on_drives(config)
     return found
 
 
@@ -40,6 +43,14 @@ def _bodies(config: Config) -> Iterator[Problem]:
                 message = unknown("body", parent, ["base", *seen])
             yield (*path, k, "parent"), message
         seen.add(name)
+
+
+def _payloads_and_drives(config: Config) -> Iterator[Problem]:
+    bodies = config.description.bodies
+    for key, message in payloads.problems(config.payloads, bodies.body_names()):
+        yield ("payloads", *key), message
+    for key, message in drives.problems(config.drives, bodies.generalised_names()):
+        yield ("drives", *key), message
 
 
 def _tracking(config: Config) -> Iterator[Problem]:
@@ -79,7 +90,7 @@ def _constraints(config: Config) -> Iterator[Problem]:
 
 
 def _known_parameters(config: Config) -> list[str]:
-    return [parameter.name for parameter in config.description.parameters()]
+    return [parameter.name for parameter in config.dynamic_parameters()]
 
 
 def _groups(config: Config) -> Iterator[Problem]:
@@ -214,7 +225,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
 
 
 def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
-    total = len(config.description.parameters())
+    total = len(config.dynamic_parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:
             yield ("reduction", "heuristics", k), f"{name} stands there twice"
@@ -265,6 +276,19 @@ def _remark_on_physics(config: Config) -> None:
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "
                 f"pseudo-inertia matrix has the eigenvalue {eigenvalues[0]:.3g})"
             )
+
+
+def _remark_on_drives(config: Config) -> None:
+    """Warn of values that are not known, and of what cannot be."""
+    sampling = config.sampling
+    missing = {name: drive.unknown() for name, drive in config.each_drive().items()}
+    found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
+    if found and (sampling.estimation_file is None or sampling.torques == "model"):
+        _remark(f"unknown, and so zero in the torques of the model: {', '.join(found)}")
+    for name, drive in config.each_drive().items():
+        for kind, value in drive.effects().items():
+            if value < 0 and kind is not Kind.OFFSET:
+                _remark(f"drive {name} has the negative {Parameter(kind, name).name} {value:g}")
 
 
 def _remark(message: str) -> None:

@@ -51,7 +51,9 @@ class Excitation:
     """What is measured along a trajectory: base columns of W, weighted and scaled, and bounds."""
 
     observation: ObservationFunction
-    """Base columns of W along a motion, (n_points * n_dof, r), and its adjoint."""
+    """Base columns of W along a motion, (n_points * n_dof, r), and its adjoint; smooth."""
+    measured: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
+    """The same columns by q, dz and ddz without smoothing, where friction has a sign that jumps."""
     coordinates: Coordinates
     """From the independent coordinates to all of them."""
     quantities: Quantities
@@ -64,7 +66,7 @@ class Excitation:
     scaling: Scaling
 
     def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """W with every row divided by its joint's nominal torque."""
+        """W with every row divided by its joint's nominal torque; smooth."""
         W = self.observation.forward(q, dz, ddz)
         W *= self._row_weights(q.shape[0])
         return W
@@ -80,7 +82,7 @@ class Excitation:
             dz: Velocities of the independent ones, (n_points, n_dof).
             ddz: Accelerations, same shape.
         """
-        W = self.weighted(q, dz, ddz)
+        W = self.measured(q, dz, ddz) * self._row_weights(q.shape[0])
         return {
             name: float(np.linalg.cond(scaling(W, self.beta, np.inf)[0]))
             for name, scaling in scalings.items()

@@ -26,6 +26,7 @@ from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.objective import Excitation
 from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
+from paramreduce_cli.multibody.drives import smoothed
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
@@ -53,23 +54,26 @@ class ExcitationTask:
     seed: int
 
 
-def excitation_of(
-    mechanism: Mechanism,
-    base: BaseParameters,
-    nominal_torque: FloatArray,
-    criterion: str,
-    scaling: str,
-    constraints: tuple[Constraint, ...] = (),
-) -> Excitation:
+def excitation_of(task: ExcitationTask) -> Excitation:
     """The measurement of a mechanism's base columns; compiles its regressor."""
+    mechanism, columns = task.mechanism, task.base.columns
+    smooth = smoothed(mechanism, task.settings.limits.velocity)
+    coordinates, true = Coordinates(mechanism), Dynamics(mechanism)
+    observation = Dynamics(smooth).observation(columns)
+
+    def measured(q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        K = true.regressor(q, *coordinates.rates(q, dz, ddz))
+        return K[..., columns].reshape(-1, columns.size)
+
     return Excitation(
-        observation=Dynamics(mechanism).observation(base.columns),
-        coordinates=Coordinates(mechanism),
-        quantities=Quantities(mechanism, constraints),
-        beta=base.beta,
-        nominal_torque=nominal_torque,
-        criterion=criteria[criterion],
-        scaling=scalings[scaling],
+        observation=observation,
+        measured=observation.forward if smooth is mechanism else measured,
+        coordinates=coordinates,
+        quantities=Quantities(mechanism, task.constraints),
+        beta=task.base.beta,
+        nominal_torque=task.nominal_torque,
+        criterion=criteria[task.criterion],
+        scaling=scalings[task.settings.scaling],
     )
 
 
@@ -90,7 +94,7 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
     missing = [key for key in keys if key not in found]
     if not missing:
         return found
-    _excitation(task)  # compile once, before the workers all ask for it
+    excitation_of(task)  # compile once, before the workers all ask for it
     with _pool(task, min(run.jobs, len(missing)), run) as pool:
         with _interruption_held():  # so that new processes are born without it
             futures = {pool.submit(_optimise, key): key for key in missing}
@@ -163,7 +167,7 @@ def _start_worker(parent: int, task: ExcitationTask, news: Queue[Progress | None
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
     _Worker.task, _Worker.news = task, news
-    _Worker.excitation = _excitation(task)
+    _Worker.excitation = excitation_of(task)
 
 
 def _end_with(parent: int) -> None:
@@ -171,17 +175,6 @@ def _end_with(parent: int) -> None:
     while os.getppid() == parent:
         time.sleep(0.5)
     os._exit(1)
-
-
-def _excitation(task: ExcitationTask) -> Excitation:
-    return excitation_of(
-        task.mechanism,
-        task.base,
-        task.nominal_torque,
-        task.criterion,
-        task.settings.scaling,
-        task.constraints,
-    )
 
 
 def _optimise(key: str) -> Trajectory:

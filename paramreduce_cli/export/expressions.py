@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import Node
 
-FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2")
+FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2", "tanh", "sign")
 """That expressions may call."""
 
 

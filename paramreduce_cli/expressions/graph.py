@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 ZERO = 0
 """The value of the constant zero in every graph."""
-_ODD = frozenset({"sin", "tan", "asin", "atan", "inv"})
+_ODD = frozenset({"sin", "tan", "asin", "atan", "inv", "sign", "tanh"})
 _EVEN = frozenset({"cos"})
 
 
@@ -123,7 +123,7 @@ class Graph:
 
     def call(self, function: str, *values: int) -> int:
         """A function of values: sin, cos, sqrt, /, atan2, ..."""
-        if values == (ZERO,) and function in ("sin", "cos"):
+        if values == (ZERO,) and function in ("sin", "cos", "sign", "tanh"):
             return self.constant(float(function == "cos"))
         if len(values) == 1 and self._signs_free and function in _ODD:
             return self._value(function, (values[0] & ~1,)) ^ (values[0] & 1)

@@ -32,6 +32,8 @@ _UNARY = {
     ca.OP_ACOS: "acos",
     ca.OP_ATAN: "atan",
     ca.OP_TAN: "tan",
+    ca.OP_TANH: "tanh",
+    ca.OP_SIGN: "sign",
     ca.OP_NEG: "neg",
 }
 _BINARY = {ca.OP_ADD: "+", ca.OP_SUB: "-", ca.OP_MUL: "*", ca.OP_DIV: "/", ca.OP_ATAN2: "atan2"}
@@ -46,6 +48,8 @@ _EVALUATED = {
     "acos": np.arccos,
     "atan": np.arctan,
     "tan": np.tan,
+    "tanh": np.tanh,
+    "sign": np.sign,
     "neg": np.negative,
     "+": np.add,
     "-": np.subtract,
@@ -102,6 +106,11 @@ class Program:
             for node in (graph.nodes[k] for k in reached)
         )
         return cls(nodes, moved(outputs))
+
+    @property
+    def operations(self) -> set[str]:
+        """Names of the operations it is made of."""
+        return {node.operation for node in self.nodes}
 
     @property
     def n_operations(self) -> int:

@@ -80,3 +80,11 @@ class Scalar:
     def cosine(self) -> Scalar:
         """The cosine of an angle."""
         return Scalar(self.graph, self.graph.call("cos", self.value))
+
+    def sign(self) -> Scalar:
+        """The sign: -1, 0 or 1."""
+        return Scalar(self.graph, self.graph.call("sign", self.value))
+
+    def tanh(self) -> Scalar:
+        """The hyperbolic tangent."""
+        return Scalar(self.graph, self.graph.call("tanh", self.value))

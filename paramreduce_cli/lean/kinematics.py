@@ -19,7 +19,8 @@ from paramreduce_cli.lean.motion import (
 )
 from paramreduce_cli.lean.tree import Joint, Tree
 from paramreduce_cli.lean.turns import ConstantTurn, Turn, constant_turn, turn_by
-from paramreduce_cli.records import BASE, INERTIAL, FloatArray, Kind
+from paramreduce_cli.records import BASE, INERTIAL, FloatArray, Rigid
+from paramreduce_cli.robots.frames import unrounded
 
 
 class Symbols:
@@ -58,15 +59,14 @@ class Symbols:
         x, y, z = ((a, b, c) for a, b, c in zip(*[iter(values)] * 3, strict=True))
         return x, y, z
 
-    def inertia(self, body: int) -> Inertia:
-        """The parameters of a body, in its frame as described."""
-        m, x, y, z, *tensor = (self.parameter(body, kind) for kind in INERTIAL)
+    def inertia(self, rigid: Rigid) -> Inertia:
+        """The parameters of a body or payload, in its frame as described."""
+        m, x, y, z, *tensor = (self.parameter(rigid.columns[kind]) for kind in INERTIAL)
         return Inertia(m, (x, y, z), *tensor)
 
-    def parameter(self, body: int, kind: Kind) -> Scalar:
-        """A parameter of a body, zero where it has none of the kind or is dropped."""
-        position = self._joints[body].columns.get(kind)
-        if position is None or position in self._dropped:
+    def parameter(self, position: int) -> Scalar:
+        """A parameter, zero where it is dropped."""
+        if position in self._dropped:
             return self.number(0.0)
         return Scalar(self.graph, self.graph.input(position))
 
@@ -152,11 +152,15 @@ class Kinematics:
             self.states.append(self._state(i))
 
     def body(self, i: int) -> Inertia:
-        """The parameters of a body in the frame on its joint."""
-        described = self.symbols.inertia(i)
-        frame = self.tree.joints[i].described_to_axis
-        turned_body = constant_turn(self.graph, frame[:3, :3].tobytes()).inertia(described)
-        return turned_body.shifted(self.symbols.vector(frame[:3, 3]))
+        """The parameters of a body with its payloads in the frame on its joint."""
+        joint = self.tree.joints[i]
+        whole = self.symbols.no_inertia()
+        for rigid in joint.rigid:
+            frame = joint.described_to_axis @ rigid.frame
+            turn = constant_turn(self.graph, unrounded(frame[:3, :3]).tobytes())
+            described = turn.inertia(self.symbols.inertia(rigid))
+            whole = whole + described.shifted(self.symbols.vector(frame[:3, 3]))
+        return whole
 
     def _state(self, i: int) -> JointState:
         joint, choice = self.tree.joints[i], self.choices[i]

@@ -10,7 +10,7 @@ inertia about the joints' own axes.
 """
 
 import itertools
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,6 +25,7 @@ from paramreduce_cli.lean.choices import (
     to_data,
 )
 from paramreduce_cli.lean.direct import mass_matrix
+from paramreduce_cli.lean.drives import with_drives, with_rotors
 from paramreduce_cli.lean.inverse import torques
 from paramreduce_cli.lean.kinematics import Kinematics
 from paramreduce_cli.lean.motion import Rates
@@ -37,6 +38,7 @@ from paramreduce_cli.records import (
     Kind,
     Mechanism,
     Progress,
+    Rigid,
 )
 
 Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], list[int]]
@@ -76,7 +78,8 @@ def inverse_outputs(
 ) -> list[int]:
     """Torques, (n_q,)."""
     kinematics = Kinematics(tree, choices, graph, dropped=dropped)
-    return [torque.value for torque in torques(kinematics)]
+    found = with_drives(tree, kinematics.symbols, torques(kinematics), moving=True)
+    return [torque.value for torque in found]
 
 
 def direct_outputs(
@@ -84,8 +87,10 @@ def direct_outputs(
 ) -> list[int]:
     """The lower triangle of M, row by row, then delta."""
     kinematics = Kinematics(tree, choices, graph, moving=False, dropped=dropped)
-    M = [entry.value for row in mass_matrix(kinematics) for entry in row]
-    return M + [torque.value for torque in torques(kinematics)]
+    symbols = kinematics.symbols
+    M = with_rotors(tree, symbols, mass_matrix(kinematics))
+    bias = with_drives(tree, symbols, torques(kinematics), moving=False)
+    return [entry.value for row in [*M, bias] for entry in row]
 
 
 _found: dict[tuple, list[JointFormulation]] = {}
@@ -145,9 +150,10 @@ def _main_parameters(tree: Tree) -> set[int]:
     """Positions of masses, first moments and the moments of inertia about the joints' axes."""
     result = set()
     for joint in tree.joints:
-        axis = np.abs(joint.described_to_axis[2, :3])
-        kinds = (*_FIRST_MOMENTS, _MOMENTS[int(np.argmax(axis))])
-        result |= {joint.columns[kind] for kind in kinds if kind in joint.columns}
+        for rigid in joint.rigid:
+            axis = np.abs((joint.described_to_axis @ rigid.frame)[2, :3])
+            kinds = (*_FIRST_MOMENTS, _MOMENTS[int(np.argmax(axis))])
+            result |= {rigid.columns[kind] for kind in kinds}
     return result
 
 
@@ -283,22 +289,26 @@ def _restricted(
 ) -> tuple[Tree, frozenset[int]]:
     """A subtree as a tree of its own, in the base turned as its first joint is."""
     place = {i: k for k, i in enumerate(branch)}
-    positions = [p for i in branch for p in tree.joints[i].columns.values()]
+    positions = [p for i in branch for p in tree.joints[i].columns]
     renumbered = {position: k for k, position in enumerate(positions)}
     joints = [
         replace(
             joint,
             parent=place.get(joint.parent, BASE),
-            columns={kind: renumbered[position] for kind, position in joint.columns.items()},
+            rigid=tuple(_renumbered(rigid, renumbered) for rigid in joint.rigid),
         )
         for joint in (tree.joints[i] for i in branch)
     ]
     # What is beyond the tips of a part is of no less kinds than a whole body.
     beyond = {joint.parent for k, joint in enumerate(tree.joints) if k not in place}
-    full = {p for i in branch if i in beyond for p in tree.joints[i].columns.values()}
+    full = {p for i in branch if i in beyond for p in tree.joints[i].columns}
     some = frozenset(renumbered[p] for p in positions if p in dropped and p not in full)
     carried = tree.carried or tree.joints[branch[0]].parent != BASE
     return Tree(tuple(joints), tree.gravity, len(positions), carried), some
+
+
+def _renumbered(rigid: Rigid, positions: Mapping[int, int]) -> Rigid:
+    return replace(rigid, columns={kind: positions[p] for kind, p in rigid.columns.items()})
 
 
 def _signature(tree: Tree) -> tuple:
@@ -309,6 +319,7 @@ def _signature(tree: Tree) -> tuple:
         if joint.parent == BASE:
             placed = ((joint.turn.T @ tree.gravity).round(12).tobytes(), b"")
         moving = (joint.parent, joint.revolute, joint.sign, joint.offset, joint.parallel)
-        return (*moving, placed, joint.described_to_axis.tobytes(), tuple(joint.columns.items()))
+        rigid = [(each.frame.tobytes(), tuple(each.columns.items())) for each in joint.rigid]
+        return (*moving, placed, joint.described_to_axis.tobytes(), tuple(rigid))
 
     return tuple(map(of, tree.joints))

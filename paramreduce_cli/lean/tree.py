@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import BASE, FloatArray, Kind, Mechanism
+from paramreduce_cli.records import BASE, Drive, FloatArray, Kind, Mechanism, Rigid
 from paramreduce_cli.robots.frames import unrounded
 
 _FLIP = np.diag([1.0, -1.0, -1.0])
@@ -36,8 +36,13 @@ class Joint:
     """Whether the axis is parallel to that of the joint before, on which its angle can be added."""
     described_to_axis: FloatArray
     """Homogeneous transform from the body's frame as described to this one, (4, 4), m."""
-    columns: Mapping[Kind, int]
-    """Positions of the body's parameters among the inputs of all models, by kind."""
+    rigid: tuple[Rigid, ...]
+    """The body and its payloads; columns are positions among the inputs of all models."""
+
+    @property
+    def columns(self) -> tuple[int, ...]:
+        """All their columns."""
+        return tuple(column for rigid in self.rigid for column in rigid.columns.values())
 
 
 @dataclass(frozen=True)
@@ -51,6 +56,8 @@ class Tree:
     """Number of parameters of all bodies."""
     carried: bool = False
     """Whether it is a part of a larger tree, whose motion carries it: the base moves."""
+    drives: tuple[tuple[Drive, Mapping[Kind, int]], ...] = ()
+    """Drives with the positions of their parameters; a part of a tree has none."""
 
 
 def lean_tree(mechanism: Mechanism) -> Tree:
@@ -84,10 +91,11 @@ def lean_tree(mechanism: Mechanism) -> Tree:
                 turn=turn,
                 parallel=parallel,
                 described_to_axis=after,
-                columns=mechanism.columns(i),
+                rigid=mechanism.moving_with(i),
             )
         )
-    return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters)
+    drives = tuple((drive, mechanism.drive_columns(drive)) for drive in mechanism.drives)
+    return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters, drives=drives)
 
 
 def _tilts(rotation: FloatArray) -> bool:

@@ -10,8 +10,9 @@ from dataclasses import dataclass
 import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Matrix, Vector, add, apply, cross, dot, scale
+from paramreduce_cli.multibody.drives import CASADI, unit_force
 from paramreduce_cli.multibody.kinematics import JointMotion, motions
-from paramreduce_cli.records import BASE, INERTIAL, Mechanism
+from paramreduce_cli.records import BASE, INERTIAL, Mechanism, Rigid
 
 ZERO: Vector = (ca.SX(0), ca.SX(0), ca.SX(0))
 
@@ -53,14 +54,21 @@ def inverse_dynamics(
     forces, moments = [ZERO] * mechanism.n_q, [ZERO] * mechanism.n_q
     tau = [ca.SX(0)] * mechanism.n_q
     for i in reversed(range(mechanism.n_q)):
-        force, moment = _inertial_wrench(mechanism, i, phi, rates[i])
-        force, moment = add(forces[i], force), add(moments[i], moment)
+        force, moment = forces[i], moments[i]
+        for rigid in mechanism.moving_with(i):
+            own_force, own_moment = _inertial_wrench(rigid, phi, rates[i])
+            force, moment = add(force, own_force), add(moment, own_moment)
         tau[i] = _along(joints[i], force, moment)
         parent = mechanism.bodies[i].parent
         if parent != BASE:
             force, moment = joints[i].to_parent(force), joints[i].to_parent(moment)
             forces[parent] = add(forces[parent], force)
             moments[parent] = add(moments[parent], add(moment, cross(joints[i].origin, force)))
+    states = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
+    for drive in mechanism.drives:
+        for kind, column in mechanism.drive_columns(drive).items():
+            along = phi[column] * unit_force(kind, drive, states, CASADI)
+            tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
     return tau
 
 
@@ -89,12 +97,21 @@ def _rates(
     return result
 
 
-def _inertial_wrench(
-    mechanism: Mechanism, body: int, phi: ca.SX, rates: FrameRates
-) -> tuple[Vector, Vector]:
-    """Force and moment about the frame origin that keep a body on its motion."""
-    columns = mechanism.columns(body)
-    values = [phi[columns[kind]] if kind in columns else ca.SX(0) for kind in INERTIAL]
+def _inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
+    """Force and moment about the origin of the body it moves with that keep it on its motion."""
+    turn, place = rigid.frame[:3, :3], rigid.frame[:3, 3].tolist()
+    back = turn.T.tolist()
+    own = FrameRates(
+        apply(back, rates.omega), apply(back, rates.omega_dot), apply(back, rates.at(place))
+    )
+    force, moment = _own_wrench(rigid, phi, own)
+    force, moment = apply(turn.tolist(), force), apply(turn.tolist(), moment)
+    return force, add(moment, cross(place, force))
+
+
+def _own_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
+    """The same about the origin of its own frame, and in that."""
+    values = [phi[column] for column in (rigid.columns[kind] for kind in INERTIAL)]
     m, d, (xx, xy, xz, yy, yz, zz) = values[0], values[1:4], values[4:]
     tensor: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
     omega, omega_dot, a = rates.omega, rates.omega_dot, rates.acceleration

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
+from paramreduce_cli.multibody.drives import CASADI, unit_force
 from paramreduce_cli.multibody.kinematics import joint_cosine_and_sine
-from paramreduce_cli.records import BASE, INERTIAL, Body, Mechanism
+from paramreduce_cli.records import BASE, INERTIAL, Body, FloatArray, Mechanism
 
 _FLAT = 500
 """Entries of the regressor that are not always zero, up to which it is written out as scalars.
@@ -34,29 +35,55 @@ def tree_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -
         A function of q, dq and ddq, each (n_q,), whose value is K', (n_columns, n_q), with
         tau = K phi.
     """
-    wanted = range(mechanism.n_parameters) if columns is None else list(columns)
+    wanted = list(range(mechanism.n_parameters)) if columns is None else list(columns)
     q, dq, ddq = (ca.MX.sym(name, mechanism.n_q) for name in ("q", "dq", "ddq"))
     states, screws = _outwards(mechanism, q, dq, ddq)
     wrench = _unit_wrenches()
     parts: list[ca.MX] = []
     order: list[int] = []
-    for i, state in enumerate(states):
-        present = {kind: c for kind, c in mechanism.columns(i).items() if c in wanted}
+    for rigid in mechanism.rigid:
+        present = {kind: c for kind, c in rigid.columns.items() if c in wanted}
         if present:
+            state = _moved(states[rigid.body], rigid.frame)
             parts.append(wrench(*state)[:, [INERTIAL.index(kind) for kind in present]])
             order += present.values()
-    wrenches = ca.horzcat(*parts)[:, [order.index(c) for c in wanted]] if parts else ca.MX(6, 0)
-    reached = _reached(mechanism)[wanted]
-    maps = wrenches.T @ ca.horzcat(*screws) * ca.MX(ca.sparsify(ca.DM(reached)))
-    function = ca.Function("regressor", [q, dq, ddq], [maps])
-    return function.expand() if reached.sum() <= _FLAT else function
+    inertial = sorted(order, key=wanted.index)
+    wrenches = ca.horzcat(*parts)[:, [order.index(c) for c in inertial]] if parts else ca.MX(6, 0)
+    reached = _reached(mechanism)
+    maps = wrenches.T @ ca.horzcat(*screws) * ca.MX(ca.sparsify(ca.DM(reached[inertial])))
+    driven = {c: row for c, row in _driven(mechanism, q, dq, ddq).items() if c in wanted}
+    rows = ca.vertcat(maps, *driven.values())
+    place = {c: k for k, c in enumerate([*inertial, *driven])}
+    function = ca.Function("regressor", [q, dq, ddq], [rows[[place[c] for c in wanted], :]])
+    return function.expand() if reached[inertial].sum() <= _FLAT else function
+
+
+def _driven(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -> dict[int, ca.MX]:
+    """Rows of drives' parameters, (1, n_q) each, by column."""
+    vectors = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
+    rows = {}
+    for drive in mechanism.drives:
+        weights = ca.MX(ca.sparsify(ca.DM(drive.weights[None])))
+        for kind, column in mechanism.drive_columns(drive).items():
+            rows[column] = unit_force(kind, drive, vectors, CASADI) * weights
+    return rows
+
+
+def _moved(state: _FrameState, frame: FloatArray) -> _FrameState:
+    """State of a frame that is fixed in another one."""
+    if np.array_equal(frame, np.eye(4)):
+        return state
+    R, p, omega, omega_dot, a = symbols = _frame_symbols()
+    arm = R @ frame[:3, 3]
+    moved = [R @ frame[:3, :3], p + arm, omega, omega_dot, a + _swing(omega, omega_dot, arm)]
+    return tuple(ca.Function("moved", symbols, moved).call(list(state)))
 
 
 def _reached(mechanism: Mechanism) -> np.ndarray:
     """One where the body of a parameter is beyond a joint, (n_parameters, n_q)."""
     result = np.zeros((mechanism.n_parameters, mechanism.n_q))
-    for i in range(mechanism.n_q):
-        columns, joint = list(mechanism.columns(i).values()), i
+    for rigid in mechanism.rigid:
+        columns, joint = list(rigid.columns.values()), rigid.body
         while joint != BASE:
             result[columns, joint] = 1.0
             joint = mechanism.bodies[joint].parent

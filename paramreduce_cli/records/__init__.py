@@ -12,12 +12,22 @@ from paramreduce_cli.records.mechanism import (
     Body,
     Closure,
     ClosureKind,
+    Drive,
     Length,
     Loops,
     Mechanism,
+    Payload,
+    Rigid,
 )
 from paramreduce_cli.records.model import BaseParameters, CountedDynamics, Formulations, Model
-from paramreduce_cli.records.parameters import INERTIAL, LAST, Kind, Parameter, preference_order
+from paramreduce_cli.records.parameters import (
+    DRIVE,
+    INERTIAL,
+    LAST,
+    Kind,
+    Parameter,
+    preference_order,
+)
 from paramreduce_cli.records.reduction import (
     NOT_KEPT,
     BySize,

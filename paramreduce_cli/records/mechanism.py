@@ -1,12 +1,21 @@
 """Mechanisms: bodies, joints, closures of loops."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+import numpy as np
+
 from paramreduce_cli.records.arrays import FloatArray, IntArray
-from paramreduce_cli.records.parameters import Kind, Parameter, preference_order, subscript
+from paramreduce_cli.records.parameters import (
+    DRIVE,
+    INERTIAL,
+    Kind,
+    Parameter,
+    preference_order,
+    subscript,
+)
 
 BASE = -1
 """Index of the fixed base in :attr:`Body.parent`."""
@@ -95,6 +104,47 @@ class Loops:
 
 
 @dataclass(frozen=True)
+class Payload:
+    """What a body carries: a rigid body with parameters of its own, in a frame fixed to that body."""
+
+    name: str
+    body: int
+    """Index of the body that carries it."""
+    frame: FloatArray
+    """Homogeneous transform of its frame in the body's, (4, 4), m."""
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What acts along one motion besides the inertia of bodies: rotor, friction, constant, spring.
+
+    Its speed is a sum of the coordinates' speeds with weights, and a force f on it is weight times f
+    on each coordinate, so that its power is force times speed.
+    """
+
+    name: str
+    weights: FloatArray
+    """Of the generalised coordinates, (n_q,)."""
+    smoothing: float = 0.0
+    """Speed s at which Coulomb friction, tanh(speed / s), is 76 %; zero for the sign of the speed."""
+    rest: float = 0.0
+    """Where the spring is slack, rad or m."""
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """A rigid body in a mechanism: one of its bodies, or a payload."""
+
+    name: str
+    body: int
+    """Index of the body it moves with."""
+    frame: FloatArray
+    """Homogeneous transform of its frame in that body's, (4, 4), m."""
+    columns: Mapping[Kind, int]
+    """Columns of its parameters by kind."""
+
+
+@dataclass(frozen=True)
 class Length:
     """A length of the geometry, such as a_3 of a Denavit-Hartenberg table."""
 
@@ -131,6 +181,10 @@ class Mechanism:
     """The geometry as the user wrote it, a header row first; for people."""
     loops: Loops | None = None
     """None for an open tree, all of whose coordinates are independent."""
+    payloads: tuple[Payload, ...] = ()
+    """What bodies carry."""
+    drives: tuple[Drive, ...] = ()
+    """Rotors, friction and springs."""
 
     @property
     def n_q(self) -> int:
@@ -173,9 +227,28 @@ class Mechanism:
         items: tuple[Parameter | Length, ...] = (*self.parameters, *self.lengths)
         return {item.name: item.latex for item in items}
 
-    def columns(self, body: int) -> Mapping[Kind, int]:
-        """Columns of a body's parameters by kind; empty for a body without any."""
-        return self._columns.get(self.bodies[body].name, {})
+    @cached_property
+    def rigid(self) -> tuple[Rigid, ...]:
+        """Everything that has inertia, the bodies first."""
+        bodies = [(body.name, k, np.eye(4)) for k, body in enumerate(self.bodies)]
+        payloads = [(payload.name, payload.body, payload.frame) for payload in self.payloads]
+        found = (
+            Rigid(name, body, frame, self._columns_of(name, INERTIAL))
+            for name, body, frame in bodies + payloads
+        )
+        return tuple(rigid for rigid in found if rigid.columns)
+
+    def moving_with(self, body: int) -> tuple[Rigid, ...]:
+        """A body with its payloads, those of them that have inertia."""
+        return tuple(rigid for rigid in self.rigid if rigid.body == body)
+
+    def drive_columns(self, drive: Drive) -> Mapping[Kind, int]:
+        """Columns of a drive's parameters by kind."""
+        return self._columns_of(drive.name, DRIVE)
+
+    def _columns_of(self, owner: str, kinds: Collection[Kind]) -> Mapping[Kind, int]:
+        columns = self._columns.get(owner, {})
+        return {kind: column for kind, column in columns.items() if kind in kinds}
 
     @cached_property
     def _columns(self) -> Mapping[str, Mapping[Kind, int]]:

@@ -17,6 +17,8 @@ class Kind(Enum):
     The smaller the rank, the more a kind is wanted among the base parameters. For revolute arms
     these ranks yield Khalil's set [Khalil1987]: Izz of the first body and seven parameters of every
     other one, with Iyy, mz and m regrouped. In formulas d is the first moment, as I is the tensor.
+    Units of what belongs to a drive are those of one that turns; one that slides has N for N m and
+    m for rad.
     """
 
     M = ("m", "kg", 9, "m", "")
@@ -29,6 +31,11 @@ class Kind(Enum):
     IYY = ("Iyy", "kg m^2", 7, "I", "yy")
     IYZ = ("Iyz", "kg m^2", 4, "I", "yz")
     IZZ = ("Izz", "kg m^2", 0, "I", "zz")
+    ROTOR = ("Ia", "kg m^2", 10, "I", "a")
+    VISCOUS = ("fv", "N m s/rad", 11, "f", "v")
+    COULOMB = ("fc", "N m", 12, "f", "c")
+    OFFSET = ("off", "N m", 13, "f", "0")
+    STIFFNESS = ("k", "N m/rad", 14, "k", "")
 
     def __init__(self, symbol: str, unit: str, preference: int, letter: str, axes: str) -> None:
         self.symbol = symbol
@@ -55,6 +62,17 @@ INERTIAL = (
 )  # fmt: skip
 """The standard parameters of a rigid body about its frame's origin: mass, first moments, inertia."""
 
+DRIVE = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
+"""What a drive adds to the torques: inertia of its rotor, friction, a constant, a spring."""
+
+_SLIDING_UNITS = {
+    Kind.ROTOR: "kg",
+    Kind.VISCOUS: "N s/m",
+    Kind.COULOMB: "N",
+    Kind.OFFSET: "N",
+    Kind.STIFFNESS: "N/m",
+}
+
 LAST = max(kind.preference for kind in Kind) + 1
 """Rank of preference of columns of which nothing is known."""
 
@@ -65,7 +83,9 @@ class Parameter:
 
     kind: Kind
     owner: str
-    """Name of the body it belongs to."""
+    """Name of the body, payload or drive it belongs to."""
+    sliding: bool = False
+    """Whether it is of a drive along which things slide."""
 
     @property
     def name(self) -> str:
@@ -81,7 +101,9 @@ class Parameter:
     @property
     def unit(self) -> str:
         """SI, such as ``kg m^2``."""
-        return self.kind.unit
+        if not self.sliding:
+            return self.kind.unit
+        return _SLIDING_UNITS[self.kind]
 
     @property
     def preference(self) -> int:

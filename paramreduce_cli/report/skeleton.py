@@ -47,14 +47,13 @@ def skeleton(model: Model, q: FloatArray) -> Skeleton:
 
 def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
     """Centre of mass in the base frame, not a number for a body without mass, (3,), m."""
-    columns = model.mechanism.columns(body)
-    m, *moment = (
-        model.values[columns[kind]] if kind in columns else 0.0
-        for kind in (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
-    )
-    if not m > 0:
+    whole = np.zeros(4)
+    for rigid in model.mechanism.moving_with(body):
+        kinds = (Kind.MX, Kind.MY, Kind.MZ, Kind.M)
+        whole += rigid.frame @ model.values[[rigid.columns[kind] for kind in kinds]]
+    if not whole[3] > 0:
         return np.full(3, np.nan)
-    return pose[:3, 3] + pose[:3, :3] @ (np.array(moment) / m)
+    return pose[:3, 3] + pose[:3, :3] @ (whole[:3] / whole[3])
 
 
 def _drawn_as(body: Body) -> str:

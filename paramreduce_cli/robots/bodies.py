@@ -48,6 +48,10 @@ class BodiesDescription(Section, ABC):
         """Names of the independent coordinates."""
         return self.generalised_names()
 
+    def driven_names(self) -> list[str]:
+        """Names of the independent coordinates of joints, which drives act on as a rule."""
+        return self.independent_names()
+
     def loops(self) -> Loops | None:
         """How the loops are closed, not yet assembled; None for an open tree."""
         return None

@@ -9,11 +9,13 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import NAME, PositivePerJoint, Section, Triple, per_joint
+from paramreduce_cli.fields.section import NAME, Name, PositivePerJoint, Section, Triple, per_joint
 from paramreduce_cli.records import INERTIAL, FloatArray, Mechanism, Parameter
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
+from paramreduce_cli.robots.drives import DriveSection, by_drive
 from paramreduce_cli.robots.inertia import BodyParameters
+from paramreduce_cli.robots.payloads import PayloadSection
 from paramreduce_cli.robots.tree import TreeDescription
 
 
@@ -47,12 +49,6 @@ class Description(Section):
         """The bodies, in the way they are described."""
         return self._given()[self.way]
 
-    def parameters(self) -> tuple[Parameter, ...]:
-        """All parameters of the mechanism, body by body."""
-        return tuple(
-            Parameter(kind, name) for name in self.bodies.inertial_names() for kind in INERTIAL
-        )
-
 
 class Robot(Section):
     """What a robot is, whatever is done with it."""
@@ -67,6 +63,10 @@ class Robot(Section):
     """Named sets of standard parameters: for each set, for each body."""
     parameters: str | None = None
     """Name of the set that is used; the first one if left out."""
+    payloads: dict[Name, PayloadSection] = {}
+    """What bodies carry, by name; its parameters are called after it."""
+    drives: dict[Name, DriveSection] = {}
+    """Rotors, friction and springs by coordinate, by a name of one's own with a motion, or under `all` for every driven coordinate."""
     nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
 
@@ -78,14 +78,18 @@ class Robot(Section):
     def mechanism(self) -> Mechanism:
         """The mechanism as it is described; loops are not assembled yet."""
         bodies = self.description.bodies
+        coordinates, rigid = bodies.generalised_names(), bodies.rigid_bodies()
+        index = {body.name: k for k, body in enumerate(rigid)}
         return Mechanism(
             robot=self.robot,
-            bodies=bodies.rigid_bodies(),
-            parameters=self.description.parameters(),
+            bodies=rigid,
+            parameters=self.dynamic_parameters(),
             gravity=np.array(self.description.gravity, dtype=float),
             lengths=bodies.lengths(),
             table=bodies.table(),
             loops=bodies.loops(),
+            payloads=tuple(s.payload(name, index) for name, s in self.payloads.items()),
+            drives=tuple(s.drive(name, coordinates) for name, s in self.each_drive().items()),
         )
 
     def stretched(self, stretch: Callable[[float], float]) -> Robot:
@@ -94,16 +98,35 @@ class Robot(Section):
         changed = old.model_copy(update={old.way: old.bodies.stretched(stretch)})
         return self.model_copy(update={"description": changed})
 
+    def each_drive(self) -> dict[str, DriveSection]:
+        """All drives by name."""
+        return by_drive(self.drives, self.description.bodies.driven_names())
+
+    def dynamic_parameters(self) -> tuple[Parameter, ...]:
+        """All parameters: body by body, then payload by payload, then drive by drive."""
+        bodies = self.description.bodies
+        rigid = [*bodies.inertial_names(), *self.payloads]
+        slides = {body.coordinate for body in bodies.rigid_bodies() if body.joint == "prismatic"}
+        return (
+            *(Parameter(kind, name) for name in rigid for kind in INERTIAL),
+            *(
+                Parameter(kind, name, slides.issuperset(section.motion or [name]))
+                for name, section in self.each_drive().items()
+                for kind in section.effects()
+            ),
+        )
+
     def body_parameters(self) -> dict[str, BodyParameters]:
-        """The chosen set, by body."""
+        """The chosen set by body, then payloads."""
         chosen = self.parameter_sets[self.parameters or next(iter(self.parameter_sets))]
         names = self.description.bodies.inertial_names()
-        return {name: chosen.get(name, BodyParameters()) for name in names}
+        return {name: chosen.get(name, BodyParameters()) for name in names} | self.payloads
 
     def parameter_values(self) -> FloatArray:
         """Values of all parameters, (n_parameters,), SI."""
-        values = {name: body.values() for name, body in self.body_parameters().items()}
-        return np.array([values[p.owner][p.kind] for p in self.description.parameters()])
+        rigid = [body.values() for body in self.body_parameters().values()]
+        driven = [drive.effects() for drive in self.each_drive().values()]
+        return np.array([value for values in rigid + driven for value in values.values()])
 
     def given_nominal_torque(self) -> FloatArray | None:
         """The characteristic torques where they are given, (n_dof,), N m or N."""

@@ -263,6 +263,13 @@ class TreeDescription(BodiesDescription):
         """Names of the independent coordinates."""
         return list(self.independent) or self.generalised_names()
 
+    def driven_names(self) -> list[str]:
+        """Names of the independent coordinates but those of bodies that float freely."""
+        floating = [
+            n for body in self.bodies if body.joint == "free" for n in body.coordinate_names()
+        ]
+        return [name for name in self.independent_names() if name not in floating]
+
     def rigid_bodies(self) -> tuple[Body, ...]:
         """The bodies with their joints of one axis each."""
         bodies: list[Body] = []

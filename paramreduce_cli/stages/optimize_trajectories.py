@@ -33,15 +33,7 @@ def optimize_trajectories(
     """
     wanted = trajectories
     period = wanted.period if coefficients is None else coefficients.period
-    task = ExcitationTask(
-        mechanism=model.mechanism,
-        base=model.base,
-        nominal_torque=model.nominal_torque,
-        criterion=wanted.criterion,
-        constraints=tuple(entry.constraint(model.mechanism) for entry in wanted.constraints),
-        settings=_settings(wanted, model, period, wanted.harmonics),
-        seed=wanted.seed,
-    )
+    task = excitation_task(wanted, model, period)
     if coefficients is None:
         sets = _optimised(wanted, task, run)
     else:
@@ -56,6 +48,21 @@ def optimize_trajectories(
         limits=task.settings.limits,
         constraints=task.constraints,
         **sets,
+    )
+
+
+def excitation_task(
+    wanted: TrajectoriesSection, model: Model, period: float | None = None
+) -> ExcitationTask:
+    """What the config asks of all trajectories."""
+    return ExcitationTask(
+        mechanism=model.mechanism,
+        base=model.base,
+        nominal_torque=model.nominal_torque,
+        criterion=wanted.criterion,
+        constraints=tuple(entry.constraint(model.mechanism) for entry in wanted.constraints),
+        settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
+        seed=wanted.seed,
     )
 
 
@@ -87,14 +94,7 @@ def _measured(
     wanted: TrajectoriesSection, model: Model, task: ExcitationTask, brought: Coefficients
 ) -> dict[str, tuple[Trajectory, ...]]:
     """The trajectories of coefficients that the user brings, measured but not changed."""
-    excitation = excitation_of(
-        model.mechanism,
-        model.base,
-        model.nominal_torque,
-        wanted.criterion,
-        wanted.scaling,
-        task.constraints,
-    )
+    excitation = excitation_of(task)
 
     def measure(coefficients: FloatArray) -> Trajectory:
         harmonics = (coefficients.shape[1] - 1) // 2

@@ -11,7 +11,7 @@ from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.follower import Follower
-from paramreduce_cli.stages.optimize_trajectories import _settings
+from paramreduce_cli.stages.optimize_trajectories import excitation_task
 from tests.conftest import config_and_model
 
 
@@ -46,11 +46,8 @@ def descend(make, start):
 
 def rows():
     config, model = config_and_model("puma560")
-    wanted = config.trajectories
-    excitation = excitation_of(
-        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling
-    )
-    settings = _settings(wanted, model, wanted.period, wanted.harmonics)
+    task = excitation_task(config.trajectories, model)
+    excitation, settings = excitation_of(task), task.settings
     basis = settings.basis()
     limits = LimitMap(settings.limits, basis, "gauge")
 

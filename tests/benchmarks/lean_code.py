@@ -61,7 +61,7 @@ def arm(model):
 
     bodies = model.mechanism.bodies
     places = [body.parent_to_joint[:3].tolist() for body in bodies]
-    columns = [model.mechanism.columns(k) for k in range(len(bodies))]
+    columns = [rigid.columns for rigid in model.mechanism.rigid]
     inertias = [[model.values[own[kind]] for kind in DYNAMIC] for own in columns]
     return (
         f"static const double gravity[3] = {listed(model.mechanism.gravity.tolist())};\n"

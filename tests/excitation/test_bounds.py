@@ -4,7 +4,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import config_and_model, constraints_of, slope
+from conftest import config_and_model, slope
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
@@ -17,21 +17,15 @@ from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import Run
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.optimize_trajectories import _settings
+from paramreduce_cli.stages.optimize_trajectories import excitation_task
 
 
 @pytest.fixture(scope="module", params=["five_bar", "hexaglide"])
 def case(request):
     config, model = config_and_model(request.param)
-    wanted = config.trajectories
-    constraints = constraints_of(config, model.mechanism)
-    excitation = excitation_of(
-        model.mechanism, model.base, model.nominal_torque, wanted.criterion, wanted.scaling,
-        constraints,
-    )  # fmt: skip
-    settings = _settings(wanted, model, wanted.period, wanted.harmonics)
-    settings = dataclasses.replace(settings, starts=1, polished=1, max_iterations=20)
-    return excitation, settings, constraints
+    task = excitation_task(config.trajectories, model)
+    settings = dataclasses.replace(task.settings, starts=1, polished=1, max_iterations=20)
+    return excitation_of(task), settings, task.constraints
 
 
 def test_gradient_with_the_barrier_against_finite_differences(case):
@@ -92,11 +86,10 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
     )  # fmt: skip
     config = load_config(path)
     model = build_model(config, config.model, Run())
-    excitation = excitation_of(
-        model.mechanism, model.base, model.nominal_torque, "condition-number", "weighted"
-    )
-    settings = _settings(config.trajectories, model, 2 * np.pi, 3)
-    settings = dataclasses.replace(settings, starts=3, polished=2, max_iterations=40)
+    wanted = config.trajectories.model_copy(update={"scaling": "weighted", "harmonics": 3})
+    task = excitation_task(wanted, model, 2 * np.pi)
+    excitation = excitation_of(task)
+    settings = dataclasses.replace(task.settings, starts=3, polished=2, max_iterations=40)
     for seed in range(2):
         found = optimise_trajectory(excitation, settings, [seed])
         assert np.isfinite(found.kappa)

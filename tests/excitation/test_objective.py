@@ -2,7 +2,7 @@ import dataclasses
 
 import numpy as np
 import pytest
-from conftest import puma_mechanism, slope
+from conftest import config_and_model, slope
 
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
@@ -10,23 +10,19 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.scalings import scalings
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import JointLimits
+from paramreduce_cli.stages.optimize_trajectories import excitation_task
 
 NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
 
 
 @pytest.fixture(scope="module")
 def parts():
-    mechanism = puma_mechanism()
-    dynamics = Dynamics(mechanism)
-    rng = np.random.default_rng(0)
-    K = dynamics.regressor(*(rng.normal(size=(100, 6)) for _ in range(3)))
-    base = base_parameters(K.reshape(-1, 60), mechanism.preference_order, 1e-9)
-    excitation = excitation_of(mechanism, base, NOMINAL, "condition-number", "column-normalised")
-    return dynamics, base, excitation
+    config, model = config_and_model("puma560")
+    excitation = excitation_of(excitation_task(config.trajectories, model))
+    return Dynamics(model.mechanism), model.base, excitation
 
 
 def basis_and_limits(mapping="gauge", acceleration=np.inf):
@@ -112,3 +108,16 @@ def test_a_joint_cannot_meet_its_limit_by_being_parked_there():
     moved = np.maximum(np.ptp(z, axis=0) / (2 * given.reach), np.abs(dz).max(axis=0) / 1.45)
     assert (moved > 0.9).all()
     assert (z <= given.upper).all()
+
+
+def test_trajectories_follow_a_rounded_sign_and_are_measured_by_the_true_one():
+    config, model = config_and_model("two_link", "drives.all.coulomb=2")
+    excitation = excitation_of(excitation_task(config.trajectories, model))
+    rng = np.random.default_rng(0)
+    states = tuple(rng.normal(size=(3, 50, 2)))
+    expected = Dynamics(model.mechanism).regressor(*states)[..., model.base.columns]
+    assert np.array_equal(excitation.measured(*states), expected.reshape(100, -1))
+    smooth = excitation.observation.forward(*states).reshape(expected.shape)
+    friction = model.mechanism.parameter_names.index("fc_z_upper")
+    rounded = np.tanh(states[1][:, 0] / (0.02 * 3))  # the velocity limit is 3 rad/s
+    assert smooth[:, 0, list(model.base.columns).index(friction)] == pytest.approx(rounded)

@@ -6,7 +6,7 @@ Loops are closed with Lagrange multipliers; nothing here knows of projections.
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.records import INERTIAL
+from paramreduce_cli.records import INERTIAL, Kind
 
 
 class Lagrange:
@@ -18,16 +18,25 @@ class Lagrange:
         phi = ca.MX.sym("phi", mechanism.n_parameters)
         poses = _poses(mechanism, q)
         kinetic, potential = 0, 0
-        for k in range(n):
-            columns = mechanism.columns(k)
-            if not columns:
-                continue
-            own = ca.vertcat(*(phi[columns[kind]] for kind in INERTIAL))
-            own_kinetic, own_potential = _energies(poses[k], q, dq, own, mechanism.gravity)
+        for rigid in mechanism.rigid:
+            own = ca.vertcat(*(phi[rigid.columns[kind]] for kind in INERTIAL))
+            pose = poses[rigid.body] @ ca.DM(rigid.frame)
+            own_kinetic, own_potential = _energies(pose, q, dq, own, mechanism.gravity)
             kinetic, potential = kinetic + own_kinetic, potential + own_potential
+        lost = 0
+        for drive in mechanism.drives:
+            value = {kind: phi[c] for kind, c in mechanism.drive_columns(drive).items()}
+            position, speed = ca.dot(drive.weights, q), ca.dot(drive.weights, dq)
+            kinetic += value.get(Kind.ROTOR, 0) * speed**2 / 2
+            potential += value.get(Kind.STIFFNESS, 0) * (position - drive.rest) ** 2 / 2
+            potential += value.get(Kind.OFFSET, 0) * position
+            friction = value.get(Kind.VISCOUS, 0) * speed
+            slope = ca.tanh(speed / drive.smoothing) if drive.smoothing else ca.sign(speed)
+            friction += value.get(Kind.COULOMB, 0) * slope
+            lost += friction * ca.gradient(speed, dq)
         momentum = ca.gradient(kinetic, dq)
         rate = ca.jtimes(momentum, q, dq) + ca.jtimes(momentum, dq, ddq)
-        tau = rate - ca.gradient(kinetic - potential, q)
+        tau = rate - ca.gradient(kinetic - potential, q) + lost
         gaps = _gaps(mechanism, poses, q)
         jacobian = ca.jacobian(gaps, q)
         drift = ca.jtimes(ca.jtimes(gaps, q, dq), q, dq)
@@ -113,5 +122,5 @@ def tangent(oracle, independent, q):
     """dq/dz from the null space of the closures' Jacobian."""
     _, J, _ = (np.array(part) for part in oracle.closures(q, np.zeros(q.size)))
     _, s, Vt = np.linalg.svd(J)
-    null = Vt[int(np.sum(s > 1e-9 * s[0])) :].T
+    null = Vt[int(np.sum(s > 1e-9 * s.max(initial=0.0))) :].T
     return null @ np.linalg.inv(null[list(independent)])

@@ -56,11 +56,11 @@ def torques(mechanism, q, dq, ddq, phi, gravity):
         omega.append(own_w), rate.append(own_dw), acceleration.append(own_a)
     forces, moments = [], []
     for i in range(n):
-        columns = mechanism.columns(i)
-        if not columns:
+        own = mechanism.moving_with(i)
+        if not own:
             forces.append(ca.SX(3, 1)), moments.append(ca.SX(3, 1))
             continue
-        m, d, tensor = _inertia(phi, columns)
+        m, d, tensor = _inertia(phi, own[0].columns)
         w, dw, a = omega[i], rate[i], acceleration[i]
         forces.append(m * a + ca.cross(dw, d) + ca.cross(w, ca.cross(w, d)))
         moments.append(tensor @ dw + ca.cross(w, tensor @ w) + ca.cross(d, a))

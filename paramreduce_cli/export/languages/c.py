@@ -66,6 +66,7 @@ class _Writer:
             "functions": [self.function(f) for f in model.functions],
             "closures": [self.function(f) for f in model.closures],
             "stack": self.stack(),
+            "signs": any("sign" in f.program.operations for f in model.functions),
             "waves": any(self.batched(f)["angles"] for f in model.functions),
             "cases": self.cases(),
             "n_cases": len(next(iter(model.cases.values()))),
@@ -151,7 +152,7 @@ class _Writer:
             column = batched and array.name != "phi"
             return f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
 
-        calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS}
+        calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS} | {"sign": "sign"}
         return Language(calls, self.number, element)
 
     def batched(self, function: Function) -> dict[str, Any]:

@@ -18,6 +18,8 @@ _CALLS = {
     "atan": ca.atan,
     "sqrt": ca.sqrt,
     "atan2": ca.atan2,
+    "tanh": ca.tanh,
+    "sign": ca.sign,
     "inv": lambda x: 1 / x,
     "/": lambda x, y: x / y,
     "+": lambda x, y: x + y,
