@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
@@ -83,6 +83,8 @@ class ImportedJoint:
     effort: float | None = None
     mimic: Mimic | None = None
     """What its coordinate follows, if it is not its own."""
+    drive: Mapping[str, float] = field(default_factory=dict)
+    """Friction, rotor and spring by the keys of a drive in a config; those that are not zero."""
     line: int = 0
 
 

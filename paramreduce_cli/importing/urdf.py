@@ -185,8 +185,17 @@ class _Reader:
             velocity=self._limit(limit, "velocity", _FASTEST),
             effort=self._limit(limit, "effort", _STRONGEST),
             mimic=self._mimic(element),
+            drive=self._drive(element),
             line=element.sourceline,
         )
+
+    def _drive(self, joint: Any) -> dict[str, float]:
+        element = joint.find("dynamics")
+        if element is None:
+            return {}
+        keys = {"viscous": "damping", "coulomb": "friction"}
+        given = {key: float(self._numbers(element, name, 1, "0")[0]) for key, name in keys.items()}
+        return {key: value for key, value in given.items() if value}
 
     def _mimic(self, joint: Any) -> Mimic | None:
         element = joint.find("mimic")

@@ -28,7 +28,8 @@ def config_text(robot: SimplifiedRobot) -> str:
     Args:
         robot: With names that configs allow.
     """
-    parts = [_head(robot), _description(robot), _parameters(robot), _limits(robot), _TAIL]
+    parts = [_head(robot), _description(robot), _parameters(robot), _drives(robot)]
+    parts += [_limits(robot), _TAIL]
     return "\n".join(parts)
 
 
@@ -156,6 +157,22 @@ def _inertial(inertial: Inertial) -> str:
     )
 
 
+def _drives(robot: SimplifiedRobot) -> str:
+    """Friction, rotors and springs as the file gives them; how to add them otherwise."""
+    given = {
+        body.coordinate: body.limits.drive
+        for body in robot.bodies
+        if body.limits is not None and body.coordinate is not None and body.limits.drive
+    }
+    if not given:
+        return _NO_DRIVES
+    lines = [
+        f"  {_name(name)}: {{{', '.join(f'{k}: {number_text(v)}' for k, v in values.items())}}}"
+        for name, values in given.items()
+    ]
+    return "\n".join([_DRIVES, *lines]) + "\n"
+
+
 def _limits(robot: SimplifiedRobot) -> str:
     """Nominal torques and the limits of trajectories, coordinate by coordinate."""
     coordinates: list[tuple[str, str, ImportedJoint | None]] = []
@@ -204,6 +221,16 @@ def _velocity(kind: str, limits: ImportedJoint | None) -> str:
     return f"{abs(limits.velocity):.6g}"
 
 
+_NO_DRIVES = """\
+# Friction and rotors of the joints, of which the file says nothing: inertia (kg m^2, kg), viscous
+# (N m s/rad, N s/m), coulomb and offset (N m, N), stiffness; a number, or unknown if yet to be found.
+# drives:
+#   all: {inertia: unknown, viscous: unknown, coulomb: unknown, offset: unknown}
+"""
+_DRIVES = """\
+drives:
+  # Friction of the joints as in the file: viscous (N m s/rad, N s/m), coulomb (N m, N). Besides there
+  # are inertia, offset and stiffness; each a number, or unknown if yet to be found."""
 _TRAJECTORIES = """\
 trajectories:
   count: 10                     # of the estimation set
