@@ -193,6 +193,7 @@ def _optional(reader: Reader, name: str, size: int) -> FloatArray | None:
     if name not in reader:
         return None
     value = reader.array(name, 1)
-    if value.size != size or not np.isfinite(value).all():
+    numbers = ~np.isnan(value) if name == "nominal_torque" else np.isfinite(value)
+    if value.size != size or not numbers.all():
         raise ArtifactError(f"{reader.path}: /{name} must hold {size} finite numbers.")
     return value

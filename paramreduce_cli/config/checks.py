@@ -215,6 +215,15 @@ def _limits(config: Config) -> Iterator[Problem]:
         yield ("trajectories", "polished"), f"is {t.polished}, but there are {t.starts} starts"
 
 
+def _unmeasured(config: Config) -> Iterator[Problem]:
+    names = config.description.bodies.independent_names()
+    for k, name in enumerate(config.unmeasured):
+        if name not in names:
+            yield ("unmeasured", k), unknown("independent coordinate", name, names)
+    if not config.measured().any():
+        yield ("unmeasured",), "leaves no torque to explain; leave out what is measured"
+
+
 def _parameter_names(config: Config) -> Iterator[Problem]:
     known = _known_parameters(config)
     for k, name in enumerate(config.model.base_columns or []):
@@ -259,6 +268,7 @@ _CHECKS: tuple[Check, ...] = (
     _parameter_sets,
     _per_joint,
     _limits,
+    _unmeasured,
     _parameter_names,
     _numbers_of_parameters,
 )

@@ -16,7 +16,7 @@ class NormErrors:
     two: FloatArray
     infinity: FloatArray
     joints: FloatArray
-    """In the 2-norm, joint by joint, (n_models, n_dof)."""
+    """In the 2-norm, joint by joint, (n_models, n_dof); not a number where torques are not measured."""
 
 
 def torque_errors(
@@ -27,7 +27,7 @@ def torque_errors(
     Args:
         blocks: The samples.
         parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
-        weights: Each joint's nominal torque, (n_dof,).
+        weights: Each joint's nominal torque, (n_dof,); infinite where it is not measured.
     """
     n_models, n_dof = parameters.shape[1], weights.size
     sums = np.zeros((n_models, n_dof))
@@ -45,9 +45,11 @@ def torque_errors(
         chi_square += (chi**2).sum(axis=0)
         chi_largest = max(chi_largest, float(np.abs(chi).max()))
     tiny = np.finfo(float).tiny
+    joints = np.sqrt(squares / np.maximum(chi_square, tiny))
+    joints[:, np.isinf(weights)] = np.nan
     return NormErrors(
         one=sums.sum(axis=1) / max(chi_sum.sum(), tiny),
         two=np.sqrt(squares.sum(axis=1) / max(chi_square.sum(), tiny)),
         infinity=largest / max(chi_largest, tiny),
-        joints=np.sqrt(squares / np.maximum(chi_square, tiny)),
+        joints=joints,
     )

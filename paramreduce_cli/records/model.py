@@ -45,7 +45,8 @@ class Model:
     """Which parameters change the torques at all, (n,)."""
     base: BaseParameters
     nominal_torque: FloatArray
-    """Characteristic size of each joint's torque or force, (n_dof,), N m or N."""
+    """Characteristic size of each joint's torque or force, (n_dof,), N m or N; infinite where it is not
+    measured, so that its rows of W weigh nothing."""
     nominal_torque_given: bool
     """Whether the config gave it; if not, the estimation set's replaces it from `sample` on."""
     formulations: Formulations

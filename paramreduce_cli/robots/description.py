@@ -10,7 +10,7 @@ from pydantic import Field, model_validator
 
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import NAME, Name, PositivePerJoint, Section, Triple, per_joint
-from paramreduce_cli.records import INERTIAL, FloatArray, Mechanism, Parameter
+from paramreduce_cli.records import INERTIAL, BoolArray, FloatArray, Mechanism, Parameter
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
 from paramreduce_cli.robots.drives import DriveSection, by_drive
@@ -70,6 +70,9 @@ class Robot(Section):
     nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic torques, one for all joints or a list, N m (N if prismatic); or their standard deviation over the estimation set."""
 
+    unmeasured: list[Name] = []
+    """Independent coordinates whose torques are not measured, such as those of a floating base: base parameters, fits and errors leave them out."""
+
     @property
     def n_dof(self) -> int:
         """Number of independent coordinates."""
@@ -127,6 +130,11 @@ class Robot(Section):
         rigid = [body.values() for body in self.body_parameters().values()]
         driven = [drive.effects() for drive in self.each_drive().values()]
         return np.array([value for values in rigid + driven for value in values.values()])
+
+    def measured(self) -> BoolArray:
+        """Which independent coordinates have torques that are measured, (n_dof,)."""
+        names = self.description.bodies.independent_names()
+        return np.array([name not in self.unmeasured for name in names])
 
     def given_nominal_torque(self) -> FloatArray | None:
         """The characteristic torques where they are given, (n_dof,), N m or N."""

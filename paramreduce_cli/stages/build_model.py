@@ -34,10 +34,12 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     rng = np.random.default_rng(model.seed)
     states = random_states(mechanism, _STATES, rng)
     K = Dynamics(mechanism).regressor(*states)
-    W = K.reshape(-1, K.shape[2])
+    measured = robot.measured()
+    W = K[:, measured].reshape(-1, K.shape[2])
     values = robot.parameter_values()
     given = robot.given_nominal_torque()
     nominal = np.std(K @ values, axis=0) if given is None else given
+    nominal = np.where(measured, nominal, np.inf)
     if not np.all(nominal > 0):
         joint = mechanism.coordinate_names[int(np.argmin(nominal))]
         raise ConfigError(
@@ -88,7 +90,7 @@ def _expressions(
     betas, geometries = [base.beta], [mechanism]
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
         changed = robot.stretched(lambda length: length * rng.uniform(0.8, 1.25)).mechanism()
-        K = Dynamics(changed, once=True).regressor(*states)
+        K = Dynamics(changed, once=True).regressor(*states)[:, robot.measured()]
         betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns))
         geometries.append(changed)
     lengths = [{length.name: length.value for length in entry.lengths} for entry in geometries]

@@ -91,14 +91,14 @@ def reduce(
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
+    weights = samples.nominal_torque
     if wanted.weighting == "none":
-        return np.ones(next(iter(samples.estimation.blocks())).tau.shape[1])
-    if samples.nominal_torque is not None:
-        weights = samples.nominal_torque
-    else:
+        n_dof = next(iter(samples.estimation.blocks())).tau.shape[1]
+        return np.where(np.isinf(weights), np.inf, 1.0) if weights is not None else np.ones(n_dof)
+    if weights is None:
         weights = standard_deviation(block.tau for block in samples.estimation.blocks())
     small, large = SIZES
-    good = (weights > small) & (weights < large)
+    good = (weights > small) & (weights < large) | np.isinf(weights)
     if not good.all():
         raise DataError(
             f"joint {int(np.argmin(good)) + 1} has no torque to weigh its errors by, or one too "

@@ -169,6 +169,7 @@ def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
     if model.nominal_torque_given:
         return model.nominal_torque
     deviation = standard_deviation(block.tau for block in estimation.blocks())
+    deviation[np.isinf(model.nominal_torque)] = np.inf
     return _scale(deviation, model, "nominal_torque", "torque")
 
 

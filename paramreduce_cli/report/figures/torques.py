@@ -11,20 +11,21 @@ from paramreduce_cli.report.style import joint_label, joint_style
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
     """Normalised torques of the full and of the selected model along the validation trajectory."""
-    n_dof = data.motion.full.shape[1]
+    measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
+    n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1
     rows = -(-n_dof // columns)
     drawn = Figure(figsize=(7.2, 1.55 * rows + 0.5))
     grid = np.atleast_1d(drawn.subplots(rows, columns, sharex=True)).ravel()
-    for j in range(n_dof):
+    for axes, j in zip(grid, measured, strict=False):
         colour, _ = joint_style(j)
-        grid[j].plot(data.motion.time, data.motion.full[:, j], color=colour, label="full")
-        grid[j].plot(
+        axes.plot(data.motion.time, data.motion.full[:, j], color=colour, label="full")
+        axes.plot(
             data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=(0, (3, 2)),
             linewidth=1.1, label=f"n = {data.validation.selected.n}",
         )  # fmt: skip
-        grid[j].set_ylabel(f"τ / nom, {joint_label(data, j)}", fontsize=8)
-        grid[j].legend(fontsize=7, loc="upper right", ncols=2)
+        axes.set_ylabel(f"τ / nom, {joint_label(data, j)}", fontsize=8)
+        axes.legend(fontsize=7, loc="upper right", ncols=2)
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:
