@@ -237,5 +237,6 @@ def _with_paths(config: Config, folder: Path) -> Config:
         update={
             "trajectories": resolved(config.trajectories, "file"),
             "sampling": resolved(config.sampling, "estimation_file", "validation_file"),
+            "source": None if config.source is None else resolved(config.source, "file"),
         }
     )

@@ -306,9 +306,30 @@ class ReportSection(Section):
     """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
 
 
+class SourceSection(Section):
+    """The robot file that a config was made from, and what was asked of it; so that it can be written back."""
+
+    file: Path
+    """The file; relative to this one."""
+    root: str | None = None
+    """The link that stands still; the file's own root if left out."""
+    tip: str | None = None
+    """The last link of a chain; joints beside it are locked."""
+    locked: dict[str, Number] = {}
+    """Coordinates of joints that do not move, rad or m."""
+    ignored: list[str] = []
+    """Links that are left out, with all that they carry."""
+    floating: bool = False
+    """Whether the root moves freely."""
+    uncoupled: bool = False
+    """Whether joints that follow others in the file move on their own."""
+
+
 class Config(Robot):
     """A robot and everything that is done with it."""
 
+    source: SourceSection | None = None
+    """The robot file it was made from."""
     model: ModelSection = ModelSection()
     """Base parameters."""
     trajectories: TrajectoriesSection

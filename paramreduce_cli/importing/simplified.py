@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.importing.imported import (
@@ -26,28 +27,12 @@ BASE = "base"
 
 
 @dataclass(frozen=True)
-class Choice:
-    """What of a robot is wanted."""
-
-    root: str | None = None
-    """The link that stands still; the file's own root if left out."""
-    tip: str | None = None
-    """The last link of a chain; joints beside it are locked."""
-    locked: Mapping[str, float] | None = None
-    """Coordinates of joints that do not move, rad or m."""
-    ignored: tuple[str, ...] = ()
-    """Links that are left out, with all that they carry."""
-    floating: bool = False
-    """Whether the root moves freely."""
-    uncoupled: bool = False
-    """Whether joints that follow others in the file move on their own."""
-
-
-@dataclass(frozen=True)
 class ImportedBody:
     """One body of the config, with the joint that carries it."""
 
     name: str
+    link: str | None
+    """What the file calls it; None for a frame between the axes of a joint."""
     parent: str
     joint: str
     """A kind of joint of configs."""
@@ -80,10 +65,12 @@ class SimplifiedRobot:
     source: str
     bodies: tuple[ImportedBody, ...]
     couplings: tuple[Coupling, ...]
+    merged: Mapping[str, str]
+    """Links that move with a body of another name, by name in the file."""
     remarks: tuple[str, ...]
 
 
-def simplified(robot: ImportedRobot, choice: Choice) -> SimplifiedRobot:
+def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
     """Merge what does not move, and name everything as configs allow.
 
     Raises:
@@ -93,7 +80,7 @@ def simplified(robot: ImportedRobot, choice: Choice) -> SimplifiedRobot:
 
 
 class _Simplification:
-    def __init__(self, robot: ImportedRobot, choice: Choice) -> None:
+    def __init__(self, robot: ImportedRobot, choice: SourceSection) -> None:
         self._robot, self._choice = robot, choice
         self._remarks = list(robot.remarks)
         self._children: dict[str, list[ImportedJoint]] = {}
@@ -107,6 +94,7 @@ class _Simplification:
         self._joints = {joint.name: joint for joint in robot.joints}
         self._lock_followers()
         self._names = _Names(self._remarks)
+        self._carried: dict[str, str] = {}
 
     def _check(self) -> None:
         choice = self._choice
@@ -150,13 +138,16 @@ class _Simplification:
         inertials: dict[str, list[Inertial]] = {}
         if self._choice.floating:
             name = self._names.body(self._root)
-            bodies.append(ImportedBody(name, BASE, "free", None, (), None, Inertial(), None))
+            bodies.append(
+                ImportedBody(name, self._root, BASE, "free", None, (), None, Inertial(), None)
+            )
             waiting: list[tuple[str, str, Steps]] = [(self._root, name, ())]
         else:
             waiting = [(self._root, BASE, ())]
         while waiting:
             link, carrier, steps = waiting.pop()
             inertial = self._robot.links[link]
+            self._carried[link] = carrier
             if inertial is not None:
                 inertials.setdefault(carrier, []).append(inertial.seen(matrix(steps)))
             for joint in reversed(self._children.get(link, [])):
@@ -175,9 +166,11 @@ class _Simplification:
             )
         filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
         couplings = () if self._choice.uncoupled else self._couplings(filled)
+        own = {body.link for body in bodies}
+        merged = {link: body for link, body in self._carried.items() if link not in own}
         name = self._names.clean(self._robot.name) or "robot"
         return SimplifiedRobot(
-            name, self._robot.source, tuple(filled), couplings, tuple(self._remarks)
+            name, self._robot.source, tuple(filled), couplings, merged, tuple(self._remarks)
         )
 
     def _moving(
@@ -187,27 +180,39 @@ class _Simplification:
         name = self._names.body(joint.child)
         coordinate = self._names.coordinate(joint.name)
         if joint.kind == "floating":
-            bodies.append(ImportedBody(name, carrier, "free", None, at, None, Inertial(), None))
+            bodies.append(
+                ImportedBody(name, joint.child, carrier, "free", None, at, None, Inertial(), None)
+            )
         elif joint.kind == "planar":
             turn = rotation_to(np.array(joint.axis))
             for k, letter in enumerate("xy"):
                 slide, axis = self._names.body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
                 bodies.append(
                     ImportedBody(
-                        slide, carrier, "prismatic", axis, at, f"{coordinate}_{letter}", Inertial(),
+                        slide, None, carrier, "prismatic", axis, at, f"{coordinate}_{letter}", Inertial(),
                         None, massless=True,
                     )
                 )  # fmt: skip
                 carrier, at = slide, ()
             bodies.append(
                 ImportedBody(
-                    name, carrier, "revolute", joint.axis, at, coordinate, Inertial(), None
+                    name,
+                    joint.child,
+                    carrier,
+                    "revolute",
+                    joint.axis,
+                    at,
+                    coordinate,
+                    Inertial(),
+                    None,
                 )
             )
         else:
             kind = "prismatic" if joint.kind == "prismatic" else "revolute"
             bodies.append(
-                ImportedBody(name, carrier, kind, joint.axis, at, coordinate, Inertial(), joint)
+                ImportedBody(
+                    name, joint.child, carrier, kind, joint.axis, at, coordinate, Inertial(), joint
+                )
             )
         return name
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import re
 import textwrap
@@ -9,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.importing.angles import angle_text, number_text
 from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
 from paramreduce_cli.importing.simplified import Coupling, ImportedBody, SimplifiedRobot
@@ -22,13 +24,14 @@ _RANGE = {"revolute": "[-pi, pi]", "prismatic": "[-0.5, 0.5]", "free": "[-0.5, 0
 """Where it has none of the position, rad or m."""
 
 
-def config_text(robot: SimplifiedRobot) -> str:
+def config_text(robot: SimplifiedRobot, source: SourceSection) -> str:
     """The config of a robot.
 
     Args:
         robot: With names that configs allow.
+        source: Where it comes from, the file relative to the folder that the config is for.
     """
-    parts = [_head(robot), _description(robot), _parameters(robot), _drives(robot)]
+    parts = [_head(robot), _source(source), _description(robot), _parameters(robot), _drives(robot)]
     parts += [_limits(robot), _TAIL]
     return "\n".join(parts)
 
@@ -43,6 +46,15 @@ def _head(robot: SimplifiedRobot) -> str:
         lines += [f"- {remark}." for remark in robot.remarks]
     text = "".join(_comment(line) for line in lines)
     return f"{text}robot: {_name(robot.name)}\n"
+
+
+def _source(source: SourceSection) -> str:
+    """What is needed to write the robot back; strings as JSON has them are YAML too."""
+    given = source.model_dump(mode="json", exclude_defaults=True)
+    lines = [f"  {key}: {json.dumps(value)}" for key, value in given.items()]
+    return "\n".join(
+        ["source:  # so that `paramreduce export --format urdf` can write it back", *lines, ""]
+    )
 
 
 def _comment(line: str) -> str:

@@ -5,7 +5,18 @@ from dataclasses import replace
 import numpy as np
 
 from paramreduce_cli.multibody.relations import approximate_expressions
-from paramreduce_cli.records import Columns, FloatArray, IntArray, Model, ReducedModel, Reduction
+from paramreduce_cli.records import (
+    Columns,
+    FloatArray,
+    IntArray,
+    Kind,
+    Model,
+    ReducedModel,
+    Reduction,
+)
+
+_STIFF = 1e-6
+"""Size of a large change of a drive's parameter: much less than that of a body's."""
 
 
 def known_choices(reduction: Reduction) -> str:
@@ -25,6 +36,42 @@ def full_model(model: Model) -> ReducedModel:
 def base_model(model: Model) -> ReducedModel:
     """The base parameters."""
     return _of_columns(model, model.base.columns, model.base_values, model.base.expressions)
+
+
+def closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
+    """Standard parameters that are the same model: of all that have its base parameters, those
+    closest to the robot's own, each measured by the size of its body.
+
+    Those of drives stay what they are wherever bodies can make up for it.
+
+    Args:
+        model: Of the robot.
+        chosen: The model.
+
+    Returns:
+        (n_parameters,)
+    """
+    columns, n = model.base.columns, model.values.size
+    to_base = np.zeros((columns.size, n))
+    to_base[np.arange(columns.size), columns] = 1.0
+    to_base[:, np.setdiff1d(np.arange(n), columns)] = model.base.beta
+    missing = to_base @ (chosen.standard - model.values)
+    sizes = _sizes(model)
+    change, *_ = np.linalg.lstsq(to_base * sizes, missing, rcond=None)
+    return model.values + sizes * change
+
+
+def _sizes(model: Model) -> FloatArray:
+    """What is a large change of each parameter, (n_parameters,)."""
+    sizes = _STIFF * (np.abs(model.values) + 1.0)
+    for rigid in model.mechanism.rigid:
+        values = {kind: abs(float(model.values[column])) for kind, column in rigid.columns.items()}
+        mass = values[Kind.M] or 1.0
+        squared = (values[Kind.IXX] + values[Kind.IYY] + values[Kind.IZZ]) / mass or 1e-2
+        scales = {Kind.M: mass, **dict.fromkeys((Kind.MX, Kind.MY, Kind.MZ), mass * squared**0.5)}
+        for kind, column in rigid.columns.items():
+            sizes[column] = scales.get(kind, mass * squared)
+    return sizes
 
 
 def _of_columns(

@@ -1,17 +1,20 @@
 """URDF files: what is read, merged and written, against Pinocchio; and what is refused."""
 
 import contextlib
+import re
 import sys
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.config import load_config
+from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.simplified import Choice, simplified
+from paramreduce_cli.importing.reading import imported
 from paramreduce_cli.importing.urdf import read_urdf
 from paramreduce_cli.importing.writing import config_text
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
@@ -20,6 +23,7 @@ from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.records import INERTIAL
+from paramreduce_cli.robots.drives import DriveSection
 
 pin = pytest.importorskip("pinocchio")
 ROBOTS = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), None)
@@ -65,7 +69,8 @@ def written(tmp_path, text):
 
 def loaded(path, tmp_path, **choice):
     config = tmp_path / "config.yaml"
-    config.write_text(config_text(simplified(read_urdf(path), Choice(**choice))))
+    source = SourceSection(file=path, **choice)
+    config.write_text(config_text(imported(source), source))
     return load_config(config)
 
 
@@ -125,7 +130,7 @@ def test_names_limits_and_torques_are_taken_over(tmp_path):
     assert limits.upper == pytest.approx([1.5, 0.3, np.pi])
     assert limits.velocity == pytest.approx([3, 0.5, 1.5])
     assert config.nominal_torque == "standard-deviation"  # grip has no effort
-    remarks = " ".join(simplified(read_urdf(path), Choice()).remarks)
+    remarks = " ".join(imported(SourceSection(file=path)).remarks)
     assert "the joint 'j\"lift' is called j_lift here" in remarks
 
 
@@ -170,7 +175,7 @@ def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
 
 
 def test_a_joint_that_follows_none_moves_on_its_own(tmp_path):
-    robot = simplified(read_urdf(written(tmp_path, following('<mimic joint="lost"/>'))), Choice())
+    robot = imported(SourceSection(file=written(tmp_path, following('<mimic joint="lost"/>'))))
     assert not robot.couplings
     assert "j\"lift follows 'lost', which is no joint: it moves on its own" in robot.remarks
 
@@ -182,12 +187,12 @@ def test_joints_that_follow_one_that_follows_or_does_not_move(tmp_path):
     )
     slide = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
     path = written(tmp_path, following(slide, grip))
-    robot = simplified(read_urdf(path), Choice())
+    robot = imported(SourceSection(file=path))
     assert [(c.leader.name, c.ratio, c.offset) for c in robot.couplings] == [
         ("upper", 2.0, 0.1), ("upper", 6.0, pytest.approx(0.3)),
     ]  # fmt: skip
     with pytest.raises(ConfigError, match="no joint is left that moves"):
-        simplified(read_urdf(path), Choice(locked={"shoulder": 0.3}))
+        imported(SourceSection(file=path, locked={"shoulder": 0.3}))
     assert loaded(path, tmp_path, uncoupled=True).n_dof == 3
 
 
@@ -202,9 +207,9 @@ def test_planar_and_floating_joints(tmp_path):
 
 def test_rounded_angles_are_listed(tmp_path):
     path = written(tmp_path, ARM.replace('rpy="0 1.2 0"', 'rpy="0 1.5708 3.14159"'))
-    robot = simplified(read_urdf(path), Choice())
+    robot = imported(SourceSection(file=path))
     assert [r for r in robot.remarks if "1.5708" in r or "3.14159" in r]
-    assert "{rz: pi}, {ry: pi/2}" in config_text(robot)
+    assert "{rz: pi}, {ry: pi/2}" in config_text(robot, SourceSection(file=path))
 
 
 @needs_robots
@@ -346,3 +351,54 @@ def test_whatever_a_file_holds_it_is_read_or_refused_with_a_message(tmp_path, ch
         text = text[:start] + piece + text[start + length :]
     with contextlib.suppress(ConfigError):
         loaded(written(tmp_path, text), tmp_path)
+
+
+def test_parameters_go_back_into_the_file(tmp_path, invoke):
+    """The reduced model's torques, from the file that is written and read anew."""
+    path = written(tmp_path, "<?xml version='1.0'?>\n<!-- kept -->\n" + ARM)
+    output = tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    settings = ["trajectories.count=2", "trajectories.starts=2", "trajectories.polished=1", "selected.torque_error=0.1",
+                "validation.accept={}", "report.formats=[svg]", "drives.grip.inertia=0.1"]  # fmt: skip
+    given = (output, "--results", tmp_path / "r")
+    invoke("run", *given, settings=settings)
+    own = load_config(output, settings)
+    mechanism, states = own.mechanism(), states_of(3)
+    with h5py.File(tmp_path / "r" / "reduction.h5") as file:
+        found = file["forward-selection"]
+        reduced = np.zeros(mechanism.n_parameters)
+        reduced[found["subsets/5"][()]] = found["parameters/5"][()]
+    models = {"full": own.parameter_values(), "base": own.parameter_values()}
+    for model, phi in (models | {"forward-selection:5": reduced}).items():
+        chosen = ("--format", "urdf", "--model", model, "--output", tmp_path / model)
+        said = invoke("export", *given, *chosen, settings=settings).err
+        again = tmp_path / model / "arm.urdf"
+        assert "<!-- kept -->" in again.read_text()
+        config = loaded(again, tmp_path / model)
+        (rotor,) = re.findall(r"no place for it: Ia_grip = (\S+)\.", " ".join(said.split()))
+        drives = config.drives | {"grip": DriveSection(inertia=float(rotor))}
+        config = config.model_copy(update={"drives": drives})
+        expected = Dynamics(mechanism, once=True).inverse(*states, phi)
+        assert own_torques(config, states) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+
+
+def test_a_file_that_is_another_robot_now_is_not_written(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    given = (output, "--results", tmp_path / "r")
+    chosen = ("--format", "urdf", "--model", "full")
+    invoke("build-model", *given)
+    written(tmp_path, ARM.replace('xyz="0.4 0 0"', 'xyz="0.5 0 0"'))
+    out = invoke("export", *given, *chosen, code=2)
+    assert "its bodies are not those of the config" in " ".join(out.err.split())
+    path.unlink()
+    assert "is no file" in invoke("export", *given, *chosen, code=2).err
+
+
+def test_a_config_of_no_file_cannot_be_written_back(invoke, tmp_path):
+    config = Path(__file__).parents[2] / "configs" / "two_link.yaml"
+    invoke("build-model", config, "--results", tmp_path)
+    out = invoke(
+        "export", config, "--results", tmp_path, "--format", "urdf", "--model", "full", code=2
+    )
+    assert "names no robot file" in " ".join(out.err.split())

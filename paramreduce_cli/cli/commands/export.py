@@ -13,11 +13,14 @@ from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.export.choice import BASE, FULL, chosen_model
 from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.robot_file import robot_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
 from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import Model, Reduction, Validation
 from paramreduce_cli.runner import Runner
+
+URDF = "urdf"
 
 
 @click.command()
@@ -25,8 +28,8 @@ from paramreduce_cli.runner import Runner
 @RESULTS
 @SET
 @click.option(
-    "--format", "kind", type=click.Choice(sorted(languages)), default="c", show_default=True,
-    help="Language of the code.",
+    "--format", "kind", type=click.Choice([*sorted(languages), URDF]), default="c", show_default=True,
+    help="Language of the code; or urdf: the robot's own file with the model's parameters.",
 )  # fmt: skip
 @click.option(
     "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
@@ -71,17 +74,20 @@ def export(
         text, loading[Model], loading.get(Reduction), loading.get(Validation)
     )
     stamp = store.stamp(records[-1])
-    files = exported(
-        loading[Model],
-        chosen,
-        title=title,
-        language=kind,
-        what=Exported(what),
-        constant=constants,
-        single=single,
-        origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
-    )
     folder = output or store.folder / "export" / kind
+    if kind == URDF:
+        files = robot_file(loaded, loading[Model], chosen)
+    else:
+        files = exported(
+            loading[Model],
+            chosen,
+            title=title,
+            language=kind,
+            what=Exported(what),
+            constant=constants,
+            single=single,
+            origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
+        )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")
 

@@ -1,5 +1,6 @@
 """The command that writes a config to begin with."""
 
+import os
 import re
 import tempfile
 from pathlib import Path
@@ -8,11 +9,11 @@ import click
 
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.loading import load_config
+from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.config.template import dh_template, loop_template, tree_template
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.section import NAME
-from paramreduce_cli.importing.simplified import Choice, simplified
-from paramreduce_cli.importing.urdf import read_urdf
+from paramreduce_cli.importing.reading import imported
 from paramreduce_cli.importing.writing import config_text
 
 
@@ -50,17 +51,21 @@ def init(
             "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies) or `--loop NAME` "
             "(closed loops)."
         )
-    choice = Choice(root, tip, dict(map(_lock, locked)), ignored, floating, uncouple)
+    choice = SourceSection(
+        file=Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
+        ignored=list(ignored), floating=floating, uncoupled=uncouple,
+    )  # fmt: skip
     if kind is not None:
-        if choice != Choice(locked={}):
+        if choice != SourceSection(file=choice.file):
             raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
-        name, text = source, _described(source, kind, joints)
+        path = output or Path("configs") / f"{source}.yaml"
+        text = _described(source, kind, joints)
     else:
-        robot = simplified(read_urdf(Path(source)), choice)
-        name, text = robot.name, config_text(robot)
+        robot = imported(choice)
+        path = output or Path("configs") / f"{robot.name}.yaml"
+        text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}))
         for remark in robot.remarks:
             say(f"- {remark}.")
-    path = output or Path("configs") / f"{name}.yaml"
     if path.exists():
         raise ConfigError(f"{path}: exists already; choose another with --output.")
     _check(text)
@@ -71,6 +76,13 @@ def init(
         raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
     todo = "Fill in what is marked TODO, then: " if "TODO" in text else ""
     say(f"Wrote {path}. {todo}paramreduce run {path}")
+
+
+def _from(config: Path, file: Path) -> Path:
+    """A robot's file as a config names it: relative to that, unless it is somewhere else."""
+    own, folder = file.resolve(), config.resolve().parent
+    near = own.is_relative_to(Path.cwd()) and folder.is_relative_to(Path.cwd())
+    return Path(os.path.relpath(own, folder)) if near else own
 
 
 def _described(name: str, kind: str, joints: int) -> str:

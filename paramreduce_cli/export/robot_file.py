@@ -1,0 +1,137 @@
+"""A model in the robot file that it came from, with standard parameters close to the file's."""
+
+import warnings
+
+import numpy as np
+
+from paramreduce_cli.config.schema import Config, SourceSection
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.importing.imported import Inertial, matrix
+from paramreduce_cli.importing.reading import imported
+from paramreduce_cli.importing.returning import with_parameters
+from paramreduce_cli.importing.simplified import SimplifiedRobot
+from paramreduce_cli.records import (
+    DRIVE,
+    INERTIAL,
+    FloatArray,
+    Kind,
+    Mechanism,
+    Model,
+    ReducedModel,
+)
+from paramreduce_cli.reduction.models import closest_standard
+from paramreduce_cli.robots.inertia import pseudo_inertia
+from paramreduce_cli.robots.placement import transform
+
+_HELD = (Kind.VISCOUS, Kind.COULOMB)
+"""What a URDF has a place for: damping and friction."""
+_SAME = 1e-9
+"""By which frames may differ, m or without unit."""
+_NOTHING = 1e-12
+"""Share of the largest eigenvalue below which a body is no worse than round-off."""
+
+
+def robot_file(config: Config, model: Model, chosen: ReducedModel) -> dict[str, bytes]:
+    """The URDF file with the parameters of a model.
+
+    A model is torques for base parameters, which many standard ones share: those are written that
+    are closest to the model's own.
+
+    Args:
+        config: With the file that it was made from.
+        model: Of the robot.
+        chosen: What is written.
+
+    Raises:
+        ConfigError: The file is unknown, or no longer the robot of the config, or has no form for
+            the parameters.
+    """
+    if config.source is None:
+        raise ConfigError(
+            "the config names no robot file to write into; one that `paramreduce init ROBOT.urdf` "
+            "writes has a source section."
+        )
+    robot = imported(config.source)
+    _check_same(config, config.source, robot)
+    standard = closest_standard(model, chosen)
+    bodies = _bodies(model.mechanism, standard)
+    _remark(model.mechanism, standard, bodies)
+    inertials = {name: _inertial(name, body) for name, body in bodies.items()}
+    content = config.source.file.read_bytes()
+    friction = _friction(model.mechanism, standard)
+    return {config.source.file.name: with_parameters(content, robot, inertials, friction)}
+
+
+def _check_same(config: Config, source: SourceSection, robot: SimplifiedRobot) -> None:
+    """Refuse a file whose bodies are no longer those of the config."""
+    tree = config.description.tree
+    own = [] if tree is None else [(b.name, b.parent, transform(b.at)) for b in tree.bodies]
+    files = [(b.name, b.parent, matrix(b.at)) for b in robot.bodies]
+    same = len(own) == len(files) and all(
+        a[:2] == b[:2] and np.allclose(a[2], b[2], rtol=0, atol=_SAME)
+        for a, b in zip(own, files, strict=True)
+    )
+    if not same:
+        raise ConfigError(
+            f"{source.file}: its bodies are not those of the config, one of them was changed; import "
+            "it anew with `paramreduce init`."
+        )
+
+
+def _bodies(mechanism: Mechanism, standard: FloatArray) -> dict[str, FloatArray]:
+    """Pseudo-inertia matrices of the bodies with their payloads, (4, 4) each."""
+    result = {}
+    for k, body in enumerate(mechanism.bodies):
+        whole = np.zeros((4, 4))
+        for rigid in mechanism.moving_with(k):
+            own = pseudo_inertia({kind: standard[rigid.columns[kind]] for kind in INERTIAL})
+            whole += rigid.frame @ own @ rigid.frame.T
+        result[body.name] = whole
+    return result
+
+
+def _inertial(name: str, body: FloatArray) -> Inertial | None:
+    mass = float(body[3, 3])
+    if not body.any():
+        return None
+    if mass == 0:
+        raise ConfigError(
+            f"{name} has moments but no mass in this model, for which a URDF has no form."
+        )
+    com = body[:3, 3] / mass
+    second = body[:3, :3] - mass * np.outer(com, com)
+    return Inertial(mass, com, np.trace(second) * np.eye(3) - second)
+
+
+def _friction(mechanism: Mechanism, standard: FloatArray) -> dict[str, tuple[float, float]]:
+    """Viscous and Coulomb friction by coordinate."""
+    found = {}
+    for drive in mechanism.drives:
+        if drive.name in mechanism.generalised_names:
+            columns = mechanism.drive_columns(drive)
+            viscous, coulomb = (
+                float(standard[columns[kind]]) if kind in columns else 0.0 for kind in _HELD
+            )
+            found[drive.name] = (viscous, coulomb)
+    return found
+
+
+def _remark(mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray]) -> None:
+    """Warn of bodies that cannot exist, and of what a URDF cannot hold."""
+    unphysical = []
+    for name, body in bodies.items():
+        eigenvalues = np.linalg.eigvalsh(body)
+        if eigenvalues[0] < -_NOTHING * max(abs(eigenvalues[-1]), _NOTHING):
+            unphysical.append(name)
+    held = {(name, kind) for name in mechanism.generalised_names for kind in _HELD}
+    left = [
+        f"{parameter.name} = {value:.12g}"
+        for parameter, value in zip(mechanism.parameters, standard, strict=True)
+        if parameter.kind in DRIVE and (parameter.owner, parameter.kind) not in held
+    ]
+    for names, text in (
+        (unphysical, "not physical, as no distribution of mass has their inertia"),
+        (left, "left out, as a URDF has no place for it"),
+    ):
+        if names:
+            warnings.warn(f"{text}: {', '.join(names)}", ParamreduceWarning, stacklevel=2)

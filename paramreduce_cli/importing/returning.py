@@ -1,0 +1,74 @@
+"""Parameters written back into the URDF file that a robot came from; everything else stays."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.simplified import BASE, SimplifiedRobot
+
+_TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+def with_parameters(
+    content: bytes,
+    robot: SimplifiedRobot,
+    inertials: Mapping[str, Inertial | None],
+    friction: Mapping[str, tuple[float, float]],
+) -> bytes:
+    """A URDF file with other parameters.
+
+    Links that move with another one lose their inertia to it, as in the config; those that do not
+    move keep it.
+
+    Args:
+        content: The file, which was read before.
+        robot: What was made of it.
+        inertials: Of the bodies by name, in their frames; None for none.
+        friction: Viscous and Coulomb friction by coordinate, N m s/rad and N m (N s/m and N).
+    """
+    parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    root = etree.fromstring(content, parser)
+    links = {element.get("name"): element for element in root.findall("link")}
+    joints = {element.get("name"): element for element in root.findall("joint")}
+    for link, carrier in robot.merged.items():
+        if carrier != BASE:
+            _write_inertial(links[link], None)
+    for body in robot.bodies:
+        if body.link is not None and not body.massless:
+            _write_inertial(links[body.link], inertials[body.name])
+        if body.limits is not None and body.coordinate is not None and body.coordinate in friction:
+            dynamics = _child(joints[body.limits.name], "dynamics")
+            for key, value in zip(("damping", "friction"), friction[body.coordinate], strict=True):
+                dynamics.set(key, _text(value))
+    tree = root.getroottree()
+    encoding = tree.docinfo.encoding or "UTF-8"
+    declared = content.lstrip().startswith(b"<?xml")
+    return bytes(etree.tostring(tree, encoding=encoding, xml_declaration=declared)) + b"\n"
+
+
+def _write_inertial(link: Any, inertial: Inertial | None) -> None:
+    old = link.find("inertial")
+    if inertial is None:
+        if old is not None:
+            link.remove(old)
+        return
+    element = _child(link, "inertial")
+    origin = _child(element, "origin")
+    origin.set("xyz", " ".join(map(_text, inertial.com)))
+    origin.set("rpy", "0 0 0")
+    _child(element, "mass").set("value", _text(inertial.mass))
+    tensor = _child(element, "inertia")
+    for key, value in zip(_TENSOR, inertial.tensor[np.triu_indices(3)], strict=True):
+        tensor.set(key, _text(value))
+
+
+def _child(element: Any, tag: str) -> Any:
+    found = element.find(tag)
+    return etree.SubElement(element, tag) if found is None else found
+
+
+def _text(value: float) -> str:
+    return repr(float(value))
