@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -69,6 +70,63 @@ def test_c_is_clean_at_every_level_of_optimisation(model, tmp_path, compiler, si
     sources = [path.name for path in tmp_path.glob("*.c")]
     for level in range(4):
         run([*COMPILERS[compiler], f"-O{level}", *WARNINGS, "-o", "t", *sources, "-lm"], tmp_path)
+
+
+EIGEN = next(Path(sys.prefix).rglob("cmeel.prefix/include/eigen3"), None)
+needs_eigen = pytest.mark.skipif(
+    EIGEN is None, reason="needs Eigen, which Pinocchio's wheel brings"
+)
+CPP = ["-std=c++17", *WARNINGS]
+
+
+def printed(text):
+    """Arrays that the example prints, by name."""
+    rows = (line.split(" = ") for line in text.splitlines())
+    return {name: np.array(values.split(), dtype=float) for name, values in rows}
+
+
+@needs_eigen
+@pytest.mark.parametrize("what", ["both", "regressor"])
+@pytest.mark.parametrize("compiler", ["g++", "clang++"])
+def test_the_face_for_cpp_gives_what_the_self_test_expects(model, tmp_path, compiler, what):
+    if shutil.which(compiler) is None:
+        pytest.skip(f"there is no {compiler}")
+    write(model, tmp_path, "c", what)
+    name = model.mechanism.robot
+    run(["gcc", "-O1", "-c", f"{name}.c"], tmp_path)
+    sources = [f"{name}_example.cpp", f"{name}.o"]
+    run([compiler, *CPP, "-isystem", EIGEN, "-o", "t", *sources, "-lm"], tmp_path)
+    found = printed(run(["./t"], tmp_path))
+    chosen, _ = chosen_model("full", model, None, None)
+    rng = np.random.default_rng(0)
+    random_cases(model.mechanism, chosen, 200, rng)  # those that are checked before it is written
+    cases = random_cases(model.mechanism, chosen, 16, rng)
+    assert set(found) == ({"K"} if what == "regressor" else {"tau", "M", "delta"})
+    for key, values in found.items():
+        assert values == pytest.approx(np.ravel(cases[key][0]), rel=1e-9, abs=1e-9)
+
+
+@needs_eigen
+@pytest.mark.skipif(shutil.which("cmake") is None, reason="needs CMake")
+def test_cmake_installs_a_package_that_is_found(tmp_path):
+    model = model_of("two_link")
+    made, used = tmp_path / "made", tmp_path / "used"
+    made.mkdir(), used.mkdir()
+    write(model, made, "c")
+    (used / "main.cpp").write_bytes((made / "two_link_example.cpp").read_bytes())
+    (used / "CMakeLists.txt").write_text(
+        "cmake_minimum_required(VERSION 3.15)\nproject(used CXX)\nfind_package(two_link REQUIRED)\n"
+        "add_executable(used main.cpp)\ntarget_compile_features(used PRIVATE cxx_std_17)\n"
+        f"target_include_directories(used PRIVATE {EIGEN})\n"
+        "target_link_libraries(used two_link::two_link)\n"
+    )
+    place = f"-DCMAKE_INSTALL_PREFIX={tmp_path / 'installed'}"
+    run(["cmake", "-B", "build", place], made)
+    run(["cmake", "--build", "build", "--target", "install"], made)
+    run(["ctest", "--test-dir", "build"], made)
+    run(["cmake", "-B", "build", f"-DCMAKE_PREFIX_PATH={tmp_path / 'installed'}"], used)
+    run(["cmake", "--build", "build"], used)
+    assert set(printed(run(["./build/used"], used))) == {"tau", "M", "delta"}
 
 
 @needs_gcc

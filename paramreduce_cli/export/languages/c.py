@@ -1,4 +1,4 @@
-"""C99: a header, a source, a self-test and the files that build them."""
+"""C99, with a face for C++17: headers, a source, a self-test, an example, and what builds them."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -22,13 +22,31 @@ def c(model: ExportedModel) -> dict[str, bytes]:
     for template, name in (
         ("model.h", f"{model.name}.h"),
         ("model.c", f"{model.name}.c"),
+        ("model.hpp", f"{model.name}.hpp"),
         ("test.c", f"{model.name}_test.c"),
+        ("example.cpp", f"{model.name}_example.cpp"),
         ("Makefile", "Makefile"),
         ("CMakeLists.txt", "CMakeLists.txt"),
     ):
         text = rendered(template, **context)
         result[name] = text.encode("ascii", "replace")
     return result
+
+
+def cpp_type(array: Argument) -> str:
+    """Of an array in C++."""
+    kind = "Vector" if len(array.shape) == 1 else "Matrix"
+    return f"{kind}<{', '.join(map(str, array.shape))}>"
+
+
+def cpp_argument(array: Argument) -> str:
+    """Of an array that is handed in."""
+    return f"In<{array.size}>" if len(array.shape) == 1 else f"const {cpp_type(array)} &"
+
+
+def class_name(function: Mapping[str, Any]) -> str:
+    """What a function of several results returns."""
+    return str(function["name"]).title().replace("_", "")
 
 
 class _Writer:
@@ -61,6 +79,9 @@ class _Writer:
             "batch_arguments": self.batch_arguments,
             "shifted": self.shifted,
             "body": self.body,
+            "type": cpp_type,
+            "argument": cpp_argument,
+            "class_name": class_name,
             "test_arguments": self.test_arguments,
             "test_batch_arguments": self.test_batch_arguments,
             "functions": [self.function(f) for f in model.functions],
