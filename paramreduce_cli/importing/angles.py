@@ -51,8 +51,8 @@ def angle_text(angle: float) -> str:
 
 
 def number_text(value: float) -> str:
-    """A number with twelve digits, as a config writes it."""
-    text = f"{value + 0.0:.12g}"
+    """A number with fourteen digits, as a config writes it."""
+    text = f"{value + 0.0:.14g}"
     return (
         text if any(mark in text for mark in ".en") or text.lstrip("-").isdigit() else f"{text}.0"
     )

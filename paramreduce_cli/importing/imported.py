@@ -8,16 +8,38 @@ from typing import Literal
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray
+from paramreduce_cli.importing.angles import without_dust
+from paramreduce_cli.records import ClosureKind, FloatArray
 from paramreduce_cli.robots.placement import Step, transform
 
-JointKind = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar"]
-JOINT_KINDS: tuple[JointKind, ...] = (
-    "revolute", "continuous", "prismatic", "fixed", "floating", "planar",
-)  # fmt: skip
+JointKind = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball"]
 
 Steps = tuple[tuple[str, float | tuple[float, ...]], ...]
 """A placement, step by step: ``xyz`` with a shift in m, or ``rx``, ``ry``, ``rz`` with an angle."""
+
+
+_NO_TURN = 1e-9
+"""Angles and entries of rotations below are round-off, rad."""
+
+
+def steps_of(frame: FloatArray) -> Steps:
+    """A homogeneous transform, (4, 4), as steps: a shift, then yaw, pitch and roll."""
+    R = frame[:3, :3]
+    flat = float(np.hypot(R[0, 0], R[1, 0]))
+    pitch = np.arctan2(-R[2, 0], flat)
+    yaw, roll = np.arctan2(R[1, 0], R[0, 0]), np.arctan2(R[2, 1], R[2, 2])
+    if flat < _NO_TURN:  # the roll turns about the same axis
+        yaw, roll = np.arctan2(-R[0, 1], R[1, 1]), 0.0
+    shift = tuple(without_dust(float(x)) for x in frame[:3, 3])
+    turns = [(key, _whole(float(a))) for key, a in (("rz", yaw), ("ry", pitch), ("rx", roll))]
+    moved: Steps = (("xyz", shift),) if any(shift) else ()
+    return (*moved, *((key, angle) for key, angle in turns if angle))
+
+
+def _whole(angle: float) -> float:
+    """An angle without the round-off of a multiple of 15 degrees."""
+    nice = round(angle / (np.pi / 12)) * np.pi / 12
+    return nice if abs(angle - nice) < _NO_TURN else angle
 
 
 def matrix(steps: Steps) -> FloatArray:
@@ -89,6 +111,17 @@ class ImportedJoint:
 
 
 @dataclass(frozen=True)
+class ImportedClosure:
+    """What holds two links together besides the joints of the tree."""
+
+    name: str
+    kind: ClosureKind
+    links: tuple[str, str]
+    frames: tuple[FloatArray, FloatArray]
+    """On the links, in their frames, (4, 4), m."""
+
+
+@dataclass(frozen=True)
 class ImportedRobot:
     """Links and joints as a file gives them, in its order."""
 
@@ -98,5 +131,12 @@ class ImportedRobot:
     links: dict[str, Inertial | None]
     """By name; None where the file gives no inertia."""
     joints: tuple[ImportedJoint, ...]
+    massless: frozenset[str] = frozenset()
+    """Links that are but frames between joints."""
+    gravity: tuple[float, ...] = (0.0, 0.0, -9.81)
+    """m/s^2, in the frame of the root."""
+    closures: tuple[ImportedClosure, ...] = ()
+    independent: tuple[tuple[str, int], ...] = ()
+    """Joints, and which of their coordinates, that determine all others; where there are closures."""
     remarks: tuple[str, ...] = ()
     """What was changed while reading, such as angles taken for what they were rounded from."""

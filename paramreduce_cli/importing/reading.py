@@ -1,6 +1,12 @@
 """A robot of a file, as the config's source section asks for it."""
 
+from pathlib import Path
+
+from lxml import etree
+
 from paramreduce_cli.config.schema import SourceSection
+from paramreduce_cli.importing.imported import ImportedRobot
+from paramreduce_cli.importing.mjcf import read_mjcf
 from paramreduce_cli.importing.simplified import SimplifiedRobot, simplified
 from paramreduce_cli.importing.urdf import read_urdf
 
@@ -11,4 +17,20 @@ def imported(source: SourceSection) -> SimplifiedRobot:
     Raises:
         ConfigError: The file cannot be read, or does not hold what is asked for.
     """
-    return simplified(read_urdf(source.file), source)
+    return simplified(_read(source.file), source)
+
+
+def _read(path: Path) -> ImportedRobot:
+    return read_mjcf(path) if _outermost(path) == "mujoco" else read_urdf(path)
+
+
+def _outermost(path: Path) -> str | None:
+    """Tag of a file's outermost element; None where there is none."""
+    if not path.is_file():
+        return None
+    try:
+        elements = etree.iterparse(str(path), ("start",), resolve_entities=False, no_network=True)
+        _, element = next(iter(elements))
+    except (etree.XMLSyntaxError, StopIteration, OSError):
+        return None
+    return str(element.tag)

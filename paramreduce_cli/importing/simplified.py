@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -18,12 +18,17 @@ from paramreduce_cli.importing.imported import (
     Inertial,
     Steps,
     matrix,
+    steps_of,
     together,
 )
+from paramreduce_cli.records import JOINT_COORDINATES, ClosureKind, FloatArray
 from paramreduce_cli.robots.tree import rotation_to
 
 BASE = "base"
 """What configs call the fixed base."""
+_SINGLE = {"revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic"}
+_SEVERAL = {"floating": "free", "ball": "spherical"}
+"""Kinds of joints in configs, with one coordinate and with several."""
 
 
 @dataclass(frozen=True)
@@ -31,20 +36,32 @@ class ImportedBody:
     """One body of the config, with the joint that carries it."""
 
     name: str
-    link: str | None
-    """What the file calls it; None for a frame between the axes of a joint."""
     parent: str
     joint: str
     """A kind of joint of configs."""
-    axis: tuple[float, ...] | None
+    at: Steps = ()
+    axis: tuple[float, ...] | None = None
     """None where the joint has none to choose."""
-    at: Steps
-    coordinate: str | None
+    coordinate: str | None = None
     """None where the joint has several, which are called after the body."""
-    inertial: Inertial
-    limits: ImportedJoint | None
-    """The joint of the file, for its limits; None where there is none."""
+    link: str | None = None
+    """What the file calls the body; None for a frame between the axes of a joint."""
+    source: ImportedJoint | None = None
+    """The joint in the file; None where there is none."""
+    inertial: Inertial = field(default_factory=Inertial)
     massless: bool = False
+
+    @property
+    def limits(self) -> ImportedJoint | None:
+        """The joint of the file where its limits are those of the one coordinate."""
+        single = self.source is not None and self.source.kind in _SINGLE
+        return self.source if single else None
+
+    def coordinates(self) -> list[str]:
+        """Names of its joint's coordinates, as configs make them where none is given."""
+        if self.coordinate is not None:
+            return [self.coordinate]
+        return [f"q_{self.name}_{k + 1}" for k in range(JOINT_COORDINATES[self.joint])]
 
 
 @dataclass(frozen=True)
@@ -58,6 +75,16 @@ class Coupling:
 
 
 @dataclass(frozen=True)
+class Closure:
+    """What holds two bodies together besides their joints."""
+
+    name: str
+    kind: ClosureKind
+    bodies: tuple[str, str]
+    at: tuple[Steps, Steps]
+
+
+@dataclass(frozen=True)
 class SimplifiedRobot:
     """Bodies, parents above their children, and what people should know of them."""
 
@@ -65,6 +92,10 @@ class SimplifiedRobot:
     source: str
     bodies: tuple[ImportedBody, ...]
     couplings: tuple[Coupling, ...]
+    closures: tuple[Closure, ...]
+    independent: tuple[str, ...]
+    """Coordinates that determine all others; all but the followers where the file says nothing."""
+    gravity: tuple[float, ...]
     merged: Mapping[str, str]
     """Links that move with a body of another name, by name in the file."""
     remarks: tuple[str, ...]
@@ -95,6 +126,7 @@ class _Simplification:
         self._lock_followers()
         self._names = _Names(self._remarks)
         self._carried: dict[str, str] = {}
+        self._frames: dict[str, FloatArray] = {}
 
     def _check(self) -> None:
         choice = self._choice
@@ -138,9 +170,7 @@ class _Simplification:
         inertials: dict[str, list[Inertial]] = {}
         if self._choice.floating:
             name = self._names.body(self._root)
-            bodies.append(
-                ImportedBody(name, self._root, BASE, "free", None, (), None, Inertial(), None)
-            )
+            bodies.append(ImportedBody(name, BASE, "free", link=self._root))
             waiting: list[tuple[str, str, Steps]] = [(self._root, name, ())]
         else:
             waiting = [(self._root, BASE, ())]
@@ -148,6 +178,7 @@ class _Simplification:
             link, carrier, steps = waiting.pop()
             inertial = self._robot.links[link]
             self._carried[link] = carrier
+            self._frames[link] = matrix(steps)
             if inertial is not None:
                 inertials.setdefault(carrier, []).append(inertial.seen(matrix(steps)))
             for joint in reversed(self._children.get(link, [])):
@@ -170,8 +201,47 @@ class _Simplification:
         merged = {link: body for link, body in self._carried.items() if link not in own}
         name = self._names.clean(self._robot.name) or "robot"
         return SimplifiedRobot(
-            name, self._robot.source, tuple(filled), couplings, merged, tuple(self._remarks)
+            name,
+            self._robot.source,
+            tuple(filled),
+            couplings,
+            self._closures(),
+            self._independent(filled, couplings),
+            self._robot.gravity,
+            merged,
+            tuple(self._remarks),
         )
+
+    def _closures(self) -> tuple[Closure, ...]:
+        found = []
+        for closure in self._robot.closures:
+            if any(link not in self._carried for link in closure.links):
+                self._remarks.append(f"{closure.name} holds a link that is left out, so it is too")
+                continue
+            one, other = (self._carried[link] for link in closure.links)
+            if one == other:
+                self._remarks.append(f"{closure.name} holds {one} to itself, so it is left out")
+                continue
+            first, second = (
+                steps_of(self._frames[link] @ frame)
+                for link, frame in zip(closure.links, closure.frames, strict=True)
+            )
+            name = self._names.closure(closure.name)
+            found.append(Closure(name, closure.kind, (one, other), (first, second)))
+        return tuple(found)
+
+    def _independent(
+        self, bodies: list[ImportedBody], couplings: tuple[Coupling, ...]
+    ) -> tuple[str, ...]:
+        if self._robot.closures:
+            moved = {body.source.name: body for body in bodies if body.source is not None}
+            return tuple(
+                moved[joint].coordinates()[k]
+                for joint, k in self._robot.independent
+                if joint in moved
+            )
+        followers = {coupling.follower.name for coupling in couplings}
+        return tuple(n for b in bodies if b.name not in followers for n in b.coordinates())
 
     def _moving(
         self, joint: ImportedJoint, carrier: str, at: Steps, bodies: list[ImportedBody]
@@ -179,48 +249,35 @@ class _Simplification:
         """Append the bodies of a joint; the name of the last of them, which is the link."""
         name = self._names.body(joint.child)
         coordinate = self._names.coordinate(joint.name)
-        if joint.kind == "floating":
-            bodies.append(
-                ImportedBody(name, joint.child, carrier, "free", None, at, None, Inertial(), None)
-            )
+        own: dict[str, Any] = {
+            "link": joint.child,
+            "source": joint,
+            "massless": joint.child in self._robot.massless,
+        }
+        if joint.kind in _SEVERAL:
+            bodies.append(ImportedBody(name, carrier, _SEVERAL[joint.kind], at, **own))
         elif joint.kind == "planar":
             turn = rotation_to(np.array(joint.axis))
             for k, letter in enumerate("xy"):
                 slide, axis = self._names.body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
+                sliding = f"{coordinate}_{letter}"
                 bodies.append(
-                    ImportedBody(
-                        slide, None, carrier, "prismatic", axis, at, f"{coordinate}_{letter}", Inertial(),
-                        None, massless=True,
-                    )
-                )  # fmt: skip
+                    ImportedBody(slide, carrier, "prismatic", at, axis, sliding, massless=True)
+                )
                 carrier, at = slide, ()
             bodies.append(
-                ImportedBody(
-                    name,
-                    joint.child,
-                    carrier,
-                    "revolute",
-                    joint.axis,
-                    at,
-                    coordinate,
-                    Inertial(),
-                    None,
-                )
+                ImportedBody(name, carrier, "revolute", at, joint.axis, coordinate, **own)
             )
         else:
-            kind = "prismatic" if joint.kind == "prismatic" else "revolute"
-            bodies.append(
-                ImportedBody(
-                    name, joint.child, carrier, kind, joint.axis, at, coordinate, Inertial(), joint
-                )
-            )
+            kind = _SINGLE[joint.kind]
+            bodies.append(ImportedBody(name, carrier, kind, at, joint.axis, coordinate, **own))
         return name
 
     def _filled(self, body: ImportedBody, parts: list[Inertial]) -> ImportedBody:
         inertial = together(parts)
         if not body.massless and not inertial.mass:
             self._remarks.append(f"{body.name} has no mass in the file: TODO")
-        return ImportedBody(**{**vars(body), "inertial": inertial})
+        return replace(body, inertial=inertial)
 
     def _led(self, joint: ImportedJoint) -> tuple[ImportedJoint, float, float]:
         """The joint at the end of those that it follows, and how it does."""
@@ -284,13 +341,9 @@ def _motion(joint: ImportedJoint, value: float) -> Steps:
         if abs(axis[k]) == 1.0:
             return ((key, value * float(axis[k])),)
     turn = rotation_to(axis)
-    return (*_yaw_pitch_roll(turn), ("rz", value), *_yaw_pitch_roll(turn.T))
-
-
-def _yaw_pitch_roll(R: np.ndarray) -> Steps:
-    pitch = -math.asin(max(-1.0, min(1.0, float(R[2, 0]))))
-    yaw, roll = math.atan2(R[1, 0], R[0, 0]), math.atan2(R[2, 1], R[2, 2])
-    return (("rz", yaw), ("ry", pitch), ("rx", roll))
+    frame = np.eye(4)
+    frame[:3, :3] = turn
+    return (*steps_of(frame), ("rz", value), *steps_of(frame.T))
 
 
 class _Names:
@@ -300,9 +353,13 @@ class _Names:
         self._remarks = remarks
         self._bodies: dict[str, str] = {BASE: BASE}
         self._coordinates: dict[str, str] = {}
+        self._closures: dict[str, str] = {}
 
     def body(self, link: str) -> str:
         return self._own(link, self._bodies, "link")
+
+    def closure(self, name: str) -> str:
+        return self._own(name, self._closures, "closure")
 
     def coordinate(self, joint: str) -> str:
         return self._own(joint, self._coordinates, "joint")

@@ -17,7 +17,6 @@ import numpy as np
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.angles import meant, without_dust
 from paramreduce_cli.importing.imported import (
-    JOINT_KINDS,
     ImportedJoint,
     ImportedRobot,
     Inertial,
@@ -27,6 +26,7 @@ from paramreduce_cli.importing.imported import (
 )
 
 _LARGEST = 50_000_000
+_KINDS = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _FARTHEST, _FASTEST, _STRONGEST = 1e3, 1e3, 1e6
 """What is meant to be no limit is beyond: rad or m, rad/s or m/s, N m or N."""
@@ -68,8 +68,8 @@ class _Reader:
             raise ConfigError(f"{self._path}, line {line}: is no XML: {error.msg}.") from error
         if root.getroottree().docinfo.internalDTD is not None:
             raise self._wrong(root, "declares a document type; a URDF has none, take it out")
-        if root.tag == "mujoco":
-            raise self._wrong(root, "is an MJCF, which cannot be read yet; export a URDF")
+        if root.tag == "mujocoinclude":
+            raise self._wrong(root, "is a part of an MJCF; give the file that includes it")
         if root.tag != "robot":
             raise self._wrong(root, "is no URDF, whose outermost element is <robot>")
         for element in root.iter("{*}*"):
@@ -99,7 +99,7 @@ class _Reader:
         self._check_tree(joints)
         joints = self._followed(joints)
         name = self._root.get("name") or self._path.stem
-        return ImportedRobot(name, str(self._path), links, joints, tuple(self._remarks))
+        return ImportedRobot(name, str(self._path), links, joints, remarks=tuple(self._remarks))
 
     def _name(self, element: Any) -> str:
         name = element.get("name")
@@ -158,8 +158,8 @@ class _Reader:
 
     def _joint(self, element: Any, links: dict[str, Inertial | None]) -> ImportedJoint:
         name, kind = self._name(element), element.get("type")
-        if kind not in JOINT_KINDS:
-            raise self._wrong(element, f"has type={kind!r}; known are {', '.join(JOINT_KINDS)}")
+        if kind not in _KINDS:
+            raise self._wrong(element, f"has type={kind!r}; known are {', '.join(_KINDS)}")
         ends = []
         for key in ("parent", "child"):
             end = element.find(key)

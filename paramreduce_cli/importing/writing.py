@@ -13,14 +13,18 @@ import numpy as np
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.importing.angles import angle_text, number_text
 from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
-from paramreduce_cli.importing.simplified import Coupling, ImportedBody, SimplifiedRobot
-from paramreduce_cli.records import JOINT_COORDINATES
+from paramreduce_cli.importing.simplified import Closure, Coupling, ImportedBody, SimplifiedRobot
 
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 _DIRECTIONS = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
-_SPEED = {"revolute": 1.5, "prismatic": 0.5, "free": 0.5}
+_SPEED = {"revolute": 1.5, "prismatic": 0.5, "free": 0.5, "spherical": 1.5}
 """Where a file has no limit of the velocity, rad/s or m/s."""
-_RANGE = {"revolute": "[-pi, pi]", "prismatic": "[-0.5, 0.5]", "free": "[-0.5, 0.5]"}
+_RANGE = {
+    "revolute": "[-pi, pi]",
+    "prismatic": "[-0.5, 0.5]",
+    "free": "[-0.5, 0.5]",
+    "spherical": "[-1, 1]",
+}
 """Where it has none of the position, rad or m."""
 
 
@@ -69,16 +73,16 @@ def _comment(line: str) -> str:
 def _description(robot: SimplifiedRobot) -> str:
     lines = [
         "description:",
-        "  gravity: [0, 0, -9.81]        # acceleration of gravity in the base frame, m/s^2",
+        f"  gravity: {_listed(robot.gravity)}        # acceleration of gravity in the base frame, m/s^2",
         "  tree:",
         "    # A body's frame is its joint's; `at` is where that is in the parent's frame, step by step.",
         "    bodies:",
     ]
     lines += [f"      - {_body(body)}" for body in robot.bodies]
-    if robot.couplings:
+    if robot.couplings or robot.closures:
         lines += ["    closures:", *(f"      - {_coupling(one)}" for one in robot.couplings)]
-        own = [name for body in _independent(robot) for name in _coordinates(body)]
-        lines.append(f"    independent: [{', '.join(map(_name, own))}]")
+        lines += [f"      - {_closure(one)}" for one in robot.closures]
+        lines.append(f"    independent: [{', '.join(map(_name, robot.independent))}]")
     return "\n".join(lines) + "\n"
 
 
@@ -105,17 +109,10 @@ def _coupling(coupling: Coupling) -> str:
     return f"{{type: coupling, bodies: {bodies}, ratio: {number_text(coupling.ratio)}{offset}}}"
 
 
-def _independent(robot: SimplifiedRobot) -> list[ImportedBody]:
-    followers = {coupling.follower.name for coupling in robot.couplings}
-    return [body for body in robot.bodies if body.name not in followers]
-
-
-def _coordinates(body: ImportedBody) -> list[str]:
-    """Names of its joint's coordinates, as configs make them where none is given."""
-    count = JOINT_COORDINATES[body.joint]
-    return (
-        [body.coordinate] if body.coordinate else [f"q_{body.name}_{k + 1}" for k in range(count)]
-    )
+def _closure(closure: Closure) -> str:
+    bodies = f"[{', '.join(map(_name, closure.bodies))}]"
+    at = ", ".join(map(_steps, closure.at))
+    return f"{{name: {_name(closure.name)}, type: {closure.kind}, bodies: {bodies}, at: [{at}]}}"
 
 
 def _axis(axis: Sequence[float]) -> str:
@@ -187,9 +184,12 @@ def _drives(robot: SimplifiedRobot) -> str:
 
 def _limits(robot: SimplifiedRobot) -> str:
     """Nominal torques and the limits of trajectories, coordinate by coordinate."""
-    coordinates: list[tuple[str, str, ImportedJoint | None]] = []
-    for body in _independent(robot):
-        coordinates += [(name, body.joint, body.limits) for name in _coordinates(body)]
+    coordinates: list[tuple[str, str, ImportedJoint | None]] = [
+        (name, body.joint, body.limits)
+        for body in robot.bodies
+        for name in body.coordinates()
+        if name in robot.independent
+    ]
     efforts = [limits.effort if limits else None for _, _, limits in coordinates]
     known = all(effort is not None and effort > 0 for effort in efforts)
     nominal = (

@@ -1,0 +1,323 @@
+"""MJCF files, read and compiled by MuJoCo itself: defaults, includes and inertias of geoms are its own.
+
+A link's frame is on the anchor of the body's last joint, in the directions of the body. Contacts,
+actuators and sensors are no part of the robot's dynamics; what else is left out is told.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.importing.imported import (
+    ImportedClosure,
+    ImportedJoint,
+    ImportedRobot,
+    Inertial,
+    JointKind,
+    Mimic,
+    steps_of,
+)
+from paramreduce_cli.records import FloatArray
+
+_WORLD = 0
+_RANK = 1e-8
+"""Share of the largest singular value up to which equations follow from others."""
+
+
+def read_mjcf(path: Path) -> ImportedRobot:
+    """Read an MJCF file.
+
+    Raises:
+        ConfigError: MuJoCo is not installed, the file cannot be read or compiled, or it holds what
+            has no rigid-body meaning.
+    """
+    try:
+        import mujoco
+    except ImportError as error:
+        raise ConfigError(
+            f"{path}: is an MJCF, which takes MuJoCo to read: `pip install 'paramreduce[mjcf]'`."
+        ) from error
+    said: list[str] = []
+    before = mujoco.get_mju_user_warning()
+    mujoco.set_mju_user_warning(said.append)  # which it writes to a file otherwise
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+        robot = _Reader(path, mujoco, model).robot()
+    except (ValueError, mujoco.FatalError) as error:
+        text = " ".join(str(error).split()).rstrip(".")
+        raise ConfigError(f"{path}: MuJoCo cannot compile it: {text}.") from error
+    finally:
+        mujoco.set_mju_user_warning(before)
+    return replace(robot, remarks=(*robot.remarks, *(f"MuJoCo says: {text}" for text in said)))
+
+
+class _Reader:
+    def __init__(self, path: Path, mujoco: Any, model: Any) -> None:
+        self._path, self._mujoco, self._model = path, mujoco, model
+        self._remarks: list[str] = []
+        self._massless: set[str] = set()
+        self._anchors = np.zeros((model.nbody, 3))
+        """Of the last joints, in the bodies' frames."""
+        self._bodies = [self._name("BODY", k, "body") for k in range(model.nbody)]
+        self._links: dict[str, Inertial | None] = {self._bodies[_WORLD]: None}
+        self._joints = [self._name("JOINT", k, "joint") for k in range(model.njnt)]
+
+    def _name(self, kind: str, index: int, default: str) -> str:
+        found = self._mujoco.mj_id2name(
+            self._model, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind}"), index
+        )
+        return str(found) if found else f"{default}_{index}"
+
+    def robot(self) -> ImportedRobot:
+        model = self._model
+        if model.nflex:
+            raise ConfigError(
+                f"{self._path}: has <flex>, bodies that bend: no rigid-body dynamics."
+            )
+        joints = tuple(joint for body in range(1, model.nbody) for joint in self._chain(body))
+        followers, closures = self._equalities()
+        joints = tuple(_following(joint, followers.get(joint.name)) for joint in joints)
+        self._tell()
+        name = bytes(model.names).split(b"\0")[0].decode(errors="replace")
+        return ImportedRobot(
+            name or self._path.stem,
+            str(self._path),
+            self._links,
+            joints,
+            massless=frozenset(self._massless),
+            gravity=tuple(model.opt.gravity.tolist()),
+            closures=closures,
+            independent=self._independent() if closures else (),
+            remarks=tuple(self._remarks),
+        )
+
+    def _chain(self, body: int) -> Iterator[ImportedJoint]:
+        """The joints of a body, one after the other, with links between; fixed where there is none."""
+        model = self._model
+        start, count = int(model.body_jntadr[body]), int(model.body_jntnum[body])
+        parent = int(model.body_parentid[body])
+        placed = self._frame(model.body_pos[body], model.body_quat[body])
+        placed[:3, 3] -= self._anchors[parent]
+        before, anchor = self._bodies[parent], np.zeros(3)
+        for k in range(start, start + count):
+            free = self._kind(k) == "floating"
+            own_anchor = np.zeros(3) if free else model.jnt_pos[k]
+            shift = np.eye(4)
+            shift[:3, 3] = own_anchor - anchor
+            last = k == start + count - 1
+            link = self._bodies[body] if last else self._between(body, k)
+            yield self._joint(k, before, link, placed @ shift)
+            before, anchor, placed = link, own_anchor, np.eye(4)
+        if count == 0:
+            yield ImportedJoint(
+                f"{self._bodies[body]}_fixed", "fixed", before, self._bodies[body], steps_of(placed),
+                (0.0, 0.0, 1.0),
+            )  # fmt: skip
+        self._anchors[body] = anchor
+        self._links[self._bodies[body]] = self._inertial(body)
+
+    def _between(self, body: int, joint: int) -> str:
+        name = f"{self._bodies[body]}_{self._joints[joint]}"
+        while name in self._bodies:
+            name += "_"
+        self._links[name] = None
+        self._massless.add(name)
+        return name
+
+    def _frame(self, position: FloatArray, quaternion: FloatArray) -> FloatArray:
+        """A homogeneous transform, (4, 4)."""
+        R = np.zeros(9)
+        self._mujoco.mju_quat2Mat(R, quaternion)
+        result = np.eye(4)
+        result[:3, :3], result[:3, 3] = R.reshape(3, 3), position
+        return result
+
+    def _inertial(self, body: int) -> Inertial | None:
+        model = self._model
+        mass, inertia = float(model.body_mass[body]), model.body_inertia[body]
+        if not mass and not inertia.any():
+            return None
+        about_com = Inertial(mass, np.zeros(3), np.diag(inertia))
+        frame = self._frame(model.body_ipos[body] - self._anchors[body], model.body_iquat[body])
+        return about_com.seen(frame)
+
+    def _kind(self, joint: int) -> JointKind:
+        kinds: dict[Any, JointKind] = {
+            self._mujoco.mjtJoint.mjJNT_FREE: "floating",
+            self._mujoco.mjtJoint.mjJNT_BALL: "ball",
+            self._mujoco.mjtJoint.mjJNT_SLIDE: "prismatic",
+            self._mujoco.mjtJoint.mjJNT_HINGE: "revolute",
+        }
+        return kinds[self._mujoco.mjtJoint(int(self._model.jnt_type[joint]))]
+
+    def _joint(self, k: int, parent: str, child: str, frame: FloatArray) -> ImportedJoint:
+        model, kind, name = self._model, self._kind(k), self._joints[k]
+        first = int(model.jnt_dofadr[k])
+        drive = {
+            "inertia": float(model.dof_armature[first]),
+            "viscous": float(model.dof_damping[first]),
+            "coulomb": float(model.dof_frictionloss[first]),
+            "stiffness": float(model.jnt_stiffness[k]),
+        }
+        single = kind in ("prismatic", "revolute")
+        if not single:
+            if any(drive.values()):
+                self._remarks.append(f"rotor, friction and spring of {name} are left out")
+            return ImportedJoint(name, kind, parent, child, steps_of(frame), (0.0, 0.0, 1.0))
+        at = int(model.jnt_qposadr[k])
+        reference = float(model.qpos0[at])
+        if reference:
+            self._remarks.append(
+                f"{name} counts from the pose of the file, where MuJoCo has it at {reference:g}"
+            )
+        if drive["stiffness"]:
+            drive["rest"] = float(model.qpos_spring[at]) - reference
+        limited = bool(model.jnt_limited[k])
+        lower, upper = ((model.jnt_range[k] - reference).tolist()) if limited else (None, None)
+        return ImportedJoint(
+            name=name,
+            kind="continuous" if kind == "revolute" and not limited else kind,
+            parent=parent,
+            child=child,
+            origin=steps_of(frame),
+            axis=tuple(model.jnt_axis[k].tolist()),
+            lower=lower,
+            upper=upper,
+            effort=self._effort(k),
+            drive={key: value for key, value in drive.items() if value},
+        )
+
+    def _effort(self, joint: int) -> float | None:
+        """What the joint's actuators can do, N m or N; None where that is not limited."""
+        model = self._model
+        if model.jnt_actfrclimited[joint]:
+            return float(np.abs(model.jnt_actfrcrange[joint]).max())
+        total = 0.0
+        for k in self._actuators(joint):
+            if not model.actuator_forcelimited[k]:
+                return None
+            gear = abs(float(model.actuator_gear[k, 0]))
+            total += gear * float(np.abs(model.actuator_forcerange[k]).max())
+        return total or None
+
+    def _actuators(self, joint: int) -> list[int]:
+        on_joint = int(self._mujoco.mjtTrn.mjTRN_JOINT)
+        model = self._model
+        return [
+            k
+            for k in range(model.nu)
+            if model.actuator_trntype[k] == on_joint and model.actuator_trnid[k, 0] == joint
+        ]
+
+    def _equalities(self) -> tuple[dict[str, Mimic], tuple[ImportedClosure, ...]]:
+        """Joints that follow others, and closures."""
+        model, kinds = self._model, self._mujoco.mjtEq
+        followers: dict[str, Mimic] = {}
+        closures = []
+        for k in range(model.neq):
+            name, kind = self._name("EQUALITY", k, "closure"), kinds(int(model.eq_type[k]))
+            if not model.eq_active0[k]:
+                self._remarks.append(f"the equality {name} is not active in the file, so left out")
+            elif kind == kinds.mjEQ_JOINT:
+                follower, mimic = self._coupling(k, name)
+                followers[follower] = mimic
+            elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
+                closures.append(self._closure(k, name, welded=kind == kinds.mjEQ_WELD))
+            else:
+                text = kind.name.removeprefix("mjEQ_").lower()
+                raise ConfigError(
+                    f"{self._path}: the equality {name} of type {text} has no rigid-body meaning here; "
+                    "connect, weld and joint have."
+                )
+        self._check_followers(followers)
+        return followers, tuple(closures)
+
+    def _coupling(self, k: int, name: str) -> tuple[str, Mimic]:
+        model = self._model
+        follower, leader = int(model.eq_obj1id[k]), int(model.eq_obj2id[k])
+        offset, ratio, *higher = model.eq_data[k, :5].tolist()
+        if any(higher) or leader < 0:
+            wanted = "a polynomial" if leader >= 0 else "a joint held at a value"
+            raise ConfigError(
+                f"{self._path}: the equality {name} is {wanted}; only offset and ratio are understood. "
+                f"--lock {self._joints[follower]}=VALUE holds a joint; take the equality out."
+            )
+        return self._joints[follower], Mimic(self._joints[leader], ratio, offset)
+
+    def _check_followers(self, followers: dict[str, Mimic]) -> None:
+        for name in followers:
+            seen, joint = {name}, followers[name].joint
+            while joint in followers:
+                if joint in seen:
+                    raise ConfigError(f"{self._path}: joint {joint} follows itself by equalities.")
+                seen.add(joint)
+                joint = followers[joint].joint
+
+    def _closure(self, k: int, name: str, *, welded: bool) -> ImportedClosure:
+        model = self._model
+        ids = (int(model.eq_obj1id[k]), int(model.eq_obj2id[k]))
+        one, other = np.eye(4), np.eye(4)
+        if model.eq_objtype[k] == int(self._mujoco.mjtObj.mjOBJ_SITE):
+            one, other = (self._frame(model.site_pos[i], model.site_quat[i]) for i in ids)
+            ids = (int(model.site_bodyid[ids[0]]), int(model.site_bodyid[ids[1]]))
+        elif welded:
+            one = self._frame(model.eq_data[k, 3:6], model.eq_data[k, 6:10])
+        else:
+            one[:3, 3], other[:3, 3] = model.eq_data[k, :3], model.eq_data[k, 3:6]
+        for frame, body in zip((one, other), ids, strict=True):
+            frame[:3, 3] -= self._anchors[body]
+        links = (self._bodies[ids[0]], self._bodies[ids[1]])
+        return ImportedClosure(name, "fixed" if welded else "point", links, (one, other))
+
+    def _independent(self) -> tuple[tuple[str, int], ...]:
+        """Coordinates that the equalities leave free: actuated ones, if they can be."""
+        mujoco, model = self._mujoco, self._model
+        off = mujoco.mjtDisableBit
+        model.opt.disableflags |= int(
+            off.mjDSBL_CONTACT | off.mjDSBL_LIMIT | off.mjDSBL_FRICTIONLOSS
+        )
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        data = mujoco.MjData(model)
+        mujoco.mj_forward(model, data)
+        J = np.reshape(data.efc_J, (-1, model.nv)) if data.nefc else np.zeros((0, model.nv))
+        scale = np.linalg.norm(J, 2) if J.size else 0.0
+        actuated = [bool(self._actuators(int(joint))) for joint in model.dof_jntid]
+        dependent: list[int] = []
+        for k in sorted(range(model.nv), key=lambda k: (actuated[k], -k)):
+            some = J[:, [*dependent, k]]
+            if np.linalg.matrix_rank(some, tol=_RANK * scale) > len(dependent):
+                dependent.append(k)
+        return tuple(
+            (self._joints[int(model.dof_jntid[k])], k - int(model.jnt_dofadr[model.dof_jntid[k]]))
+            for k in range(model.nv)
+            if k not in dependent
+        )
+
+    def _tell(self) -> None:
+        """What the file has and the config has not."""
+        model = self._model
+        left = {
+            "tendons": model.ntendon,
+            "forces of a fluid": model.opt.density or model.opt.viscosity,
+            "compensation of gravity": model.body_gravcomp.any(),
+            "springs and friction that are not linear": _given(model, "dof_dampingpoly")
+            or _given(model, "jnt_stiffnesspoly"),
+            "rotors and friction of actuators": _given(model, "actuator_armature")
+            or _given(model, "actuator_damping"),
+        }
+        self._remarks += [f"{what} are left out" for what, there in left.items() if there]
+
+
+def _given(model: Any, name: str) -> bool:
+    """Whether something that not every version of MuJoCo knows is there and not zero."""
+    return bool(np.any(getattr(model, name, 0)))
+
+
+def _following(joint: ImportedJoint, mimic: Mimic | None) -> ImportedJoint:
+    return joint if mimic is None else replace(joint, mimic=mimic)
