@@ -7,9 +7,9 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 1)
 
 # The paper's two systems; and small cases of seconds, for trying things out.
 PAPER := puma560 hexaglide
-SMALL := two_link four_bar five_bar rssr delta
+SMALL := two_link four_bar five_bar rssr delta puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark torture graph clean
+.PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark robots torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -22,6 +22,7 @@ help:
 	@echo "make regression  compare with the committed references"
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
+	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -82,6 +83,10 @@ benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
 	$(if $(BEFORE),$(BIN)/python -m tests.benchmarks.revisions $(BEFORE))
+
+# Arms that people have, from their URDF to code: sizes, operations and times in results/robots.
+robots: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.robots
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1

@@ -1,0 +1,144 @@
+"""Robots that people have, from their files to code: how small and how fast models of them are.
+
+Run as a module it writes results/robots/robots.md: for each arm the full model, the smallest with a
+torque error of at most 1 % and 0.1 % on both sets, their operations and nanoseconds a state in C.
+"""
+
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+
+ROOT = Path(__file__).parents[2]
+WHEEL = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), Path())
+DATA = ROOT.parent / "shared" / "data"
+ROBOTS = {
+    "TX40": (DATA / "tx40" / "tx40.urdf", ()),
+    "UR5": (WHEEL / "ur_description/urdf/ur5_robot.urdf", ()),
+    "UR10": (WHEEL / "ur_description/urdf/ur10_robot.urdf", ()),
+    "Jaco": (WHEEL / "kinova_description/robots/kinova.urdf", ()),
+    "Panda": (WHEEL / "panda_description/urdf/panda.urdf", ("--tip", "panda_hand")),
+}
+"""Files, and what else `init` is asked."""
+FOLDER = ROOT / "results" / "robots"
+TOLERANCES = (0.01, 0.001)
+FLAGS = ("-O3", "-march=native", "-ffp-contract=fast", "-std=gnu99")
+
+DRIVER = """
+#include "{name}.h"
+#include <stdio.h>
+#include <time.h>
+int main(void) {{
+  double phi[{name}_n_parameters], q[{n}], dq[{n}], ddq[{n}], tau[{n}], sum = 0, least = 1e9;
+  {name}_parameters(phi);
+  for (int i = 0; i < {n}; ++i) {{ q[i] = 0.3 + 0.1 * i; dq[i] = 0.2 * i - 0.5; ddq[i] = 0.7 - 0.3 * i; }}
+  for (int turn = 0; turn < 60; ++turn) {{
+    struct timespec a, b;
+    clock_gettime(CLOCK_MONOTONIC, &a);
+    for (int k = 0; k < 20000; ++k) {{
+      q[k % {n}] += 1e-6;
+      {name}_inverse_dynamics(phi, q, dq, ddq, tau);
+      sum += tau[k % {n}];
+    }}
+    clock_gettime(CLOCK_MONOTONIC, &b);
+    const double spent = ((b.tv_sec - a.tv_sec) * 1e9 + (b.tv_nsec - a.tv_nsec)) / 20000;
+    if (spent < least) least = spent;
+  }}
+  printf("%.1f %g\\n", least, sum);
+  return 0;
+}}
+"""
+
+
+def paramreduce(*arguments):
+    command = [sys.executable, "-m", "paramreduce_cli", *map(str, arguments)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    if done.returncode not in (0, 1):
+        raise RuntimeError(done.stdout + done.stderr)
+    return done.stdout
+
+
+def nanoseconds(folder, name, n):
+    """Of one evaluation of the exported inverse dynamics, the least of many turns."""
+    (folder / "time.c").write_text(DRIVER.format(name=name, n=n))
+    subprocess.run(["gcc", *FLAGS, "-o", "t", "time.c", f"{name}.c", "-lm"], cwd=folder, check=True)
+    return float(
+        subprocess.run(
+            ["./t"], cwd=folder, capture_output=True, text=True, check=True
+        ).stdout.split()[0]
+    )
+
+
+def cells(label, file, options):
+    """Rows of the table: what is said of the full model and of each tolerance."""
+    config, results = FOLDER / f"{label}.yaml", FOLDER / label
+    config.unlink(missing_ok=True)
+    paramreduce("init", file, *options, "--output", config)
+    started = time.perf_counter()
+    paramreduce("run", config, "--results", results, "--set", "validation.accept={}")
+    minutes = (time.perf_counter() - started) / 60
+    rows = []
+    for tolerance in (None, *TOLERANCES):
+        if tolerance is None:
+            settings, model = ("--set", "validation.accept={}"), ("--model", "full")
+        else:
+            settings = (
+                "--set",
+                "validation.accept={}",
+                "--set",
+                f"selected.torque_error={tolerance}",
+            )
+            model = ()
+            paramreduce("validate", config, "--results", results, *settings)
+        code = FOLDER / f"{label}-{tolerance}"
+        paramreduce("export", config, "--results", results, *settings, *model, "--output", code)
+        name = next(path.stem for path in code.glob("*.hpp"))
+        header = (code / f"{name}.h").read_text()
+        operations = int(
+            header.split("Torques of the independent coordinates for a motion. ")[1].split()[0]
+        )
+        with h5py.File(results / "model.h5") as model_file:
+            n, base = len(model_file["coordinates/names"]), model_file["base/columns"].size
+            affecting = int(model_file["parameters/affecting"][()].sum())
+        kept, errors = affecting, ""
+        if tolerance is not None:
+            with h5py.File(results / "validation.h5") as file_:
+                kept, heuristic = (
+                    int(file_["selected/n"][()]),
+                    file_["selected/heuristic"][()].decode(),
+                )
+                errors = " / ".join(
+                    f"{100 * file_[f'{heuristic}/torque_error_{name_}'][kept - 1]:.2g} %"
+                    for name_ in ("estimation", "validation")
+                )
+        rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
+    return minutes, rows
+
+
+def main():
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    lines = [
+        "| robot | model | parameters | ε_τ, estimation / validation | operations of d | ns |",
+        "| --- | --- | --- | --- | --- | --- |",
+    ]
+    for label, (file, options) in ROBOTS.items():
+        if not file.is_file():
+            lines.append(f"| {label} | its file is not here | | | | |")
+            continue
+        minutes, rows = cells(label, file, options)
+        for tolerance, kept, base, errors, operations, ns in rows:
+            what = "full" if tolerance is None else f"≤ {100 * tolerance:g} %"
+            first = (
+                f"{label}, {base} base parameters, {minutes:.1f} min" if tolerance is None else ""
+            )
+            lines.append(f"| {first} | {what} | {kept} | {errors} | {operations} | {ns:.0f} |")
+        print(*lines[-len(rows) :], sep="\n", flush=True)
+    (FOLDER / "robots.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
+    print(f"Wrote {os.path.relpath(FOLDER / 'robots.md', ROOT)}.")
+
+
+if __name__ == "__main__":
+    main()
