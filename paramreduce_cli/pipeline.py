@@ -115,6 +115,7 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
 
 
 def stages_to_run(config: Config) -> list[Stage]:
-    """The stages of a full run: without trajectories where both sets are recordings."""
-    recorded = len(brought_files(config, Recordings)) == 2
+    """The stages of a full run: without trajectories where both sets are recordings, or simulated."""
+    simulated = config.sampling.simulation is not None
+    recorded = simulated or len(brought_files(config, Recordings)) == 2
     return [s for s in pipeline() if not (recorded and s.output is Trajectories)]

@@ -13,6 +13,7 @@ from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import pseudo_inertia
 
 Problem = tuple[Key, str]
+_FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
 
 
@@ -128,6 +129,28 @@ def _symmetries(config: Config) -> Iterator[Problem]:
             )
     if config.sampling.symmetries and config.sampling.estimation_file is not None:
         yield ("sampling", "symmetries"), "complete trajectories, not recordings; leave them out"
+
+
+def _simulation(config: Config) -> Iterator[Problem]:
+    wanted = config.sampling.simulation
+    if wanted is None:
+        return
+    path: Key = ("sampling", "simulation")
+    names = config.description.bodies.independent_names()
+    for key, given in (("inputs", wanted.inputs), ("start", wanted.start)):
+        for name in given:
+            if name not in names:
+                yield (*path, key, name), unknown("independent coordinate", name, names)
+    if wanted.step * _FEWEST_STEPS > wanted.duration:
+        yield (*path, "step"), f"{wanted.step:g} s is too long for {wanted.duration:g} s"
+    if wanted.duration / wanted.step > _MOST_STEPS:
+        yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {wanted.duration:g} s"
+    for name, drive in config.each_drive().items():
+        if Kind.COULOMB in drive.effects() and not drive.smoothing:
+            yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
+    sampling = config.sampling
+    if sampling.estimation_file or sampling.validation_file or sampling.symmetries:
+        yield path, "makes both sets; leave out files and symmetries"
 
 
 def _massless(config: Config) -> Iterator[Problem]:
@@ -264,6 +287,7 @@ _CHECKS: tuple[Check, ...] = (
     _constraints,
     _groups,
     _symmetries,
+    _simulation,
     _massless,
     _parameter_sets,
     _per_joint,

@@ -15,6 +15,7 @@ from paramreduce_cli.fields.section import (
     Count,
     LimitPerJoint,
     Name,
+    Pair,
     PairPerJoint,
     PerJoint,
     Positive,
@@ -93,6 +94,40 @@ class TrajectoriesSection(Section):
         )
 
 
+class InputSection(Section):
+    """A force on an independent coordinate in a simulation: sines of time with random phases, and feedback."""
+
+    amplitude: Annotated[Number, Field(ge=0)] = 0.0
+    """Of each sine, N m (N if prismatic)."""
+    frequencies: list[Positive] = []
+    """Of the sines, Hz."""
+    stiffness: Annotated[Number, Field(ge=0)] = 0.0
+    """Feedback of the coordinate, N m/rad (N/m)."""
+    damping: Annotated[Number, Field(ge=0)] = 0.0
+    """Feedback of its speed, N m s/rad (N s/m)."""
+    reference: Number = 0.0
+    """Where the feedback leads, rad (m)."""
+
+
+class SimulationSection(Section):
+    """Samples of simulated motions under inputs, for mechanisms that cannot follow any trajectory; coordinates without an input have no torque."""
+
+    inputs: Annotated[dict[str, InputSection], Field(min_length=1)]
+    """By independent coordinate."""
+    duration: Span = 10.0
+    """Of each motion, s."""
+    step: Positive = 0.01
+    """Between samples, s."""
+    runs: Count = 4
+    """Motions of the estimation set."""
+    validation_runs: Count = 1
+    """Motions of the validation set."""
+    start: dict[str, Pair] = {}
+    """[lower, upper] of independent coordinates at the start, at rest, rad (m); where the mechanism is assembled, or zero, if left out."""
+    seed: Seed = 0
+    """Of phases and starts."""
+
+
 class SamplingSection(Section):
     """The estimation and validation sets."""
 
@@ -104,6 +139,8 @@ class SamplingSection(Section):
     """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
     validation_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
+    simulation: SimulationSection | None = None
+    """Simulated motions instead of trajectories, for both sets."""
     torques: Literal["measured", "model"] = "measured"
     """Of recorded states: measured ones, which the files must hold, or those of the model, whatever they hold."""
     symmetries: list[Annotated[list[str], Field(min_length=1)]] = []

@@ -23,8 +23,8 @@ class Odd(NamedTuple):
 
 
 _ROUNDED = 0.02
-"""Share of the largest speed up to which a sign is rounded off. The PUMA's trajectories with friction
-take a fifth of the time then and have a fifth less kappa, by the true sign, than without."""
+"""Share of the largest speed up to which a sign is rounded off. Trajectories of a six-joint arm with
+friction take a fifth of the time then and have a fifth less kappa, by the true sign, than without."""
 
 CASADI = Odd(ca.sign, ca.tanh)
 

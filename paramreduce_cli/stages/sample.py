@@ -1,14 +1,16 @@
 """sample: states, torques and observation matrices of both sets."""
 
 import warnings
+import zlib
 from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 
-from paramreduce_cli.config.schema import SamplingSection
+from paramreduce_cli.config.schema import InputSection, SamplingSection, SimulationSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
+from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -39,6 +41,8 @@ def sample(
     dynamics = Dynamics(model.mechanism)
 
     def observed(name: str, recording: Recording | None, points: int | None) -> ObservedSet:
+        if sampling.simulation is not None:
+            return _simulated(sampling.simulation, model, dynamics, name)
         if recording is not None:
             return _recorded(sampling, model, dynamics, recording)
         if trajectories is None:
@@ -130,6 +134,48 @@ def _recorded(
         model.values,
         recording.source,
     )
+
+
+def _simulated(
+    wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str
+) -> ObservedSet:
+    """Samples of the full model's motions under the inputs that the config gives."""
+    mechanism = model.mechanism
+    rng = np.random.default_rng([wanted.seed, zlib.crc32(name.encode())])
+    time = np.arange(0.0, wanted.duration, wanted.step)
+    z = np.zeros(mechanism.n_dof)
+    if mechanism.loops is not None:
+        z = mechanism.loops.assembly[list(mechanism.independent)]
+    motions = []
+    for _ in range(wanted.runs if name == "estimation" else wanted.validation_runs):
+        inputs = [_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
+        start = z.copy()
+        for coordinate, (lower, upper) in wanted.start.items():
+            start[mechanism.coordinate_names.index(coordinate)] = rng.uniform(lower, upper)
+        try:
+            motions.append(simulate(dynamics, model.values, inputs, start, time))
+        except DataError as error:
+            raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
+    return ObservedSet(
+        lambda: _motion_blocks(motions), len(motions) * time.size, dynamics, model.values,
+        f"{name} set",
+    )  # fmt: skip
+
+
+def _input(section: InputSection | None, rng: np.random.Generator) -> Input:
+    if section is None:
+        return Input()
+    phases = rng.uniform(0, 2 * np.pi, len(section.frequencies)).tolist()
+    given = section.model_dump() | {"frequencies": tuple(section.frequencies)}
+    return Input(phases=tuple(phases), **given)
+
+
+def _motion_blocks(motions: list[SimulatedMotion]) -> Iterator[StateBlock]:
+    for index, motion in enumerate(motions):
+        for start in range(0, motion.time.size, BLOCK_SAMPLES):
+            part = slice(start, start + BLOCK_SAMPLES)
+            states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
+            yield StateBlock(index, *states, motion.tau[part])
 
 
 def _series_blocks(

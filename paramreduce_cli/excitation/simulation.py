@@ -1,0 +1,137 @@
+"""Motions of a mechanism under inputs, for those that cannot follow any trajectory.
+
+Coordinates without an input move as the others make them. States are those of the full model's
+forward dynamics; accelerations follow from the inputs at each sample, so that torques and states fit
+each other to round-off whatever the integration's error.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.integrate import solve_ivp
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.records import FloatArray
+
+_TOLERANCE = 1e-8
+"""Of the integration, relative and absolute; it moves the path, not the fit of its samples."""
+_MOST_EVALUATIONS = 100
+"""Of the dynamics for each sample, on average; a dozen are usual."""
+_METHOD = "LSODA"
+"""Stiff where friction is smooth but steep, and not where it is not."""
+
+
+@dataclass(frozen=True)
+class Input:
+    """A force on an independent coordinate: sines of time, and feedback towards a rest."""
+
+    amplitude: float = 0.0
+    """Of each sine, N m or N."""
+    frequencies: tuple[float, ...] = ()
+    """Hz"""
+    phases: tuple[float, ...] = ()
+    """rad"""
+    stiffness: float = 0.0
+    """Of the feedback, N m/rad or N/m."""
+    damping: float = 0.0
+    """N m s/rad or N s/m"""
+    reference: float = 0.0
+    """rad or m"""
+
+    def __call__(self, time: float, z: float, dz: float) -> float:
+        """The force at a time and a state."""
+        sines = sum(
+            np.sin(2 * np.pi * frequency * time + phase)
+            for frequency, phase in zip(self.frequencies, self.phases, strict=True)
+        )
+        feedback = self.stiffness * (self.reference - z) - self.damping * dz
+        return float(self.amplitude * sines + feedback)
+
+
+@dataclass(frozen=True)
+class SimulatedMotion:
+    """Samples of a motion; each (n_samples, n_dof)."""
+
+    time: FloatArray
+    """(n_samples,), s"""
+    z: FloatArray
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray
+    """What the inputs were, zero where there is none."""
+
+
+def simulate(
+    dynamics: Dynamics,
+    phi: FloatArray,
+    inputs: Sequence[Input],
+    start: FloatArray,
+    time: FloatArray,
+) -> SimulatedMotion:
+    """Move from rest under inputs.
+
+    Args:
+        dynamics: Of the mechanism.
+        phi: Standard parameters of the full model, (n_parameters,).
+        inputs: One per independent coordinate.
+        start: Independent coordinates to start from, (n_dof,), rad or m.
+        time: Of the samples, from zero, (n_samples,), s.
+
+    Raises:
+        DataError: The motion grows beyond all bounds, or the loops cannot be closed.
+    """
+    forward = _ForwardDynamics(dynamics, phi, inputs, _MOST_EVALUATIONS * time.size)
+    n = start.size
+    state = np.concatenate([start, np.zeros(n)])
+    with np.errstate(over="ignore", invalid="ignore"):
+        found = solve_ivp(
+            forward.rates, (0.0, float(time[-1])), state, _METHOD, time,
+            rtol=_TOLERANCE, atol=_TOLERANCE,
+        )  # fmt: skip
+    z, dz = found.y[:n].T, found.y[n:].T
+    if not found.success or not np.isfinite(found.y).all():
+        raise _lost(float(found.t[-1]) if found.t.size else 0.0)
+    tau = np.array([forward.inputs(*sample) for sample in zip(time, z, dz, strict=True)])
+    samples = zip(time, z, dz, strict=True)
+    ddz = np.array([forward.rates(t, np.concatenate([*some]))[n:] for t, *some in samples])
+    return SimulatedMotion(time, z, dz, ddz, tau)
+
+
+def _lost(time: float) -> DataError:
+    return DataError(
+        f"the simulated motion cannot be followed beyond {time:.3g} s; give it smaller inputs, or "
+        "feedback that keeps it within bounds."
+    )
+
+
+class _ForwardDynamics:
+    def __init__(
+        self, dynamics: Dynamics, phi: FloatArray, inputs: Sequence[Input], most: int
+    ) -> None:
+        self._dynamics, self._phi, self._inputs = dynamics, phi, inputs
+        self._left = most
+        """Evaluations until the motion is given up."""
+        self._coordinates = Coordinates(dynamics.mechanism)
+        self._near: FloatArray | None = None
+        """Where the mechanism was last, to close its loops from."""
+
+    def inputs(self, time: float, z: FloatArray, dz: FloatArray) -> FloatArray:
+        """Forces on the independent coordinates, (n_dof,)."""
+        pairs = zip(self._inputs, z, dz, strict=True)
+        return np.array([signal(time, *state) for signal, *state in pairs])
+
+    def rates(self, time: float, state: FloatArray) -> FloatArray:
+        """Derivative of positions and velocities, (2 n_dof,)."""
+        self._left -= 1
+        if self._left < 0 or not np.isfinite(state).all():
+            raise _lost(time)
+        z, dz = np.split(state, 2)
+        q = self._coordinates.positions(z[None], self._near)
+        self._near = q[0]
+        dq, _ = self._coordinates.rates(q, dz[None], np.zeros((1, dz.size)))
+        M, delta = self._dynamics.direct(q, dq, self._phi)
+        ddz = np.linalg.solve(M[0], self.inputs(time, z, dz) - delta[0])
+        return np.concatenate([dz, ddz])

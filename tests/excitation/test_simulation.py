@@ -1,0 +1,101 @@
+"""Simulated motions against Lagrange's equations with multipliers, and by their energy."""
+
+import numpy as np
+import pytest
+from conftest import TWO_LINK, config_and_model
+from oracles.lagrange import Lagrange, forward_dynamics
+from scipy.integrate import simpson
+
+from paramreduce_cli.excitation.simulation import Input, simulate
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.records import Recordings
+from paramreduce_cli.stages.sample import sample
+
+SHORT = ["sampling.simulation.runs=2", "sampling.simulation.duration=1"]
+
+
+@pytest.fixture(scope="module", params=["cart_pole", "quarter_car"])
+def simulated(request):
+    config, model = config_and_model(request.param, *SHORT)
+    return model, sample(config.sampling, model, None, Recordings(None, None))
+
+
+def test_accelerations_are_those_of_the_oracle(simulated):
+    model, samples = simulated
+    mechanism, oracle = model.mechanism, Lagrange(model.mechanism)
+    independent = list(mechanism.independent)
+    for block in samples.estimation.blocks():
+        for k in range(0, block.time.size, 20):
+            q, dq, tau = block.q[k], block.dq[k], block.tau[k]
+            ddq = forward_dynamics(oracle, independent, q, dq, model.values, tau)[independent]
+            assert block.ddz[k] == pytest.approx(ddq, rel=1e-8, abs=1e-8 * np.abs(ddq).max())
+
+
+def test_torques_fit_the_full_model_and_are_zero_where_there_is_no_input(simulated):
+    model, samples = simulated
+    passive = [name not in ("s", "z_wheel") for name in model.mechanism.coordinate_names]
+    blocks = list(samples.estimation.blocks())
+    assert {block.trajectory for block in blocks} == {0, 1}
+    for block in blocks:
+        predicted = (block.W @ model.values).reshape(block.tau.shape)
+        assert predicted == pytest.approx(block.tau, abs=1e-9 * np.abs(block.tau).max())
+        assert not block.tau[:, passive].any()
+
+
+def test_energy_is_what_inputs_brought_and_friction_took():
+    _, model = config_and_model("cart_pole", *SHORT)
+    mechanism, oracle = model.mechanism, Lagrange(model.mechanism)
+    time = np.linspace(0, 2, 2001)
+    push = Input(amplitude=2.0, frequencies=(0.7, 1.9), phases=(0.3, 1.0), stiffness=5, damping=1)
+    start = np.array([0.1, 0.8])
+    motion = simulate(Dynamics(mechanism), model.values, [push, Input()], start, time)
+    n = time.size
+    states = motion.z.T, motion.dz.T, np.zeros_like(motion.dz.T)
+    phi = np.tile(model.values, (n, 1)).T
+    energy = oracle.energy.map(n)(motion.z.T, motion.dz.T, phi).full().ravel()
+    conservative = model.values.copy()
+    drives = [k for k, p in enumerate(mechanism.parameters) if p.kind.symbol in ("fv", "fc")]
+    conservative[drives] = 0.0
+    friction = oracle.tau.map(n)(*states, phi) - oracle.tau.map(n)(
+        *states, np.tile(conservative, (n, 1)).T
+    )
+    power = np.sum((motion.tau - friction.full().T) * motion.dz, axis=1)
+    brought = simpson(power, x=time)
+    assert abs(brought) > 0.1
+    assert energy[-1] - energy[0] == pytest.approx(brought, rel=1e-5)
+
+
+def test_loops_stay_closed(simulated):
+    model, samples = simulated
+    if model.mechanism.loops is None:
+        pytest.skip("has no loops")
+    block = next(iter(samples.validation.blocks()))
+    again = Coordinates(model.mechanism).positions(block.z, None)
+    assert again == pytest.approx(block.q, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        (["inputs={q_1: {amplitude: 1}}"], "'q_1' is not known"),
+        (["inputs={z_fore: {amplitude: 1}}", "step=2"], "is too long for 10 s"),
+        (["inputs={z_fore: {amplitude: 1}}", "step=1e-9"], "more than 1000000 samples"),
+        (["inputs={z_fore: {amplitude: -1}}"], "greater than or equal to 0"),
+        (
+            ["inputs={z_fore: {amplitude: 1e12, frequencies: [1]}}", "duration=0.5"],
+            "cannot be followed beyond",
+        ),
+    ],
+)
+def test_simulations_that_cannot_be_are_refused(invoke, tmp_path, settings, says):
+    changes = [f"sampling.simulation.{setting}" for setting in settings]
+    given = (TWO_LINK, "--results", tmp_path)
+    out = invoke("run", *given, settings=changes, code=2)
+    assert says in " ".join(out.err.split())
+
+
+def test_a_sign_that_jumps_is_refused(invoke, tmp_path):
+    settings = ["sampling.simulation.inputs={z_fore: {amplitude: 1}}", "drives.all.coulomb=1"]
+    out = invoke("run", TWO_LINK, "--results", tmp_path, settings=settings, code=2)
+    assert "needs a smoothing" in " ".join(out.err.split())
