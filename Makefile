@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 1)
 
 # The paper's two systems; and small cases of seconds, for trying things out.
 PAPER := puma560 hexaglide
-SMALL := two_link four_bar five_bar rssr delta cart_pole quarter_car puma560_friction
+SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
 .PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark robots torture graph clean
 .DEFAULT_GOAL := help

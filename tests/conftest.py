@@ -24,7 +24,7 @@ ROOT = Path(__file__).resolve().parents[1]
 CONFIGS = ROOT / "configs"
 TWO_LINK = CONFIGS / "two_link.yaml"
 
-CLOSED_LOOPS = ["four_bar", "five_bar", "rssr", "delta", "hexaglide"]
+CLOSED_LOOPS = ["four_bar", "five_bar", "rssr", "delta", "humanoid_leg", "hexaglide"]
 
 PI = np.pi
 PUMA_ROWS = [

@@ -22,7 +22,8 @@ from paramreduce_cli.records import Constraint, Mechanism
 from paramreduce_cli.robots import Description, Robot
 from paramreduce_cli.robots.frames import translation
 
-REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8, "delta": 0.3}
+REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8, "delta": 0.3,
+         "humanoid_leg": 0.2}  # fmt: skip
 """Amplitudes of independent coordinates about the assembly, rad or m, that all loops survive."""
 
 
