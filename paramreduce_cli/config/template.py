@@ -112,6 +112,30 @@ def dh_template(name: str, joints: int) -> str:
     return _HEAD.format(name=name) + _DH + rows + parameters + bodies + _TAIL
 
 
+_RECORDED = """
+sampling:
+  # TODO recorded states of the robot, CSV (also .gz) or HDF5, relative to this file. A CSV has a header: t, then z1 ...
+  # zn, dz1 ..., ddz1 ... and tau1 ... for the joints in order; s, rad (m), rad/s, rad/s^2, N m (N).
+  estimation_file: {name}-estimation.csv
+  validation_file: {name}-validation.csv
+
+drives:
+  # Friction and rotors, whose values the recordings tell: each a number, or unknown if yet to be found.
+  all: {{inertia: unknown, viscous: unknown, coulomb: unknown, offset: unknown}}
+"""
+
+
+def recorded_template(name: str, joints: int) -> str:
+    """Text of a config for an arm whose motion was recorded.
+
+    Args:
+        name: Of the robot.
+        joints: How many.
+    """
+    before, _, after = dh_template(name, joints).partition("\nselected:")
+    return before + _RECORDED.format(name=name) + "\nselected:" + after
+
+
 def tree_template(name: str) -> str:
     """Text of a config for a tree of bodies in frames of one's own choice."""
     return (_HEAD + _TREE).format(name=name) + _TAIL

@@ -5,6 +5,7 @@ torque error of at most 1 % and 0.1 % on both sets, their operations and nanosec
 """
 
 import os
+import shutil
 import subprocess
 import sys
 import time
@@ -76,6 +77,7 @@ def cells(label, file, options):
     """Rows of the table: what is said of the full model and of each tolerance."""
     config, results = FOLDER / f"{label}.yaml", FOLDER / label
     config.unlink(missing_ok=True)
+    shutil.rmtree(results, ignore_errors=True)
     paramreduce("init", file, *options, "--output", config)
     started = time.perf_counter()
     paramreduce("run", config, "--results", results, "--set", "validation.accept={}")

@@ -1,6 +1,8 @@
 import json
 import re
 import shutil
+import sys
+import types
 
 import h5py
 import pytest
@@ -143,11 +145,31 @@ def test_init_writes_a_config_that_runs(invoke, tmp_path):
     invoke("run", path, "--results", tmp_path / "r", "--quiet", settings=small)
 
 
-@pytest.mark.parametrize("kind", ["--tree", "--loop"])
+@pytest.mark.parametrize("kind", ["--tree", "--loop", "--recorded"])
 def test_init_writes_configs_to_be_filled_in_that_build(invoke, tmp_path, kind):
     path = tmp_path / "new.yaml"
     assert "TODO" in invoke("init", kind, "new", "--output", path).out
     invoke("build-model", path, "--results", tmp_path / "r")
+
+
+def test_init_knows_robots_of_a_package_by_name(invoke, tmp_path, monkeypatch):
+    """What robot_descriptions offers are modules with paths; the real one fetches them."""
+    package, module = types.ModuleType("robot_descriptions"), types.ModuleType("one")
+    package.__path__ = []
+    urdf = tmp_path / "one.urdf"
+    urdf.write_text(
+        '<robot name="one"><link name="a"/><link name="b"><inertial><mass value="1"/>'
+        '<inertia ixx="1" iyy="1" izz="1"/></inertial></link><joint name="j" type="continuous">'
+        '<parent link="a"/><child link="b"/></joint></robot>'
+    )
+    module.URDF_PATH = str(urdf)
+    monkeypatch.setitem(sys.modules, "robot_descriptions", package)
+    monkeypatch.setitem(sys.modules, "robot_descriptions.one_description", module)
+    path = tmp_path / "one.yaml"
+    invoke("init", "one_description", "--output", path)
+    assert "robot: one" in path.read_text()
+    refused = invoke("init", "two_description", "--output", tmp_path / "two.yaml", code=2)
+    assert "is no file" in refused.err
 
 
 @pytest.mark.parametrize(

@@ -10,20 +10,30 @@ import click
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.config.schema import SourceSection
-from paramreduce_cli.config.template import dh_template, loop_template, tree_template
+from paramreduce_cli.config.template import (
+    dh_template,
+    loop_template,
+    recorded_template,
+    tree_template,
+)
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.section import NAME
-from paramreduce_cli.importing.reading import imported
+from paramreduce_cli.importing.reading import described, imported
 from paramreduce_cli.importing.writing import config_text
 
 
 @click.command()
-@click.argument("source", metavar="ROBOT.urdf|NAME", required=False)
+@click.argument("source", metavar="FILE|NAME", required=False)
 @click.option("--dh", "kind", flag_value="dh", help="An arm in Denavit-Hartenberg parameters.")
 @click.option("--tree", "kind", flag_value="tree", help="A tree of bodies.")
 @click.option("--loop", "kind", flag_value="loop", help="A mechanism with a closed loop.")
+@click.option("--recorded", "kind", flag_value="recorded", help="An arm with recorded motions.")
 @click.option(
-    "--joints", type=click.IntRange(1, 30), default=6, show_default=True, help="With --dh."
+    "--joints",
+    type=click.IntRange(1, 30),
+    default=6,
+    show_default=True,
+    help="With --dh and --recorded.",
 )
 @click.option("--root", metavar="LINK", help="What stands still.  [default: the file's root]")
 @click.option("--tip", metavar="LINK", help="The end of a chain; joints beside it are locked at 0.")
@@ -38,9 +48,9 @@ def init(
     source: str | None, kind: str | None, joints: int, root: str | None, tip: str | None,
     locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool, output: Path | None,
 ) -> None:  # fmt: skip
-    """Write a commented config: from a URDF, or with --dh, --tree or --loop one to be filled in.
+    """Write a commented config: from a URDF or MJCF, or with --dh, --tree, --loop or --recorded one to be filled in.
 
-    Of a URDF links that cannot move against each other become one body, rounded angles are taken
+    Of a file links that cannot move against each other become one body, rounded angles are taken
     for what they were, limits and inertias are taken over. The config is the robot from then on.
 
     Example: paramreduce init robot.urdf --output configs/robot.yaml
@@ -48,11 +58,11 @@ def init(
     if source is None:
         raise ConfigError(
             "say what the robot is: `paramreduce init robot.urdf`; or, to describe it in a config, "
-            "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies) or `--loop NAME` "
-            "(closed loops)."
+            "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies), `--loop NAME` "
+            "(closed loops) or `--recorded NAME` (an arm with recorded motions)."
         )
     choice = SourceSection(
-        file=Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
+        file=(described(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
         ignored=list(ignored), floating=floating, uncoupled=uncouple,
     )  # fmt: skip
     if kind is not None:
@@ -92,6 +102,8 @@ def _described(name: str, kind: str, joints: int) -> str:
         )
     if kind == "dh":
         return dh_template(name, joints)
+    if kind == "recorded":
+        return recorded_template(name, joints)
     return tree_template(name) if kind == "tree" else loop_template(name)
 
 
