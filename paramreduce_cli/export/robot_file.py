@@ -1,4 +1,4 @@
-"""A model in the robot file that it came from, with standard parameters close to the file's."""
+"""A model in the robot file that it came from, URDF or MJCF, with standard parameters close to the file's."""
 
 import warnings
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from paramreduce_cli.config.schema import Config, SourceSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.importing import mjcf, returning
 from paramreduce_cli.importing.imported import Inertial, matrix
-from paramreduce_cli.importing.reading import imported
-from paramreduce_cli.importing.returning import with_parameters
+from paramreduce_cli.importing.reading import imported, kind_of
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import (
     DRIVE,
@@ -20,19 +20,26 @@ from paramreduce_cli.records import (
     ReducedModel,
 )
 from paramreduce_cli.reduction.models import closest_standard
+from paramreduce_cli.robots.drives import EFFECTS
 from paramreduce_cli.robots.inertia import pseudo_inertia
 from paramreduce_cli.robots.placement import transform
 
-_HELD = (Kind.VISCOUS, Kind.COULOMB)
-"""What a URDF has a place for: damping and friction."""
+_HELD = {
+    "urdf": (Kind.VISCOUS, Kind.COULOMB),
+    "mjcf": (Kind.VISCOUS, Kind.COULOMB, Kind.ROTOR, Kind.STIFFNESS),
+}
+"""What of a drive the files have a place for."""
 _SAME = 1e-9
 """By which frames may differ, m or without unit."""
 _NOTHING = 1e-12
 """Share of the largest eigenvalue below which a body is no worse than round-off."""
 
 
-def robot_file(config: Config, model: Model, chosen: ReducedModel) -> dict[str, bytes]:
-    """The URDF file with the parameters of a model.
+FORMATS = ("urdf", "mjcf")
+
+
+def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) -> dict[str, bytes]:
+    """The robot's own file with the parameters of a model.
 
     A model is torques for base parameters, which many standard ones share: those are written that
     are closest to the model's own.
@@ -41,6 +48,7 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel) -> dict[str, 
         config: With the file that it was made from.
         model: Of the robot.
         chosen: What is written.
+        kind: One of :data:`FORMATS`, which the file must be of.
 
     Raises:
         ConfigError: The file is unknown, or no longer the robot of the config, or has no form for
@@ -51,15 +59,21 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel) -> dict[str, 
             "the config names no robot file to write into; one that `paramreduce init ROBOT.urdf` "
             "writes has a source section."
         )
+    file = config.source.file
+    if kind_of(file) != kind:
+        raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
     robot = imported(config.source)
     _check_same(config, config.source, robot)
     standard = closest_standard(model, chosen)
     bodies = _bodies(model.mechanism, standard)
-    _remark(model.mechanism, standard, bodies)
+    _remark(model.mechanism, standard, bodies, kind)
     inertials = {name: _inertial(name, body) for name, body in bodies.items()}
-    content = config.source.file.read_bytes()
-    friction = _friction(model.mechanism, standard)
-    return {config.source.file.name: with_parameters(content, robot, inertials, friction)}
+    drives = _drives(model.mechanism, standard)
+    if kind == "mjcf":
+        content = mjcf.with_parameters(file, robot, inertials, drives)
+    else:
+        content = returning.with_parameters(file.read_bytes(), robot, inertials, drives)
+    return {file.name: content}
 
 
 def _check_same(config: Config, source: SourceSection, robot: SimplifiedRobot) -> None:
@@ -103,27 +117,37 @@ def _inertial(name: str, body: FloatArray) -> Inertial | None:
     return Inertial(mass, com, np.trace(second) * np.eye(3) - second)
 
 
-def _friction(mechanism: Mechanism, standard: FloatArray) -> dict[str, tuple[float, float]]:
-    """Viscous and Coulomb friction by coordinate."""
-    found = {}
-    for drive in mechanism.drives:
-        if drive.name in mechanism.generalised_names:
-            columns = mechanism.drive_columns(drive)
-            viscous, coulomb = (
-                float(standard[columns[kind]]) if kind in columns else 0.0 for kind in _HELD
-            )
-            found[drive.name] = (viscous, coulomb)
-    return found
+def _drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
+    """Values by key of the drives of single coordinates, by coordinate."""
+    return {
+        drive.name: {
+            EFFECTS[kind]: float(standard[column])
+            for kind, column in mechanism.drive_columns(drive).items()
+        }
+        for drive in mechanism.drives
+        if drive.name in mechanism.generalised_names
+    }
 
 
-def _remark(mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray]) -> None:
-    """Warn of bodies that cannot exist, and of what a URDF cannot hold."""
+def _remark(
+    mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray], kind: str
+) -> None:
+    """Warn of bodies that cannot exist, and of what the file cannot hold.
+
+    Raises:
+        ConfigError: Bodies cannot exist, and MuJoCo would refuse them.
+    """
     unphysical = []
     for name, body in bodies.items():
         eigenvalues = np.linalg.eigvalsh(body)
         if eigenvalues[0] < -_NOTHING * max(abs(eigenvalues[-1]), _NOTHING):
             unphysical.append(name)
-    held = {(name, kind) for name in mechanism.generalised_names for kind in _HELD}
+    if unphysical and kind == "mjcf":
+        raise ConfigError(
+            f"MuJoCo takes physical bodies alone, and no distribution of mass has the inertia of "
+            f"{', '.join(unphysical)} in this model; a URDF can hold them."
+        )
+    held = {(name, held) for name in mechanism.generalised_names for held in _HELD[kind]}
     left = [
         f"{parameter.name} = {value:.12g}"
         for parameter, value in zip(mechanism.parameters, standard, strict=True)
@@ -131,7 +155,7 @@ def _remark(mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatA
     ]
     for names, text in (
         (unphysical, "not physical, as no distribution of mass has their inertia"),
-        (left, "left out, as a URDF has no place for it"),
+        (left, f"left out, as {kind.upper()} has no place for it"),
     ):
         if names:
             warnings.warn(f"{text}: {', '.join(names)}", ParamreduceWarning, stacklevel=2)

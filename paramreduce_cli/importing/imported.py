@@ -64,6 +64,10 @@ class Inertial:
         R = frame[:3, :3]
         return Inertial(self.mass, R @ self.com + frame[:3, 3], R @ self.tensor @ R.T)
 
+    def negative(self) -> Inertial:
+        """What takes it off another body, to be added to that."""
+        return Inertial(-self.mass, self.com, -self.tensor)
+
 
 def together(parts: Sequence[Inertial]) -> Inertial:
     """Bodies that are one, in one frame."""

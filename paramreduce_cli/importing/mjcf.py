@@ -6,7 +6,7 @@ actuators and sensors are no part of the robot's dynamics; what else is left out
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,10 +22,19 @@ from paramreduce_cli.importing.imported import (
     JointKind,
     Mimic,
     steps_of,
+    together,
 )
+from paramreduce_cli.importing.simplified import ImportedBody, SimplifiedRobot
 from paramreduce_cli.records import FloatArray
 
 _WORLD = 0
+_DRIVE = {
+    "armature": "inertia",
+    "frictionloss": "coulomb",
+    "damping": "viscous",
+    "stiffness": "stiffness",
+}
+"""Attributes of joints and the keys of drives in configs."""
 _RANK = 1e-8
 """Share of the largest singular value up to which equations follow from others."""
 
@@ -55,6 +64,80 @@ def read_mjcf(path: Path) -> ImportedRobot:
     finally:
         mujoco.set_mju_user_warning(before)
     return replace(robot, remarks=(*robot.remarks, *(f"MuJoCo says: {text}" for text in said)))
+
+
+def with_parameters(
+    path: Path,
+    robot: SimplifiedRobot,
+    inertials: Mapping[str, Inertial | None],
+    drives: Mapping[str, Mapping[str, float]],
+) -> bytes:
+    """An MJCF file with other parameters; everything else stays.
+
+    Bodies that move with another one keep their inertia, which is taken off that one.
+
+    Args:
+        path: The file, which was read before.
+        robot: What was made of it.
+        inertials: Of the bodies by name, in their frames; None for none.
+        drives: Values by the keys of a drive in a config, by coordinate.
+
+    Raises:
+        ConfigError: A body or joint has no name in the file or is in an included one, or inertias
+            are made from geoms whatever is written.
+    """
+    import mujoco
+    from lxml import etree
+
+    model = mujoco.MjModel.from_xml_path(str(path))
+    reader = _Reader(path, mujoco, model)
+    reader.robot()
+    parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    root = etree.fromstring(path.read_bytes(), parser)
+    if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
+        raise ConfigError(f"{path}: makes inertias from geoms alone; take inertiafromgeom out.")
+
+    def element(tag: str, name: str) -> Any:
+        found = [
+            e for part in root.findall("worldbody") for e in part.iter(tag) if e.get("name") == name
+        ]
+        if len(found) != 1:
+            raise ConfigError(
+                f"{path}: the {tag} {name} cannot be written, as it has no name of its own in this file "
+                "or is in an included one."
+            )
+        return found[0]
+
+    for body in robot.bodies:
+        if body.link is not None and not body.massless:
+            own = reader.alone(body, robot, inertials[body.name])
+            _write_inertial(mujoco, element("body", body.link), own)
+        drive = drives.get(body.coordinate or "")
+        if body.limits is not None and drive is not None:
+            joint = element("joint", body.limits.name)
+            for name, key in _DRIVE.items():
+                joint.set(name, repr(drive.get(key, 0.0)))
+    return bytes(etree.tostring(root.getroottree(), encoding="UTF-8")) + b"\n"
+
+
+def _write_inertial(mujoco: Any, body: Any, inertial: Inertial) -> None:
+    sizes, axes = np.linalg.eigh(inertial.tensor)
+    if np.linalg.det(axes) < 0:
+        axes[:, 0] = -axes[:, 0]
+    quaternion = np.zeros(4)
+    mujoco.mju_mat2Quat(quaternion, axes.ravel())
+    old = body.find("inertial")
+    if old is not None:
+        body.remove(old)
+    values = {"pos": inertial.com, "quat": quaternion, "diaginertia": sizes}
+    new = body.makeelement("inertial", {key: _numbers(value) for key, value in values.items()})
+    new.set("mass", repr(float(inertial.mass)))
+    new.tail = body.text
+    body.insert(0, new)
+
+
+def _numbers(values: FloatArray) -> str:
+    return " ".join(repr(float(value)) for value in values)
 
 
 class _Reader:
@@ -298,6 +381,17 @@ class _Reader:
             for k in range(model.nv)
             if k not in dependent
         )
+
+    def alone(self, body: ImportedBody, robot: SimplifiedRobot, whole: Inertial | None) -> Inertial:
+        """What is left of a body's inertia for its own link, in the frame of that in the file."""
+        parts = [whole or Inertial()]
+        for link, carrier in robot.merged.items():
+            inertial = self._links[link]
+            if carrier == body.name and inertial is not None:
+                parts.append(inertial.seen(robot.frames[link]).negative())
+        anchored = np.eye(4)
+        anchored[:3, 3] = self._anchors[self._bodies.index(str(body.link))]
+        return together(parts).seen(anchored)
 
     def _tell(self) -> None:
         """What the file has and the config has not."""

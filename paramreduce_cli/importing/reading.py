@@ -42,8 +42,13 @@ def described(name: str) -> Path | None:
     return None
 
 
+def kind_of(path: Path) -> str:
+    """``mjcf`` where a file's outermost element says so, else ``urdf``."""
+    return "mjcf" if _outermost(path) == "mujoco" else "urdf"
+
+
 def _read(path: Path) -> ImportedRobot:
-    return read_mjcf(path) if _outermost(path) == "mujoco" else read_urdf(path)
+    return read_mjcf(path) if kind_of(path) == "mjcf" else read_urdf(path)
 
 
 def _outermost(path: Path) -> str | None:

@@ -16,7 +16,7 @@ def with_parameters(
     content: bytes,
     robot: SimplifiedRobot,
     inertials: Mapping[str, Inertial | None],
-    friction: Mapping[str, tuple[float, float]],
+    drives: Mapping[str, Mapping[str, float]],
 ) -> bytes:
     """A URDF file with other parameters.
 
@@ -27,7 +27,7 @@ def with_parameters(
         content: The file, which was read before.
         robot: What was made of it.
         inertials: Of the bodies by name, in their frames; None for none.
-        friction: Viscous and Coulomb friction by coordinate, N m s/rad and N m (N s/m and N).
+        drives: Values by the keys of a drive in a config, by coordinate.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     root = etree.fromstring(content, parser)
@@ -39,10 +39,11 @@ def with_parameters(
     for body in robot.bodies:
         if body.link is not None and not body.massless:
             _write_inertial(links[body.link], inertials[body.name])
-        if body.limits is not None and body.coordinate is not None and body.coordinate in friction:
+        drive = drives.get(body.coordinate or "")
+        if body.limits is not None and drive is not None:
             dynamics = _child(joints[body.limits.name], "dynamics")
-            for key, value in zip(("damping", "friction"), friction[body.coordinate], strict=True):
-                dynamics.set(key, _text(value))
+            for name, key in (("damping", "viscous"), ("friction", "coulomb")):
+                dynamics.set(name, _text(drive.get(key, 0.0)))
     tree = root.getroottree()
     encoding = tree.docinfo.encoding or "UTF-8"
     declared = content.lstrip().startswith(b"<?xml")

@@ -98,6 +98,8 @@ class SimplifiedRobot:
     gravity: tuple[float, ...]
     merged: Mapping[str, str]
     """Links that move with a body of another name, by name in the file."""
+    frames: Mapping[str, FloatArray]
+    """Of all links in those of the bodies they move with, (4, 4), by name in the file."""
     remarks: tuple[str, ...]
 
 
@@ -209,6 +211,7 @@ class _Simplification:
             self._independent(filled, couplings),
             self._robot.gravity,
             merged,
+            self._frames,
             tuple(self._remarks),
         )
 

@@ -19,7 +19,8 @@ ALL = "all"
 
 Value = Number | Literal["unknown"]
 
-_EFFECTS = dict(zip(DRIVE, ("inertia", "viscous", "coulomb", "offset", "stiffness"), strict=True))
+EFFECTS = dict(zip(DRIVE, ("inertia", "viscous", "coulomb", "offset", "stiffness"), strict=True))
+"""Keys of what a drive adds, by the kinds of its parameters."""
 
 
 class DriveSection(Section):
@@ -45,12 +46,12 @@ class DriveSection(Section):
     @model_validator(mode="after")
     def _acts(self) -> DriveSection:
         if not self.effects() and "smoothing" not in self.model_fields_set:
-            raise ValueError(f"says nothing; give one of {', '.join(_EFFECTS.values())}")
+            raise ValueError(f"says nothing; give one of {', '.join(EFFECTS.values())}")
         return self
 
     def effects(self) -> dict[Kind, float]:
         """Values of its parameters by kind; zero for those yet to be found."""
-        given = {kind: getattr(self, key) for kind, key in _EFFECTS.items()}
+        given = {kind: getattr(self, key) for kind, key in EFFECTS.items()}
         return {
             kind: 0.0 if value == "unknown" else value
             for kind, value in given.items()
@@ -59,7 +60,7 @@ class DriveSection(Section):
 
     def unknown(self) -> list[str]:
         """Keys of the values that are yet to be found."""
-        return [key for key in _EFFECTS.values() if getattr(self, key) == "unknown"]
+        return [key for key in EFFECTS.values() if getattr(self, key) == "unknown"]
 
     def over(self, other: DriveSection | None) -> DriveSection:
         """The same, with what it leaves out taken from another one."""

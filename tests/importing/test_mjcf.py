@@ -275,3 +275,37 @@ def test_torques_of_robots_are_those_of_mujoco(tmp_path, name):
     expected = mujoco_torques(path, (q[:, order] + model.qpos0, dq[:, order], ddq[:, order]))
     found = own_torques(config, (q, dq, ddq))[:, order]
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
+
+
+def test_parameters_go_back_into_the_file(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    given = (output, "--results", tmp_path / "r")
+    settings = [
+        "parameter_sets.file.fore.m=0.9",
+        "drives.elbow.viscous=0.7",
+        "drives.elbow.inertia=0.05",
+    ]
+    invoke("build-model", *given, settings=settings)
+    chosen = ("--format", "mjcf", "--model", "base", "--output", tmp_path / "out")
+    invoke("export", *given, *chosen, settings=settings)
+    assert "<actuator>" in (tmp_path / "out" / "arm.xml").read_text()
+    again = loaded(tmp_path / "out" / "arm.xml", tmp_path)
+    states = np.random.default_rng(0).uniform(-2, 2, (3, 20, 3))
+    expected = own_torques(load_config(output, settings), states)
+    assert own_torques(again, states) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    old = own_torques(load_config(output), states)
+    assert np.abs(expected - old).max() > 0.1
+
+
+def test_mujoco_takes_physical_bodies_alone(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    given = (output, "--results", tmp_path / "r")
+    settings = ["parameter_sets.file.fore.m=-0.9"]
+    invoke("build-model", *given, settings=settings)
+    model = ("--model", "full")
+    out = invoke("export", *given, "--format", "mjcf", *model, settings=settings, code=2)
+    assert "MuJoCo takes physical bodies alone" in " ".join(out.err.split())
+    out = invoke("export", *given, "--format", "urdf", *model, settings=settings, code=2)
+    assert "is no URDF" in " ".join(out.err.split())

@@ -13,14 +13,12 @@ from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.export.choice import BASE, FULL, chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.robot_file import robot_file
+from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
 from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import Model, Reduction, Validation
 from paramreduce_cli.runner import Runner
-
-URDF = "urdf"
 
 
 @click.command()
@@ -28,8 +26,8 @@ URDF = "urdf"
 @RESULTS
 @SET
 @click.option(
-    "--format", "kind", type=click.Choice([*sorted(languages), URDF]), default="c", show_default=True,
-    help="Language of the code; or urdf: the robot's own file with the model's parameters.",
+    "--format", "kind", type=click.Choice([*sorted(languages), *FORMATS]), default="c", show_default=True,
+    help="Language of the code; or urdf, mjcf: the robot's own file with the model's parameters.",
 )  # fmt: skip
 @click.option(
     "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
@@ -75,8 +73,8 @@ def export(
     )
     stamp = store.stamp(records[-1])
     folder = output or store.folder / "export" / kind
-    if kind == URDF:
-        files = robot_file(loaded, loading[Model], chosen)
+    if kind in FORMATS:
+        files = robot_file(loaded, loading[Model], chosen, kind)
     else:
         files = exported(
             loading[Model],
