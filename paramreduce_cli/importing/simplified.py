@@ -12,6 +12,7 @@ import numpy as np
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.importing.doubts import doubts
 from paramreduce_cli.importing.imported import (
     ImportedJoint,
     ImportedRobot,
@@ -115,7 +116,7 @@ def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
 class _Simplification:
     def __init__(self, robot: ImportedRobot, choice: SourceSection) -> None:
         self._robot, self._choice = robot, choice
-        self._remarks = list(robot.remarks)
+        self._remarks = [*robot.remarks, *doubts(robot.links)]
         self._children: dict[str, list[ImportedJoint]] = {}
         for joint in robot.joints:
             self._children.setdefault(joint.parent, []).append(joint)
