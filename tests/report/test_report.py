@@ -118,3 +118,20 @@ def test_latex_escapes_what_latex_would_trip_over():
     for piece in (r"$\kappa$ \& 5 \%", r"$m_{\mathrm{3}}$", r"a\_b", r"50 \%",
                   r"$\varepsilon_\tau$", r"x\^{}2"):  # fmt: skip
         assert piece in text
+
+
+def test_drives_have_a_table_of_their_own(tmp_path):
+    drives = [
+        "drives.z_upper={viscous: 0.5, coulomb: 1, smoothing: 0.1}",
+        "drives.both={motion: {z_upper: 1, z_fore: -2}, inertia: 0.01, stiffness: 3, rest: 0.2}",
+    ]
+    run_stages(tmp_path, *drives)
+    table = (tmp_path / "report" / "tables" / "drives.csv").read_text()
+    assert table.split("\n")[1:3] == [
+        "z_upper,z_upper,,0.5 N m s/rad,1 N m,,,tanh(v / 0.1),",
+        "both,z_upper - 2 z_fore,0.01 kg m²,,,,3 N m/rad,,0.2",
+    ]
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert "Rotors, friction and springs" in page
+    bodies = (tmp_path / "report" / "tables" / "dynamic-parameters.csv").read_text()
+    assert bodies.split("\n")[0] == "body,m,mx,my,mz,Ixx,Ixy,Ixz,Iyy,Iyz,Izz"

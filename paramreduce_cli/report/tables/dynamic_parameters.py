@@ -1,5 +1,6 @@
-"""The parameters of every body."""
+"""The parameters of every body and payload."""
 
+from paramreduce_cli.records import INERTIAL
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.table import Table
@@ -7,15 +8,12 @@ from paramreduce_cli.report.table import Table
 
 @placed(PageSection.MECHANISM, 3)
 def dynamic_parameters(data: ReportData) -> Table:
-    """The parameters of every body."""
-    parameters = data.model.mechanism.parameters
-    kinds = list(dict.fromkeys(parameter.kind for parameter in parameters))
-    values = {(p.owner, p.kind): v for p, v in zip(parameters, data.model.values, strict=True)}
+    """The parameters of every body and payload."""
+    values = data.model.values
     rows = [
-        (owner, *(f"{values[owner, kind]:g}" if (owner, kind) in values else "" for kind in kinds))
-        for owner in dict.fromkeys(parameter.owner for parameter in parameters)
+        (rigid.name, *(f"{values[rigid.columns[kind]]:g}" for kind in INERTIAL))
+        for rigid in data.model.mechanism.rigid
     ]
-    units = ", ".join(dict.fromkeys(kind.unit for kind in kinds)).replace("^2", "²")
-    return Table(
-        f"Standard parameters ({units})", ("body", *(kind.symbol for kind in kinds)), tuple(rows)
-    )
+    units = ", ".join(dict.fromkeys(kind.unit for kind in INERTIAL)).replace("^2", "²")
+    header = ("body", *(kind.symbol for kind in INERTIAL))
+    return Table(f"Standard parameters ({units})", header, tuple(rows))

@@ -1,0 +1,40 @@
+"""Rotors, friction and springs: along what they act, and their parameters."""
+
+from paramreduce_cli.records import DRIVE, Drive, Kind, Mechanism, Parameter
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.MECHANISM, 4)
+def drives(data: ReportData) -> Table:
+    """Rotors, friction and springs; motions are coordinates with weights."""
+    mechanism = data.model.mechanism
+    rows = []
+    for drive in mechanism.drives:
+        columns = mechanism.drive_columns(drive)
+        cells = [
+            _cell(mechanism.parameters[columns[kind]], data.model.values[columns[kind]])
+            if kind in columns
+            else ""
+            for kind in DRIVE
+        ]
+        sign = _sign(drive) if Kind.COULOMB in columns else ""
+        slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
+        rows.append((drive.name, _motion(mechanism, drive), *cells, sign, slack))
+    header = ("drive", "motion", *(kind.symbol for kind in DRIVE), "sign of speed", "slack at")
+    return Table("Rotors, friction and springs", header, tuple(rows))
+
+
+def _cell(parameter: Parameter, value: float) -> str:
+    return f"{value:g} {parameter.unit}".replace("^2", "²")
+
+
+def _motion(mechanism: Mechanism, drive: Drive) -> str:
+    names = zip(drive.weights.tolist(), mechanism.generalised_names, strict=True)
+    terms = [f"{'' if weight == 1 else f'{weight:g} '}{name}" for weight, name in names if weight]
+    return " + ".join(terms).replace("+ -", "- ")
+
+
+def _sign(drive: Drive) -> str:
+    return f"tanh(v / {drive.smoothing:g})" if drive.smoothing else "sign(v)"
