@@ -12,14 +12,14 @@ from oracles.lagrange import Lagrange, tangent
 from scipy.spatial.transform import Rotation
 
 from paramreduce_cli.lean.checking import check_formulations
-from paramreduce_cli.lean.search import formulations
+from paramreduce_cli.lean.choices import JointFormulation, to_data
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.drives import along
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.records import Drive, Kind, Parameter, Payload
+from paramreduce_cli.records import Drive, Formulations, Kind, Parameter, Payload
 
 EVERYTHING = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
 
@@ -92,9 +92,10 @@ def test_mass_matrix_and_bias_are_those_of_the_same_torques(case):
 
 def test_lean_models_are_the_same(case):
     mechanism, _, states = case
+    same = (to_data(JointFormulation()),) * mechanism.n_q
     everything = np.arange(mechanism.n_parameters)
-    found = formulations(mechanism, np.ones(everything.size, dtype=bool), everything)
-    check_formulations(mechanism, found, everything, states, np.random.default_rng(0))
+    uniform = Formulations((same,), (same,))  # no choice at a joint has to do with drives
+    check_formulations(mechanism, uniform, everything, states, np.random.default_rng(0))
 
 
 def test_plain_recursion_is_the_same():
