@@ -22,9 +22,7 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.models import full_model
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.page import render_page
 from paramreduce_cli.report.skeleton import skeleton
-from paramreduce_cli.report.style import render
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.tracking.demonstration import tracked
@@ -43,6 +41,10 @@ def report(
     provenance: Provenance,
 ) -> Report:
     """Draw the figures, set the tables and write the page and summary.json."""
+    # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
+    from paramreduce_cli.report.page import render_page
+    from paramreduce_cli.report.style import render
+
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), selected.model, reduction.nominal_torque)
