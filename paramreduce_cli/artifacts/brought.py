@@ -102,8 +102,9 @@ def load_recording(path: Path, n_dof: int) -> Recording:
                 f"{path}: {key} has shape {value.shape}, but the robot has {n_dof} joints and there "
                 f"are {rows} rows: it must be {expected}."
             )
-        if not np.isfinite(value).all():
-            bad = int(np.argwhere(~np.isfinite(value))[0, 0])
+        known = np.isfinite(value) | (np.isnan(value) & (key == "tau"))  # some may be unmeasured
+        if not known.all():
+            bad = int(np.argwhere(~known)[0, 0])
             raise DataError(
                 f"{path}: {key} is not a finite number in data row {bad + 1}. Remove such rows."
             )
@@ -149,9 +150,11 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
                 f"{path}, line 1: there is a column {key}{n_dof + 1}, but the robot has {n_dof} joints."
             )
         wanted = [f"{key}{j + 1}" for j in range(n_dof)]
-        if all(name in columns for name in wanted):
-            arrays[key] = np.column_stack([columns[name] for name in wanted])
-        elif key != "tau" or any(name in columns for name in wanted):
+        some = key == "tau" and any(name in columns for name in wanted)
+        if some or all(name in columns for name in wanted):
+            unknown = np.full(len(data), np.nan)
+            arrays[key] = np.column_stack([columns.get(name, unknown) for name in wanted])
+        elif key != "tau":
             missing = [name for name in wanted if name not in columns]
             raise DataError(
                 f"{path}, line 1: the header lacks {', '.join(missing)}. Columns are t, z1 ... "

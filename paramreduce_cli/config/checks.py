@@ -55,6 +55,8 @@ def _payloads_and_drives(config: Config) -> Iterator[Problem]:
 
 
 def _tracking(config: Config) -> Iterator[Problem]:
+    if config.report.tracking is not None and config.unmeasured:
+        yield ("report", "tracking"), "needs the torques of all joints; leave it out"
     if config.report.tracking is not None and config.description.bodies.closed:
         yield (
             ("report", "tracking"),
@@ -141,6 +143,9 @@ def _simulation(config: Config) -> Iterator[Problem]:
         for name in given:
             if name not in names:
                 yield (*path, key, name), unknown("independent coordinate", name, names)
+    for name, (lower, upper) in wanted.start.items():
+        if lower > upper:
+            yield (*path, "start", name), f"the range crosses: {lower:g} is above {upper:g}"
     if wanted.step * _FEWEST_STEPS > wanted.duration:
         yield (*path, "step"), f"{wanted.step:g} s is too long for {wanted.duration:g} s"
     if wanted.duration / wanted.step > _MOST_STEPS:

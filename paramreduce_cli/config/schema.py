@@ -108,6 +108,12 @@ class InputSection(Section):
     reference: Number = 0.0
     """Where the feedback leads, rad (m)."""
 
+    @model_validator(mode="after")
+    def _moves(self) -> InputSection:
+        if bool(self.amplitude) != bool(self.frequencies):
+            raise ValueError("amplitude and frequencies belong together; one of them does nothing")
+        return self
+
 
 class SimulationSection(Section):
     """Samples of simulated motions under inputs, for mechanisms that cannot follow any trajectory; coordinates without an input have no torque."""

@@ -94,6 +94,7 @@ def simulate(
     z, dz = found.y[:n].T, found.y[n:].T
     if not found.success or not np.isfinite(found.y).all():
         raise _lost(float(found.t[-1]) if found.t.size else 0.0)
+    forward.restart()
     tau = np.array([forward.inputs(*sample) for sample in zip(time, z, dz, strict=True)])
     samples = zip(time, z, dz, strict=True)
     ddz = np.array([forward.rates(t, np.concatenate([*some]))[n:] for t, *some in samples])
@@ -118,6 +119,10 @@ class _ForwardDynamics:
         self._near: FloatArray | None = None
         """Where the mechanism was last, to close its loops from."""
 
+    def restart(self) -> None:
+        """Follow the loops from the assembly again, not from where the mechanism was last."""
+        self._near = None
+
     def inputs(self, time: float, z: FloatArray, dz: FloatArray) -> FloatArray:
         """Forces on the independent coordinates, (n_dof,)."""
         pairs = zip(self._inputs, z, dz, strict=True)
@@ -133,5 +138,11 @@ class _ForwardDynamics:
         self._near = q[0]
         dq, _ = self._coordinates.rates(q, dz[None], np.zeros((1, dz.size)))
         M, delta = self._dynamics.direct(q, dq, self._phi)
-        ddz = np.linalg.solve(M[0], self.inputs(time, z, dz) - delta[0])
+        try:
+            ddz = np.linalg.solve(M[0], self.inputs(time, z, dz) - delta[0])
+        except np.linalg.LinAlgError as error:
+            raise DataError(
+                f"the mass matrix is singular at {time:.3g} s, as where a moving body has no mass; "
+                "nothing can be simulated."
+            ) from error
         return np.concatenate([dz, ddz])

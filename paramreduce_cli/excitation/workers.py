@@ -21,6 +21,8 @@ from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing.queues import Queue
 
+import numpy as np
+
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.objective import Excitation
@@ -57,7 +59,10 @@ class ExcitationTask:
 def excitation_of(task: ExcitationTask) -> Excitation:
     """The measurement of a mechanism's base columns; compiles its regressor."""
     mechanism, columns = task.mechanism, task.base.columns
-    smooth = smoothed(mechanism, task.settings.limits.velocity)
+    settings = task.settings
+    # No motion of the series is faster, whatever the limits allow.
+    fastest = settings.limits.reach * 2 * np.pi * settings.harmonics / settings.period
+    smooth = smoothed(mechanism, np.minimum(settings.limits.velocity, fastest))
     coordinates, true = Coordinates(mechanism), Dynamics(mechanism)
     observation = Dynamics(smooth).observation(columns)
 

@@ -84,11 +84,102 @@ _TAKEN = {
 }
 """Names of files and targets that exported code itself uses."""
 
+_C_WORDS = frozenset(
+    [
+        "alignas",
+        "alignof",
+        "and_eq",
+        "asm",
+        "auto",
+        "bitand",
+        "bitor",
+        "bool",
+        "case",
+        "catch",
+        "char",
+        "char8_t",
+        "char16_t",
+        "char32_t",
+        "class",
+        "compl",
+        "concept",
+        "const",
+        "constexpr",
+        "const_cast",
+        "decltype",
+        "default",
+        "delete",
+        "do",
+        "double",
+        "dynamic_cast",
+        "Eigen",
+        "else",
+        "enum",
+        "explicit",
+        "export",
+        "extern",
+        "float",
+        "for",
+        "friend",
+        "goto",
+        "if",
+        "inline",
+        "int",
+        "long",
+        "main",
+        "mutable",
+        "namespace",
+        "new",
+        "noexcept",
+        "not_eq",
+        "nullptr",
+        "operator",
+        "or_eq",
+        "private",
+        "protected",
+        "public",
+        "register",
+        "reinterpret_cast",
+        "requires",
+        "restrict",
+        "return",
+        "short",
+        "signed",
+        "sizeof",
+        "static",
+        "static_assert",
+        "static_cast",
+        "std",
+        "struct",
+        "switch",
+        "template",
+        "this",
+        "thread_local",
+        "throw",
+        "try",
+        "typedef",
+        "typeid",
+        "typename",
+        "union",
+        "unsigned",
+        "using",
+        "virtual",
+        "void",
+        "volatile",
+        "wchar_t",
+        "while",
+        "xor",
+        "xor_eq",
+    ]
+)
+"""Words of C and C++, and names that their programs have already."""
+
 
 def identifier(name: str) -> str:
     """A name that every language takes for an identifier, and that means nothing else there."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    taken = keyword.iskeyword(word) or word in _TAKEN or word in sys.stdlib_module_names
+    words = _TAKEN | _C_WORDS | sys.stdlib_module_names
+    taken = keyword.iskeyword(word) or word in words
     return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"
 
 

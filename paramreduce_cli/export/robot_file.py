@@ -77,13 +77,14 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) ->
 
 
 def _check_same(config: Config, source: SourceSection, robot: SimplifiedRobot) -> None:
-    """Refuse a file whose bodies are no longer those of the config."""
+    """Refuse a file whose bodies and joints are no longer those of the config."""
     tree = config.description.tree
-    own = [] if tree is None else [(b.name, b.parent, transform(b.at)) for b in tree.bodies]
-    files = [(b.name, b.parent, matrix(b.at)) for b in robot.bodies]
-    same = len(own) == len(files) and all(
-        a[:2] == b[:2] and np.allclose(a[2], b[2], rtol=0, atol=_SAME)
-        for a, b in zip(own, files, strict=True)
+    own = [] if tree is None else list(tree.bodies)
+    same = len(own) == len(robot.bodies) and all(
+        (a.name, a.parent, a.joint) == (b.name, b.parent, b.joint)
+        and np.allclose(transform(a.at), matrix(b.at), rtol=0, atol=_SAME)
+        and (b.axis is None or np.allclose(a.motions()[-1][1], b.axis, rtol=0, atol=_SAME))
+        for a, b in zip(own, robot.bodies, strict=True)
     )
     if not same:
         raise ConfigError(
@@ -118,15 +119,25 @@ def _inertial(name: str, body: FloatArray) -> Inertial | None:
 
 
 def _drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
-    """Values by key of the drives of single coordinates, by coordinate."""
-    return {
-        drive.name: {
-            EFFECTS[kind]: float(standard[column])
-            for kind, column in mechanism.drive_columns(drive).items()
-        }
-        for drive in mechanism.drives
-        if drive.name in mechanism.generalised_names
-    }
+    """What acts on the joint of each body, by the keys of a drive in a config.
+
+    Of drives along one coordinate, seen from that: with a weight w, inertia, friction and stiffness of
+    a drive are w^2 times as large there, Coulomb friction w times.
+    """
+    result: dict[str, dict[str, float]] = {}
+    for drive in mechanism.drives:
+        (moved,) = np.nonzero(drive.weights)
+        if moved.size != 1:
+            continue
+        weight = float(drive.weights[moved[0]])
+        found = result.setdefault(mechanism.bodies[moved[0]].name, {})
+        for kind, column in mechanism.drive_columns(drive).items():
+            scale = abs(weight) if kind is Kind.COULOMB else weight**2
+            key = EFFECTS[kind]
+            found[key] = found.get(key, 0.0) + scale * float(standard[column])
+            if kind is Kind.STIFFNESS:
+                found["rest"] = drive.rest / weight
+    return result
 
 
 def _remark(
@@ -147,11 +158,12 @@ def _remark(
             f"MuJoCo takes physical bodies alone, and no distribution of mass has the inertia of "
             f"{', '.join(unphysical)} in this model; a URDF can hold them."
         )
-    held = {(name, held) for name in mechanism.generalised_names for held in _HELD[kind]}
+    single = {drive.name for drive in mechanism.drives if np.count_nonzero(drive.weights) == 1}
     left = [
         f"{parameter.name} = {value:.12g}"
         for parameter, value in zip(mechanism.parameters, standard, strict=True)
-        if parameter.kind in DRIVE and (parameter.owner, parameter.kind) not in held
+        if parameter.kind in DRIVE
+        and not (parameter.owner in single and parameter.kind in _HELD[kind])
     ]
     for names, text in (
         (unphysical, "not physical, as no distribution of mass has their inertia"),

@@ -87,7 +87,11 @@ def export(
         heading=(
             f"{mechanism.robot}: {title}.",
             *([f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []),
-            *_not_predicted(model),
+            *(
+                [f"NOT PREDICTED, as not measured: the torques of {', '.join(model.unmeasured)}."]
+                if model.unmeasured
+                else []
+            ),
             "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
             f"Made by paramreduce {__version__} ({origin}).",
         ),
@@ -104,12 +108,6 @@ def export(
     )
     files: dict[str, bytes] = languages[language](exported)
     return files
-
-
-def _not_predicted(model: Model) -> list[str]:
-    names = model.mechanism.coordinate_names
-    left = [n for n, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)]
-    return [f"NOT PREDICTED, as not measured: the torques of {', '.join(left)}."] if left else []
 
 
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:

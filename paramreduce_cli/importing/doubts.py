@@ -26,7 +26,7 @@ def doubts(links: Mapping[str, Inertial | None]) -> Iterator[str]:
             name for name, one in given.items() if not one.mass and one.tensor.any()
         ],
         "an inertia that no distribution of mass has": [
-            name for name, one in heavy.items() if not _possible(one.tensor)
+            name for name, one in heavy.items() if not possible(one.tensor)
         ],
         "an inertia that may be about the link's origin instead of its centre of mass": [
             name for name, one in heavy.items() if _about_origin(one)
@@ -38,7 +38,7 @@ def doubts(links: Mapping[str, Inertial | None]) -> Iterator[str]:
             yield f"{', '.join(names[:_MOST])}{more}: {what}"
 
 
-def _possible(tensor: FloatArray) -> bool:
+def possible(tensor: FloatArray) -> bool:
     """Whether second moments of mass with this tensor are positive."""
     moments = np.linalg.eigvalsh(np.trace(tensor) / 2 * np.eye(3) - tensor)
     return bool(moments[0] >= -_ROUNDING * max(abs(moments[-1]), np.finfo(float).tiny))
@@ -53,4 +53,4 @@ def _about_origin(inertial: Inertial) -> bool:
     c, m = inertial.com, inertial.mass
     gyration = np.trace(inertial.tensor) / 2 / m
     left = inertial.tensor - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return _possible(inertial.tensor) and _possible(left) and bool(c @ c > _FAR * gyration)
+    return possible(inertial.tensor) and possible(left) and bool(c @ c > _FAR * gyration)

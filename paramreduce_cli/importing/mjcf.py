@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.importing.doubts import possible
 from paramreduce_cli.importing.imported import (
     ImportedClosure,
     ImportedJoint,
@@ -28,6 +29,10 @@ from paramreduce_cli.importing.simplified import ImportedBody, SimplifiedRobot
 from paramreduce_cli.records import FloatArray
 
 _WORLD = 0
+_UNNAMED = "MuJoCo Model"
+"""What MuJoCo calls a model that has no name."""
+_FLAGS = ("EQUALITY", "PASSIVE", "SPRING", "DAMPER", "FRICTIONLOSS")
+"""Parts of the dynamics that a file can switch off."""
 _DRIVE = {
     "armature": "inertia",
     "frictionloss": "coulomb",
@@ -80,7 +85,7 @@ def with_parameters(
         path: The file, which was read before.
         robot: What was made of it.
         inertials: Of the bodies by name, in their frames; None for none.
-        drives: Values by the keys of a drive in a config, by coordinate.
+        drives: Values by the keys of a drive in a config, by body.
 
     Raises:
         ConfigError: A body or joint has no name in the file or is in an included one, or inertias
@@ -94,6 +99,7 @@ def with_parameters(
     reader.robot()
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     root = etree.fromstring(path.read_bytes(), parser)
+    radian = any(c.get("angle") == "radian" for c in root.findall("compiler"))
     if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
         raise ConfigError(f"{path}: makes inertias from geoms alone; take inertiafromgeom out.")
 
@@ -111,12 +117,21 @@ def with_parameters(
     for body in robot.bodies:
         if body.link is not None and not body.massless:
             own = reader.alone(body, robot, inertials[body.name])
+            if own.mass <= 0 or not possible(own.tensor):
+                raise ConfigError(
+                    f"{path}: MuJoCo takes physical bodies alone, and without the links that move with "
+                    f"it {body.link} would have {own.mass:.3g} kg, or an inertia that no body has."
+                )
             _write_inertial(mujoco, element("body", body.link), own)
-        drive = drives.get(body.coordinate or "")
-        if body.limits is not None and drive is not None:
+        if body.limits is not None:
+            drive = drives.get(body.name, {})
             joint = element("joint", body.limits.name)
             for name, key in _DRIVE.items():
                 joint.set(name, repr(drive.get(key, 0.0)))
+            if "stiffness" in drive:
+                slack = drive["rest"] + reader.reference(body.limits.name)
+                turns = body.joint == "revolute" and not radian
+                joint.set("springref", repr(float(np.degrees(slack) if turns else slack)))
     return bytes(etree.tostring(root.getroottree(), encoding="UTF-8")) + b"\n"
 
 
@@ -147,15 +162,25 @@ class _Reader:
         self._massless: set[str] = set()
         self._anchors = np.zeros((model.nbody, 3))
         """Of the last joints, in the bodies' frames."""
-        self._bodies = [self._name("BODY", k, "body") for k in range(model.nbody)]
+        self._bodies = self._names("BODY", model.nbody)
         self._links: dict[str, Inertial | None] = {self._bodies[_WORLD]: None}
-        self._joints = [self._name("JOINT", k, "joint") for k in range(model.njnt)]
+        self._joints = self._names("JOINT", model.njnt)
 
-    def _name(self, kind: str, index: int, default: str) -> str:
-        found = self._mujoco.mj_id2name(
-            self._model, getattr(self._mujoco.mjtObj, f"mjOBJ_{kind}"), index
-        )
-        return str(found) if found else f"{default}_{index}"
+    def _name(self, kind: str, index: int) -> str | None:
+        number = getattr(self._mujoco.mjtObj, f"mjOBJ_{kind}")
+        found = self._mujoco.mj_id2name(self._model, number, index)
+        return str(found) if found else None
+
+    def _names(self, kind: str, count: int) -> list[str]:
+        """Those of the file, and others for what has none there."""
+        given = [self._name(kind, k) for k in range(count)]
+        result = []
+        for k, name in enumerate(given):
+            own = name or f"{kind.lower()}_{k}"
+            while name is None and own in given:
+                own += "_"
+            result.append(own)
+        return result
 
     def robot(self) -> ImportedRobot:
         model = self._model
@@ -168,13 +193,14 @@ class _Reader:
         joints = tuple(_following(joint, followers.get(joint.name)) for joint in joints)
         self._tell()
         name = bytes(model.names).split(b"\0")[0].decode(errors="replace")
+        weightless = model.opt.disableflags & int(self._mujoco.mjtDisableBit.mjDSBL_GRAVITY)
         return ImportedRobot(
-            name or self._path.stem,
+            name if name not in ("", _UNNAMED) else self._path.stem,
             str(self._path),
             self._links,
             joints,
             massless=frozenset(self._massless),
-            gravity=tuple(model.opt.gravity.tolist()),
+            gravity=(0.0, 0.0, 0.0) if weightless else tuple(model.opt.gravity.tolist()),
             closures=closures,
             independent=self._independent() if closures else (),
             remarks=tuple(self._remarks),
@@ -304,12 +330,14 @@ class _Reader:
         followers: dict[str, Mimic] = {}
         closures = []
         for k in range(model.neq):
-            name, kind = self._name("EQUALITY", k, "closure"), kinds(int(model.eq_type[k]))
+            name, kind = self._name("EQUALITY", k) or f"closure_{k}", kinds(int(model.eq_type[k]))
             if not model.eq_active0[k]:
                 self._remarks.append(f"the equality {name} is not active in the file, so left out")
             elif kind == kinds.mjEQ_JOINT:
                 follower, mimic = self._coupling(k, name)
                 followers[follower] = mimic
+            elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and self._leads(k):
+                self._remarks.append(f"the equality {name} leads a body by hand, so it is left out")
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 closures.append(self._closure(k, name, welded=kind == kinds.mjEQ_WELD))
             else:
@@ -320,6 +348,13 @@ class _Reader:
                 )
         self._check_followers(followers)
         return followers, tuple(closures)
+
+    def _leads(self, k: int) -> bool:
+        """Whether an equality ties a body to one that is moved from outside."""
+        model = self._model
+        on_bodies = model.eq_objtype[k] == int(self._mujoco.mjtObj.mjOBJ_BODY)
+        ids = [int(model.eq_obj1id[k]), int(model.eq_obj2id[k])]
+        return bool(on_bodies and any(model.body_mocapid[i] >= 0 for i in ids))
 
     def _coupling(self, k: int, name: str) -> tuple[str, Mimic]:
         model = self._model
@@ -393,6 +428,11 @@ class _Reader:
         anchored[:3, 3] = self._anchors[self._bodies.index(str(body.link))]
         return together(parts).seen(anchored)
 
+    def reference(self, joint: str) -> float:
+        """Where MuJoCo has a joint in the pose of the file, rad or m."""
+        k = self._joints.index(joint)
+        return float(self._model.qpos0[self._model.jnt_qposadr[k]])
+
     def _tell(self) -> None:
         """What the file has and the config has not."""
         model = self._model
@@ -405,6 +445,12 @@ class _Reader:
             "rotors and friction of actuators": _given(model, "actuator_armature")
             or _given(model, "actuator_damping"),
         }
+        bits = self._mujoco.mjtDisableBit
+        flags = (getattr(bits, f"mjDSBL_{flag}", None) for flag in _FLAGS)
+        off = [bit.name.removeprefix("mjDSBL_").lower() for bit in flags
+               if bit is not None and model.opt.disableflags & int(bit)]  # fmt: skip
+        if off:
+            self._remarks.append(f"switched off in the file, and yet taken over: {', '.join(off)}")
         self._remarks += [f"{what} are left out" for what, there in left.items() if there]
 
 

@@ -27,7 +27,7 @@ def with_parameters(
         content: The file, which was read before.
         robot: What was made of it.
         inertials: Of the bodies by name, in their frames; None for none.
-        drives: Values by the keys of a drive in a config, by coordinate.
+        drives: Values by the keys of a drive in a config, by body.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     root = etree.fromstring(content, parser)
@@ -39,9 +39,12 @@ def with_parameters(
     for body in robot.bodies:
         if body.link is not None and not body.massless:
             _write_inertial(links[body.link], inertials[body.name])
-        drive = drives.get(body.coordinate or "")
-        if body.limits is not None and drive is not None:
-            dynamics = _child(joints[body.limits.name], "dynamics")
+        drive = drives.get(body.name, {})
+        if body.limits is None:
+            continue
+        joint = joints[body.limits.name]
+        if drive or joint.find("dynamics") is not None:
+            dynamics = _child(joint, "dynamics")
             for name, key in (("damping", "viscous"), ("friction", "coulomb")):
                 dynamics.set(name, _text(drive.get(key, 0.0)))
     tree = root.getroottree()

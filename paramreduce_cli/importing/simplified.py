@@ -200,6 +200,7 @@ class _Simplification:
             )
         filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
         couplings = () if self._choice.uncoupled else self._couplings(filled)
+        closures = self._closures()
         own = {body.link for body in bodies}
         merged = {link: body for link, body in self._carried.items() if link not in own}
         name = self._names.clean(self._robot.name) or "robot"
@@ -208,8 +209,8 @@ class _Simplification:
             self._robot.source,
             tuple(filled),
             couplings,
-            self._closures(),
-            self._independent(filled, couplings),
+            closures,
+            self._independent(filled, couplings, closures),
             self._robot.gravity,
             merged,
             self._frames,
@@ -235,9 +236,19 @@ class _Simplification:
         return tuple(found)
 
     def _independent(
-        self, bodies: list[ImportedBody], couplings: tuple[Coupling, ...]
+        self,
+        bodies: list[ImportedBody],
+        couplings: tuple[Coupling, ...],
+        closures: tuple[Closure, ...],
     ) -> tuple[str, ...]:
-        if self._robot.closures:
+        choice = self._choice
+        if closures:
+            options = (choice.root, choice.tip, choice.locked, choice.ignored)
+            if any(options) or choice.floating or choice.uncoupled:
+                raise ConfigError(
+                    f"{self._robot.source}: has closed loops, whose independent coordinates no choice may "
+                    "change; import it whole and change the config."
+                )
             moved = {body.source.name: body for body in bodies if body.source is not None}
             return tuple(
                 moved[joint].coordinates()[k]

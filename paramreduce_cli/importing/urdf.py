@@ -54,7 +54,9 @@ class _Reader:
 
         try:
             if not self._path.is_file():
-                raise ConfigError(f"{self._path}: is no file; give the path of a URDF.")
+                raise ConfigError(
+                    f"{self._path}: is no file, nor a robot that an installed robot_descriptions knows; give the path of a URDF or MJCF."
+                )
             if self._path.stat().st_size > _LARGEST:
                 raise ConfigError(f"{self._path}: is larger than 50 MB, which no URDF is.")
             content = self._path.read_bytes()

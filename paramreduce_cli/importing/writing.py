@@ -17,6 +17,7 @@ from paramreduce_cli.importing.simplified import Closure, Coupling, ImportedBody
 
 _NOT_PLAIN = {"y", "n", "yes", "no", "on", "off", "true", "false", "null"}
 _DIRECTIONS = {(1.0, 0.0, 0.0): "x", (0.0, 1.0, 0.0): "y", (0.0, 0.0, 1.0): "z"}
+_CHOSEN = ": chosen where the file gives none"
 _SPEED = {"revolute": 1.5, "prismatic": 0.5, "free": 0.5, "spherical": 1.5}
 """Where a file has no limit of the velocity, rad/s or m/s."""
 _RANGE = {
@@ -57,7 +58,11 @@ def _source(source: SourceSection) -> str:
     given = source.model_dump(mode="json", exclude_defaults=True)
     lines = [f"  {key}: {json.dumps(value)}" for key, value in given.items()]
     return "\n".join(
-        ["source:  # so that `paramreduce export --format urdf` can write it back", *lines, ""]
+        [
+            "source:  # so that `paramreduce export --format urdf` (or mjcf) can write it back",
+            *lines,
+            "",
+        ]
     )
 
 
@@ -198,27 +203,29 @@ def _limits(robot: SimplifiedRobot) -> str:
         else "nominal_torque: standard-deviation   # the file does not give all; or one per joint, N m (N)\n"
     )
 
-    def rows(shown: Callable[[str, ImportedJoint | None], str]) -> str:
+    def rows(
+        shown: Callable[[str, ImportedJoint | None], str], given: Callable[[ImportedJoint], object]
+    ) -> str:
         width = max(len(shown(kind, limits)) for _, kind, limits in coordinates)
         return "".join(
-            f"    - {shown(kind, limits):{width}}   # {name}{_unless_given(limits)}\n"
+            f"    - {shown(kind, limits):{width}}   # {name}"
+            f"{'' if limits is not None and given(limits) else _CHOSEN}\n"
             for name, kind, limits in coordinates
         )
 
     return (
-        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position)}"
-        f"  velocity_limits:              # rad/s or m/s\n{rows(_velocity)}"
+        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position, _ranged)}"
+        f"  velocity_limits:              # rad/s or m/s\n{rows(_velocity, _fast)}"
     )
-
-
-def _unless_given(limits: ImportedJoint | None) -> str:
-    given = limits is not None and limits.velocity and _ranged(limits)
-    return "" if given else ": chosen where the file gives none"
 
 
 def _ranged(limits: ImportedJoint) -> bool:
     lower, upper = limits.lower, limits.upper
     return limits.kind != "continuous" and lower is not None and upper is not None and lower < upper
+
+
+def _fast(limits: ImportedJoint) -> bool:
+    return bool(limits.velocity) and math.isfinite(limits.velocity or 0.0)
 
 
 def _position(kind: str, limits: ImportedJoint | None) -> str:

@@ -52,6 +52,12 @@ class Model:
     formulations: Formulations
 
     @property
+    def unmeasured(self) -> tuple[str, ...]:
+        """Names of the independent coordinates whose torques are not measured."""
+        pairs = zip(self.mechanism.coordinate_names, self.nominal_torque, strict=True)
+        return tuple(name for name, size in pairs if np.isinf(size))
+
+    @property
     def base_values(self) -> FloatArray:
         """Values of the base parameters, in the order of ``base.columns``, (r,)."""
         others = np.setdiff1d(np.arange(self.values.size), self.base.columns)

@@ -38,6 +38,7 @@ def summary_of(
         "model": {
             "n_dof": model.mechanism.n_dof,
             "n_parameters": model.values.size,
+            "unmeasured": list(model.unmeasured),
             "n_affecting": int(model.affecting.sum()),
             "n_base": model.base.columns.size,
             "rank_gap": model.base.rank_gap,

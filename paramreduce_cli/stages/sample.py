@@ -127,6 +127,8 @@ def _recorded(
             "have torques of the model.",
             ("sampling", "torques"),
         )
+    if recording.tau is not None:
+        recording = replace(recording, tau=_measured(model, recording.source, recording.tau))
     return ObservedSet(
         lambda: _recorded_blocks(recording),
         recording.time.size,
@@ -176,6 +178,24 @@ def _motion_blocks(motions: list[SimulatedMotion]) -> Iterator[StateBlock]:
             part = slice(start, start + BLOCK_SAMPLES)
             states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
             yield StateBlock(index, *states, motion.tau[part])
+
+
+def _measured(model: Model, source: str, tau: FloatArray) -> FloatArray:
+    """Recorded torques, zero where none are measured."""
+    wanted = np.isfinite(model.nominal_torque)
+    for j in np.flatnonzero(wanted & np.isnan(tau).any(axis=0)).tolist():
+        lost = np.flatnonzero(np.isnan(tau[:, j]))
+        name = model.mechanism.coordinate_names[j]
+        if lost.size == tau.shape[0]:
+            raise DataError(
+                f"{source}: there is no tau{j + 1}. Add the torques of {name}, or name it under "
+                "unmeasured in the config."
+            )
+        raise DataError(
+            f"{source}: tau{j + 1} is not a finite number in data row {lost[0] + 1}. Remove such rows, "
+            f"or name {name} under unmeasured in the config."
+        )
+    return np.where(wanted, tau, 0.0)
 
 
 def _series_blocks(

@@ -78,10 +78,18 @@ def test_loops_stay_closed(simulated):
 @pytest.mark.parametrize(
     ("settings", "says"),
     [
-        (["inputs={q_1: {amplitude: 1}}"], "'q_1' is not known"),
-        (["inputs={z_fore: {amplitude: 1}}", "step=2"], "is too long for 10 s"),
-        (["inputs={z_fore: {amplitude: 1}}", "step=1e-9"], "more than 1000000 samples"),
-        (["inputs={z_fore: {amplitude: -1}}"], "greater than or equal to 0"),
+        (["inputs={z_fore: {amplitude: 1}}"], "belong together"),
+        (
+            ["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "start={z_upper: [1, -1]}"],
+            "the range crosses",
+        ),
+        (["inputs={q_1: {amplitude: 1, frequencies: [1]}}"], "'q_1' is not known"),
+        (["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "step=2"], "is too long for 10 s"),
+        (
+            ["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "step=1e-9"],
+            "more than 1000000 samples",
+        ),
+        (["inputs={z_fore: {amplitude: -1, frequencies: [1]}}"], "greater than or equal to 0"),
         (
             ["inputs={z_fore: {amplitude: 1e12, frequencies: [1]}}", "duration=0.5"],
             "cannot be followed beyond",
@@ -96,6 +104,16 @@ def test_simulations_that_cannot_be_are_refused(invoke, tmp_path, settings, says
 
 
 def test_a_sign_that_jumps_is_refused(invoke, tmp_path):
-    settings = ["sampling.simulation.inputs={z_fore: {amplitude: 1}}", "drives.all.coulomb=1"]
+    settings = [
+        "sampling.simulation.inputs={z_fore: {amplitude: 1, frequencies: [1]}}",
+        "drives.all.coulomb=1",
+    ]
     out = invoke("run", TWO_LINK, "--results", tmp_path, settings=settings, code=2)
     assert "needs a smoothing" in " ".join(out.err.split())
+
+
+def test_bodies_without_mass_cannot_be_simulated(invoke, tmp_path):
+    settings = ["parameter_sets.nominal.pole={m: 0}", "validation.accept={}"]
+    path = TWO_LINK.parent / "cart_pole.yaml"
+    out = invoke("run", path, "--results", tmp_path, settings=settings, code=2)
+    assert "the mass matrix is singular" in " ".join(out.err.split())

@@ -309,3 +309,54 @@ def test_mujoco_takes_physical_bodies_alone(tmp_path, invoke):
     assert "MuJoCo takes physical bodies alone" in " ".join(out.err.split())
     out = invoke("export", *given, "--format", "urdf", *model, settings=settings, code=2)
     assert "is no URDF" in " ".join(out.err.split())
+
+
+def test_a_spring_goes_back_with_its_rest(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    settings = ["drives.shoulder={stiffness: 7, rest: 0.3}"]
+    given = (output, "--results", tmp_path / "r")
+    invoke("build-model", *given, settings=settings)
+    chosen = ("--format", "mjcf", "--model", "full", "--output", tmp_path / "out")
+    invoke("export", *given, *chosen, settings=settings)
+    again = loaded(tmp_path / "out" / "arm.xml", tmp_path).drives["shoulder"]
+    assert (again.stiffness, again.rest) == pytest.approx((7, 0.3))
+
+
+def test_what_carries_others_must_be_physical_without_them(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    settings = ["parameter_sets.file.fore={m: 0.2}"]  # what is fixed to it weighs 0.27 kg
+    given = (output, "--results", tmp_path / "r")
+    invoke("build-model", *given, settings=settings)
+    chosen = ("--format", "mjcf", "--model", "full")
+    out = invoke("export", *given, *chosen, settings=settings, code=2)
+    assert "without the links that move with it fore would have" in " ".join(out.err.split())
+
+
+def test_bodies_without_a_name_get_one_that_is_free(tmp_path):
+    text = (
+        FIVE_BAR.replace('name="left_rod"', 'name="body_4"')
+        .replace('name="right_rod"', "")
+        .replace("left_rod", "body_4")
+        .replace('body2="right_rod"', 'body2="right"')
+    )
+    config = loaded(written(tmp_path, text), tmp_path)
+    assert "body_4_" in config.description.bodies.body_names()
+
+
+def test_choices_that_would_change_loops_are_refused(tmp_path):
+    path = written(tmp_path, FIVE_BAR)
+    with pytest.raises(ConfigError, match="import it whole"):
+        imported(SourceSection(file=path, locked={"left": 0.1}))
+    opened = imported(SourceSection(file=path, ignored=["right"], uncoupled=True))
+    assert len(opened.independent) == len(opened.bodies)
+
+
+def test_a_model_without_a_name_is_called_after_its_file(tmp_path):
+    text = ARM.replace(' model="an arm"', "").replace(
+        'gravity="0.3 -0.2 -9"/>', 'gravity="0 0 -1"><flag gravity="disable"/></option>'
+    )
+    robot = imported(SourceSection(file=written(tmp_path, text)))
+    assert robot.name == "arm"
+    assert robot.gravity == (0, 0, 0)

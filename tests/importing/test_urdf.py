@@ -372,3 +372,32 @@ def test_a_config_of_no_file_cannot_be_written_back(invoke, tmp_path):
         "export", config, "--results", tmp_path, "--format", "urdf", "--model", "full", code=2
     )
     assert "names no robot file" in " ".join(out.err.split())
+
+
+def test_friction_behind_a_gear_goes_back_as_the_joint_sees_it(tmp_path, invoke):
+    """Also where the coordinate was renamed; what the config has no longer is gone from the file."""
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    text = output.read_text().replace("coordinates: shoulder", "coordinates: q1")
+    drives = "  motor: {motion: {q1: -100}, viscous: 1e-4, coulomb: 4e-3}\n"
+    output.write_text(re.sub(r"  shoulder: {visc.*\n", drives, text))
+    given = (output, "--results", tmp_path / "r")
+    chosen = ("--format", "urdf", "--model", "full", "--output", tmp_path / "out")
+    invoke("build-model", *given)
+    invoke("export", *given, *chosen)
+    again = loaded(tmp_path / "out" / "arm.urdf", tmp_path).drives["shoulder"]
+    assert (again.viscous, again.coulomb) == pytest.approx((1.0, 0.4))
+    output.write_text(re.sub(r"drives:\n(  .*\n)+", "", output.read_text()))
+    invoke("build-model", *given)
+    invoke("export", *given, *chosen)
+    assert not loaded(tmp_path / "out" / "arm.urdf", tmp_path).drives
+
+
+def test_another_axis_is_another_robot(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    output.write_text(output.read_text().replace("axes: -z", "axes: -x"))
+    given = (output, "--results", tmp_path / "r")
+    invoke("build-model", *given)
+    out = invoke("export", *given, "--format", "urdf", "--model", "full", code=2)
+    assert "its bodies are not those of the config" in " ".join(out.err.split())

@@ -43,6 +43,25 @@ def test_fits_and_errors_leave_their_rows_out(invoke, tmp_path, weighting):
     assert "NOT PREDICTED, as not measured: the torques of z_upper" in header
 
 
+@pytest.mark.parametrize("unmeasured", [True, False])
+def test_recordings_may_lack_what_is_not_measured(invoke, tmp_path, unmeasured):
+    names = ["t", "z1", "z2", "dz1", "dz2", "ddz1", "ddz2", "tau2"]
+    rng = np.random.default_rng(0)
+    rows = np.column_stack([np.arange(60) / 10, rng.normal(size=(60, 7))])
+    np.savetxt(tmp_path / "log.csv", rows, delimiter=",", header=",".join(names), comments="")
+    file = tmp_path / "log.csv"
+    files = [f"sampling.estimation_file={file}", f"sampling.validation_file={file}"]
+    given = (TWO_LINK, "--results", tmp_path / "r")
+    if unmeasured:
+        settings = [*files, "unmeasured=[z_upper]", "selected.n=2", "validation.accept={}"]
+        invoke("run", *given, settings=[*settings, ONE_FORMAT])
+        page = (tmp_path / "r" / "report" / "index.html").read_text()
+        assert "Torques of z_upper are not measured" in page
+    else:
+        out = invoke("run", *given, settings=files, code=2)
+        assert "there is no tau1" in " ".join(out.err.split())
+
+
 @pytest.mark.parametrize(
     ("value", "says"),
     [("[z_uper]", "did you mean z_upper"), ("[z_upper, z_fore]", "leaves no torque to explain")],

@@ -17,9 +17,13 @@ from paramreduce_cli.config.template import (
     tree_template,
 )
 from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.fields.numbers import parse_number
 from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.reading import described, imported
 from paramreduce_cli.importing.writing import config_text
+
+_FARTHEST = 1e6
+"""Where a joint may be locked, rad or m."""
 
 
 @click.command()
@@ -110,9 +114,12 @@ def _described(name: str, kind: str, joints: int) -> str:
 def _lock(text: str) -> tuple[str, float]:
     joint, _, value = text.rpartition("=")
     try:
-        return joint, float(value)
+        number = parse_number(value)
     except ValueError as error:
         raise ConfigError(f"--lock {text}: write JOINT=VALUE with a number, rad or m.") from error
+    if abs(number) > _FARTHEST:
+        raise ConfigError(f"--lock {text}: a joint cannot be locked there; write rad or m.")
+    return joint, number
 
 
 def _check(text: str) -> None:
