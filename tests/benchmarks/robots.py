@@ -1,7 +1,8 @@
 """Robots that people have, from their files to code: how small and how fast models of them are.
 
 Run as a module it writes results/robots/robots.md: for each arm the full model, the smallest with a
-torque error of at most 1 % and 0.1 % on both sets, their operations and nanoseconds a state in C.
+torque error of at most 1 % and 0.1 % on both sets, their operations and nanoseconds a state in C, and
+those of Pinocchio's recursion on the same arm.
 """
 
 import os
@@ -9,9 +10,15 @@ import shutil
 import subprocess
 import sys
 import time
+from functools import cache
 from pathlib import Path
 
 import h5py
+import numpy as np
+import pinocchio as pin
+
+from paramreduce_cli.config import load_config
+from tests.benchmarks.lean_code import DEFINITIONS, DYNAMIC, headers
 
 ROOT = Path(__file__).parents[2]
 WHEEL = next(Path(sys.prefix).rglob("share/example-robot-data/robots"), Path())
@@ -73,6 +80,37 @@ def nanoseconds(folder, name, n):
     )
 
 
+@cache
+def peer():
+    """Pinocchio's inverse dynamics as a program, compiled as lean_code.py compiles it."""
+    program = FOLDER / "peer"
+    includes = [f"-I{path}" for path in headers()]
+    defined = [f"-D{one}" for one in DEFINITIONS]
+    source = str(Path(__file__).with_suffix(".cpp"))
+    command = ["g++", "-std=c++17", "-w", "-DNDEBUG", *FLAGS[:2], *defined, *includes, source]
+    subprocess.run([*command, "-o", str(program)], check=True)
+    return program
+
+
+def pinocchio_nanoseconds(config):
+    """Of one evaluation by Pinocchio, the least of many turns; all joints turn about z."""
+    robot = load_config(config)
+    mechanism, phi = robot.mechanism(), robot.parameter_values()
+    lines = [str(mechanism.n_q)]
+    for rigid in mechanism.rigid:
+        body = mechanism.bodies[rigid.body]
+        above = np.eye(4) if body.parent < 0 else mechanism.bodies[body.parent].joint_to_body
+        placed = above @ body.parent_to_joint
+        own = pin.Inertia.FromDynamicParameters(phi[[rigid.columns[kind] for kind in DYNAMIC]])
+        inertia = own.se3Action(pin.SE3(body.joint_to_body)).toDynamicParameters()
+        numbers = [*placed[:3, :3].ravel(), *placed[:3, 3], *inertia]
+        lines.append(f"{body.parent + 1} z {' '.join(repr(float(x)) for x in numbers)}")
+    done = subprocess.run(
+        [peer()], input="\n".join(lines), capture_output=True, text=True, check=True
+    )
+    return float(done.stdout.split()[0])
+
+
 def cells(label, file, options):
     """Rows of the table: what is said of the full model and of each tolerance."""
     config, results = FOLDER / f"{label}.yaml", FOLDER / label
@@ -117,26 +155,29 @@ def cells(label, file, options):
                     for name_ in ("estimation", "validation")
                 )
         rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
-    return minutes, rows
+    return minutes, rows, pinocchio_nanoseconds(config)
 
 
 def main():
     FOLDER.mkdir(parents=True, exist_ok=True)
     lines = [
-        "| robot | model | parameters | ε_τ, estimation / validation | operations of d | ns |",
-        "| --- | --- | --- | --- | --- | --- |",
+        "| robot | model | parameters | ε_τ, estimation / validation | operations of d | ns | Pinocchio, ns |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for label, (file, options) in ROBOTS.items():
         if not file.is_file():
-            lines.append(f"| {label} | its file is not here | | | | |")
+            lines.append(f"| {label} | its file is not here | | | | | |")
             continue
-        minutes, rows = cells(label, file, options)
+        minutes, rows, theirs = cells(label, file, options)
         for tolerance, kept, base, errors, operations, ns in rows:
             what = "full" if tolerance is None else f"≤ {100 * tolerance:g} %"
             first = (
                 f"{label}, {base} base parameters, {minutes:.1f} min" if tolerance is None else ""
             )
-            lines.append(f"| {first} | {what} | {kept} | {errors} | {operations} | {ns:.0f} |")
+            beside = f"{theirs:.0f}" if tolerance is None else ""
+            lines.append(
+                f"| {first} | {what} | {kept} | {errors} | {operations} | {ns:.0f} | {beside} |"
+            )
         print(*lines[-len(rows) :], sep="\n", flush=True)
     (FOLDER / "robots.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
     print(f"Wrote {os.path.relpath(FOLDER / 'robots.md', ROOT)}.")
