@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import Config, SourceSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.importing import mjcf, returning
+from paramreduce_cli.importing import mjcf_writing, urdf_writing
 from paramreduce_cli.importing.imported import Inertial, matrix
 from paramreduce_cli.importing.reading import imported, kind_of
 from paramreduce_cli.importing.simplified import SimplifiedRobot
@@ -70,9 +70,9 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) ->
     inertials = {name: _inertial(name, body) for name, body in bodies.items()}
     drives = _drives(model.mechanism, standard)
     if kind == "mjcf":
-        content = mjcf.with_parameters(file, robot, inertials, drives)
+        content = mjcf_writing.with_parameters(file, robot, inertials, drives)
     else:
-        content = returning.with_parameters(file.read_bytes(), robot, inertials, drives)
+        content = urdf_writing.with_parameters(file.read_bytes(), robot, inertials, drives)
     return {file.name: content}
 
 

@@ -6,7 +6,7 @@ actuators and sensors are no part of the robot's dynamics; what else is left out
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.doubts import possible
 from paramreduce_cli.importing.imported import (
     ImportedClosure,
     ImportedJoint,
@@ -33,13 +32,6 @@ _UNNAMED = "MuJoCo Model"
 """What MuJoCo calls a model that has no name."""
 _FLAGS = ("EQUALITY", "PASSIVE", "SPRING", "DAMPER", "FRICTIONLOSS")
 """Parts of the dynamics that a file can switch off."""
-_DRIVE = {
-    "armature": "inertia",
-    "frictionloss": "coulomb",
-    "damping": "viscous",
-    "stiffness": "stiffness",
-}
-"""Attributes of joints and the keys of drives in configs."""
 _RANK = 1e-8
 """Share of the largest singular value up to which equations follow from others."""
 
@@ -62,7 +54,7 @@ def read_mjcf(path: Path) -> ImportedRobot:
     mujoco.set_mju_user_warning(said.append)  # which it writes to a file otherwise
     try:
         model = mujoco.MjModel.from_xml_path(str(path))
-        robot = _Reader(path, mujoco, model).robot()
+        robot = MjcfReader(path, mujoco, model).robot()
     except (ValueError, mujoco.FatalError) as error:
         text = " ".join(str(error).split()).rstrip(".")
         raise ConfigError(f"{path}: MuJoCo cannot compile it: {text}.") from error
@@ -71,91 +63,15 @@ def read_mjcf(path: Path) -> ImportedRobot:
     return replace(robot, remarks=(*robot.remarks, *(f"MuJoCo says: {text}" for text in said)))
 
 
-def with_parameters(
-    path: Path,
-    robot: SimplifiedRobot,
-    inertials: Mapping[str, Inertial | None],
-    drives: Mapping[str, Mapping[str, float]],
-) -> bytes:
-    """An MJCF file with other parameters; everything else stays.
-
-    Bodies that move with another one keep their inertia, which is taken off that one.
+class MjcfReader:
+    """What a compiled model holds.
 
     Args:
-        path: The file, which was read before.
-        robot: What was made of it.
-        inertials: Of the bodies by name, in their frames; None for none.
-        drives: Values by the keys of a drive in a config, by body.
-
-    Raises:
-        ConfigError: A body or joint has no name in the file or is in an included one, or inertias
-            are made from geoms whatever is written.
+        path: Of the file, for messages.
+        mujoco: The library.
+        model: The compiled model.
     """
-    import mujoco
-    from lxml import etree
 
-    model = mujoco.MjModel.from_xml_path(str(path))
-    reader = _Reader(path, mujoco, model)
-    reader.robot()
-    parser = etree.XMLParser(resolve_entities=False, no_network=True)
-    root = etree.fromstring(path.read_bytes(), parser)
-    radian = any(c.get("angle") == "radian" for c in root.findall("compiler"))
-    if any(c.get("inertiafromgeom") == "true" for c in root.findall("compiler")):
-        raise ConfigError(f"{path}: makes inertias from geoms alone; take inertiafromgeom out.")
-
-    def element(tag: str, name: str) -> Any:
-        found = [
-            e for part in root.findall("worldbody") for e in part.iter(tag) if e.get("name") == name
-        ]
-        if len(found) != 1:
-            raise ConfigError(
-                f"{path}: the {tag} {name} cannot be written, as it has no name of its own in this file "
-                "or is in an included one."
-            )
-        return found[0]
-
-    for body in robot.bodies:
-        if body.link is not None and not body.massless:
-            own = reader.alone(body, robot, inertials[body.name])
-            if own.mass <= 0 or not possible(own.tensor):
-                raise ConfigError(
-                    f"{path}: MuJoCo takes physical bodies alone, and without the links that move with "
-                    f"it {body.link} would have {own.mass:.3g} kg, or an inertia that no body has."
-                )
-            _write_inertial(mujoco, element("body", body.link), own)
-        if body.limits is not None:
-            drive = drives.get(body.name, {})
-            joint = element("joint", body.limits.name)
-            for name, key in _DRIVE.items():
-                joint.set(name, repr(drive.get(key, 0.0)))
-            if "stiffness" in drive:
-                slack = drive["rest"] + reader.reference(body.limits.name)
-                turns = body.joint == "revolute" and not radian
-                joint.set("springref", repr(float(np.degrees(slack) if turns else slack)))
-    return bytes(etree.tostring(root.getroottree(), encoding="UTF-8")) + b"\n"
-
-
-def _write_inertial(mujoco: Any, body: Any, inertial: Inertial) -> None:
-    sizes, axes = np.linalg.eigh(inertial.tensor)
-    if np.linalg.det(axes) < 0:
-        axes[:, 0] = -axes[:, 0]
-    quaternion = np.zeros(4)
-    mujoco.mju_mat2Quat(quaternion, axes.ravel())
-    old = body.find("inertial")
-    if old is not None:
-        body.remove(old)
-    values = {"pos": inertial.com, "quat": quaternion, "diaginertia": sizes}
-    new = body.makeelement("inertial", {key: _numbers(value) for key, value in values.items()})
-    new.set("mass", repr(float(inertial.mass)))
-    new.tail = body.text
-    body.insert(0, new)
-
-
-def _numbers(values: FloatArray) -> str:
-    return " ".join(repr(float(value)) for value in values)
-
-
-class _Reader:
     def __init__(self, path: Path, mujoco: Any, model: Any) -> None:
         self._path, self._mujoco, self._model = path, mujoco, model
         self._remarks: list[str] = []
