@@ -10,7 +10,7 @@ from paramreduce_cli.errors import Key, ParamreduceWarning
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
-from paramreduce_cli.robots.inertia import pseudo_inertia
+from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 
 Problem = tuple[Key, str]
 _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
@@ -309,11 +309,11 @@ def _remark_on_physics(config: Config) -> None:
         if body.m < 0:
             _remark(f"body {name} has the negative mass {body.m:g} kg")
             continue
-        eigenvalues = np.linalg.eigvalsh(pseudo_inertia(body.values()))
-        if eigenvalues[0] < -1e-9 * max(abs(eigenvalues[-1]), 1e-300):
+        moments = pseudo_inertia(body.values())
+        if not physical(moments):
             _remark(
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "
-                f"pseudo-inertia matrix has the eigenvalue {eigenvalues[0]:.3g})"
+                f"pseudo-inertia matrix has the eigenvalue {np.linalg.eigvalsh(moments)[0]:.3g})"
             )
 
 

@@ -75,7 +75,8 @@ trajectories:
   position_limits: [-pi/2, pi/2]     # TODO for all joints, or a list of one pair per joint, rad (m)
   velocity_limits: 1.5               # TODO for all joints, or one per joint, rad/s (m/s)
   # acceleration_limits: 10          # rad/s^2 (m/s^2)
-
+"""
+JUDGEMENT = """\
 selected:
   heuristic: forward-selection
   torque_error: 0.01            # the smallest model with an error of at most 1 %; or n: 18
@@ -84,6 +85,7 @@ validation:
   accept:                       # exit code 1 where these are not met
     torque_error_validation: 0.02
 """
+"""What is selected, and when it is accepted."""
 
 
 def dh_template(name: str, joints: int) -> str:
@@ -109,7 +111,7 @@ def dh_template(name: str, joints: int) -> str:
         "  # Ixx Ixy Ixz Iyy Iyz Izz about the frame's origin.\n"
         "  nominal:\n"
     )
-    return _HEAD.format(name=name) + _DH + rows + parameters + bodies + _TAIL
+    return _HEAD.format(name=name) + _DH + rows + parameters + bodies + _TAIL + "\n" + JUDGEMENT
 
 
 _RECORDED = """
@@ -138,9 +140,9 @@ def recorded_template(name: str, joints: int) -> str:
 
 def tree_template(name: str) -> str:
     """Text of a config for a tree of bodies in frames of one's own choice."""
-    return (_HEAD + _TREE).format(name=name) + _TAIL
+    return (_HEAD + _TREE).format(name=name) + _TAIL + "\n" + JUDGEMENT
 
 
 def loop_template(name: str) -> str:
     """Text of a config for a mechanism with a closed loop."""
-    return (_HEAD + _LOOP).format(name=name) + _TAIL
+    return (_HEAD + _LOOP).format(name=name) + _TAIL + "\n" + JUDGEMENT

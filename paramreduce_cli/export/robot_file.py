@@ -21,7 +21,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import closest_standard
 from paramreduce_cli.robots.drives import EFFECTS
-from paramreduce_cli.robots.inertia import pseudo_inertia
+from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 from paramreduce_cli.robots.placement import transform
 
 _HELD = {
@@ -31,9 +31,6 @@ _HELD = {
 """What of a drive the files have a place for."""
 _SAME = 1e-9
 """By which frames may differ, m or without unit."""
-_NOTHING = 1e-12
-"""Share of the largest eigenvalue below which a body is no worse than round-off."""
-
 
 FORMATS = ("urdf", "mjcf")
 
@@ -63,7 +60,7 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) ->
     if kind_of(file) != kind:
         raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
     robot = imported(config.source)
-    _check_same(config, config.source, robot)
+    _check_same(config, config.source, robot, gravity=kind == "mjcf")
     standard = closest_standard(model, chosen)
     bodies = _bodies(model.mechanism, standard)
     _remark(model.mechanism, standard, bodies, kind)
@@ -76,8 +73,14 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) ->
     return {file.name: content}
 
 
-def _check_same(config: Config, source: SourceSection, robot: SimplifiedRobot) -> None:
-    """Refuse a file whose bodies and joints are no longer those of the config."""
+def _check_same(
+    config: Config, source: SourceSection, robot: SimplifiedRobot, *, gravity: bool
+) -> None:
+    """Refuse a file whose bodies and joints, or gravity, are no longer those of the config."""
+    if gravity and not np.allclose(config.description.gravity, robot.gravity, rtol=0, atol=_SAME):
+        raise ConfigError(
+            f"{source.file}: has another gravity than the config; change one of them."
+        )
     tree = config.description.tree
     own = [] if tree is None else list(tree.bodies)
     same = len(own) == len(robot.bodies) and all(
@@ -148,11 +151,7 @@ def _remark(
     Raises:
         ConfigError: Bodies cannot exist, and MuJoCo would refuse them.
     """
-    unphysical = []
-    for name, body in bodies.items():
-        eigenvalues = np.linalg.eigvalsh(body)
-        if eigenvalues[0] < -_NOTHING * max(abs(eigenvalues[-1]), _NOTHING):
-            unphysical.append(name)
+    unphysical = [name for name, body in bodies.items() if not physical(body)]
     if unphysical and kind == "mjcf":
         raise ConfigError(
             f"MuJoCo takes physical bodies alone, and no distribution of mass has the inertia of "

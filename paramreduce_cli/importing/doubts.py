@@ -6,9 +6,8 @@ import numpy as np
 
 from paramreduce_cli.importing.imported import Inertial
 from paramreduce_cli.records import FloatArray
+from paramreduce_cli.robots.inertia import physical
 
-_ROUNDING = 1e-9
-"""Share of the largest second moment that is no more than the digits of a file."""
 _FAR = 0.5
 """Square of the distance to the centre of mass, in squares of the radius of gyration, from which on it
 matters about which point an inertia is."""
@@ -40,8 +39,7 @@ def doubts(links: Mapping[str, Inertial | None]) -> Iterator[str]:
 
 def possible(tensor: FloatArray) -> bool:
     """Whether second moments of mass with this tensor are positive."""
-    moments = np.linalg.eigvalsh(np.trace(tensor) / 2 * np.eye(3) - tensor)
-    return bool(moments[0] >= -_ROUNDING * max(abs(moments[-1]), np.finfo(float).tiny))
+    return physical(np.trace(tensor) / 2 * np.eye(3) - tensor)
 
 
 def _about_origin(inertial: Inertial) -> bool:

@@ -6,6 +6,7 @@ actuators and sensors are no part of the robot's dynamics; what else is left out
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -43,24 +44,33 @@ def read_mjcf(path: Path) -> ImportedRobot:
         ConfigError: MuJoCo is not installed, the file cannot be read or compiled, or it holds what
             has no rigid-body meaning.
     """
-    try:
-        import mujoco
-    except ImportError as error:
+    if importlib.util.find_spec("mujoco") is None:
         raise ConfigError(
             f"{path}: is an MJCF, which takes MuJoCo to read: `pip install 'paramreduce[mjcf]'`."
-        ) from error
+        )
+    reader = compiled(path)
+    remarks = [*reader.found.remarks, *(f"MuJoCo says: {text}" for text in reader.said)]
+    return replace(reader.found, remarks=tuple(remarks))
+
+
+def compiled(path: Path) -> MjcfReader:
+    """Compile and read a file; MuJoCo, which must be there, writes its warnings nowhere.
+
+    Raises:
+        ConfigError: It cannot be compiled, or holds what has no rigid-body meaning.
+    """
+    import mujoco
+
     said: list[str] = []
     before = mujoco.get_mju_user_warning()
     mujoco.set_mju_user_warning(said.append)  # which it writes to a file otherwise
     try:
-        model = mujoco.MjModel.from_xml_path(str(path))
-        robot = MjcfReader(path, mujoco, model).robot()
+        return MjcfReader(path, mujoco, mujoco.MjModel.from_xml_path(str(path)), said)
     except (ValueError, mujoco.FatalError) as error:
         text = " ".join(str(error).split()).rstrip(".")
         raise ConfigError(f"{path}: MuJoCo cannot compile it: {text}.") from error
     finally:
         mujoco.set_mju_user_warning(before)
-    return replace(robot, remarks=(*robot.remarks, *(f"MuJoCo says: {text}" for text in said)))
 
 
 class MjcfReader:
@@ -70,9 +80,11 @@ class MjcfReader:
         path: Of the file, for messages.
         mujoco: The library.
         model: The compiled model.
+        said: Warnings of MuJoCo.
     """
 
-    def __init__(self, path: Path, mujoco: Any, model: Any) -> None:
+    def __init__(self, path: Path, mujoco: Any, model: Any, said: list[str]) -> None:
+        self.said = said
         self._path, self._mujoco, self._model = path, mujoco, model
         self._remarks: list[str] = []
         self._massless: set[str] = set()
@@ -81,6 +93,7 @@ class MjcfReader:
         self._bodies = self._names("BODY", model.nbody)
         self._links: dict[str, Inertial | None] = {self._bodies[_WORLD]: None}
         self._joints = self._names("JOINT", model.njnt)
+        self.found = self._robot()
 
     def _name(self, kind: str, index: int) -> str | None:
         number = getattr(self._mujoco.mjtObj, f"mjOBJ_{kind}")
@@ -98,7 +111,7 @@ class MjcfReader:
             result.append(own)
         return result
 
-    def robot(self) -> ImportedRobot:
+    def _robot(self) -> ImportedRobot:
         model = self._model
         if model.nflex:
             raise ConfigError(

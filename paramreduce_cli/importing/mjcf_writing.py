@@ -11,7 +11,7 @@ import numpy as np
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.doubts import possible
 from paramreduce_cli.importing.imported import Inertial
-from paramreduce_cli.importing.mjcf import MjcfReader
+from paramreduce_cli.importing.mjcf import compiled
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import FloatArray
 
@@ -47,9 +47,7 @@ def with_parameters(
     import mujoco
     from lxml import etree
 
-    model = mujoco.MjModel.from_xml_path(str(path))
-    reader = MjcfReader(path, mujoco, model)
-    reader.robot()
+    reader = compiled(path)
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     root = etree.fromstring(path.read_bytes(), parser)
     radian = any(c.get("angle") == "radian" for c in root.findall("compiler"))

@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from paramreduce_cli.config.schema import SourceSection
+from paramreduce_cli.config.template import JUDGEMENT
 from paramreduce_cli.importing.angles import angle_text, number_text
 from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
 from paramreduce_cli.importing.simplified import Closure, Coupling, ImportedBody, SimplifiedRobot
@@ -37,7 +38,7 @@ def config_text(robot: SimplifiedRobot, source: SourceSection) -> str:
         source: Where it comes from, the file relative to the folder that the config is for.
     """
     parts = [_head(robot), _source(source), _description(robot), _parameters(robot), _drives(robot)]
-    parts += [_limits(robot), _TAIL]
+    parts += [_limits(robot), JUDGEMENT]
     return "\n".join(parts)
 
 
@@ -257,13 +258,4 @@ trajectories:
   harmonics: 4
   period: 2*pi                  # s
   points: 100                   # samples over a period
-"""
-_TAIL = """\
-selected:
-  heuristic: forward-selection
-  torque_error: 0.01            # the smallest model with an error of at most 1 %; or n: 18
-
-validation:
-  accept:                       # exit code 1 where these are not met
-    torque_error_validation: 0.02
 """

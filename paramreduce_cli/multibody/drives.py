@@ -15,7 +15,7 @@ import numpy as np
 from paramreduce_cli.records import Drive, FloatArray, Kind, Mechanism
 
 
-class Odd(NamedTuple):
+class OddFunctions(NamedTuple):
     """Functions of the scalars in use."""
 
     sign: Callable[[Any], Any]
@@ -26,10 +26,10 @@ _ROUNDED = 0.02
 """Share of the largest speed up to which a sign is rounded off. Trajectories of a six-joint arm with
 friction take a fifth of the time then and have a fifth less kappa, by the true sign, than without."""
 
-CASADI = Odd(ca.sign, ca.tanh)
+CASADI = OddFunctions(ca.sign, ca.tanh)
 
 
-def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: Odd) -> Any:
+def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
     """The force along a drive's motion for a unit value of one of its parameters.
 
     Args:

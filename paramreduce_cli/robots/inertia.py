@@ -69,6 +69,21 @@ class BodyParameters(Section):
         return values
 
 
+_ROUNDING = 1e-9
+"""Share of the largest second moment that is no more than the digits of a file."""
+
+
+def physical(moments: FloatArray) -> bool:
+    """Whether second moments of mass, such as a pseudo-inertia matrix, are positive semidefinite.
+
+    Args:
+        moments: Symmetric, (n, n).
+    """
+    eigenvalues = np.linalg.eigvalsh(moments)
+    largest = max(abs(float(eigenvalues[-1])), float(np.finfo(float).tiny))
+    return bool(eigenvalues[0] >= -_ROUNDING * largest)
+
+
 def pseudo_inertia(values: dict[Kind, float]) -> FloatArray:
     """The pseudo-inertia matrix of a body, (4, 4) [Wensing2018]; some mass distribution has it if it is positive semidefinite.
 

@@ -360,3 +360,33 @@ def test_a_model_without_a_name_is_called_after_its_file(tmp_path):
     robot = imported(SourceSection(file=written(tmp_path, text)))
     assert robot.name == "arm"
     assert robot.gravity == (0, 0, 0)
+
+
+def test_what_mujoco_warns_of_is_told_and_written_nowhere(tmp_path, invoke, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = ARM.replace('angle="degree"', 'angle="degree" settotalmass="5"')
+    path, output = written(tmp_path, text), tmp_path / "arm.yaml"
+    mujoco.set_mju_user_warning(None)
+    try:
+        remarks = imported(SourceSection(file=path)).remarks
+        invoke("init", path, "--output", output)
+        given = (output, "--results", tmp_path / "r")
+        invoke("build-model", *given)
+        invoke("export", *given, "--format", "mjcf", "--model", "full")
+    finally:
+        mujoco.set_mju_user_warning(lambda _: None)
+    assert any(remark.startswith("MuJoCo says:") for remark in remarks) or mujoco.__version__ < "4"
+    assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
+
+
+def test_a_file_of_another_gravity_or_another_kind_of_output_is_refused(tmp_path, invoke):
+    path, output = written(tmp_path, ARM), tmp_path / "arm.yaml"
+    invoke("init", path, "--output", output)
+    given = (output, "--results", tmp_path / "r")
+    settings = ["description.gravity=[0, 0, -1.62]"]
+    invoke("build-model", *given, settings=settings)
+    chosen = ("--format", "mjcf", "--model", "full")
+    out = invoke("export", *given, *chosen, settings=settings, code=2)
+    assert "has another gravity than the config" in " ".join(out.err.split())
+    out = invoke("export", *given, *chosen, "--constants", settings=settings, code=2)
+    assert "are of code, not of mjcf" in " ".join(out.err.split())

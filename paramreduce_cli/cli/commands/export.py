@@ -64,6 +64,8 @@ def export(
     store = Store(results or Path("results") / loaded.robot)
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
+    if kind in FORMATS and (what != Exported.BOTH or constants):
+        raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
     records: list[type] = [Model]
     if text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
