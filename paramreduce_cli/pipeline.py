@@ -12,7 +12,17 @@ from typing import Any
 from paramreduce_cli.artifacts.store import LAYOUTS
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.sections import has_default, is_section
-from paramreduce_cli.records import Coefficients, Recordings, Report, Run, Samples, Trajectories
+from paramreduce_cli.records import (
+    Coefficients,
+    Identification,
+    MeasuredLog,
+    RawLogs,
+    Recordings,
+    Report,
+    Run,
+    Samples,
+    Trajectories,
+)
 from paramreduce_cli.stages import stages
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
@@ -111,11 +121,29 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
             "estimation": config.sampling.estimation_file,
             "validation": config.sampling.validation_file,
         }
+    elif config is not None and kind is RawLogs and config.sampling.log is not None:
+        log = config.sampling.log
+        files = {f"training {k}": path for k, path in enumerate(log.files)}
+        files |= {f"held out {k}": path for k, path in enumerate(log.held_out_files)}
     return {name: path for name, path in files.items() if path is not None}
+
+
+def measured_torques(config: Config) -> bool:
+    """Whether the torques of both sets were measured on a machine."""
+    if config.sampling.log is not None:
+        return True
+    both = len(brought_files(config, Recordings)) == 2
+    return both and config.sampling.torques == "measured"
 
 
 def stages_to_run(config: Config) -> list[Stage]:
     """The stages of a full run: without trajectories where both sets are recordings, or simulated."""
+    logged = config.sampling.log is not None
     simulated = config.sampling.simulation is not None
-    recorded = simulated or len(brought_files(config, Recordings)) == 2
-    return [s for s in pipeline() if not (recorded and s.output is Trajectories)]
+    recorded = logged or simulated or len(brought_files(config, Recordings)) == 2
+    idle = {
+        Trajectories: recorded,
+        MeasuredLog: not logged,
+        Identification: not measured_torques(config),
+    }
+    return [s for s in pipeline() if not idle.get(s.output, False)]

@@ -17,6 +17,7 @@ from typing import Any
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
+from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
@@ -35,6 +36,7 @@ from paramreduce_cli.records import (
     Coefficients,
     Progress,
     Provenance,
+    RawLogs,
     Recording,
     Recordings,
     Report,
@@ -76,6 +78,13 @@ class _Inputs:
         for path in found.values():
             self.digests[str(path)] = file_digest(path)
         return found
+
+
+def _logs(inputs: _Inputs) -> RawLogs:
+    found = {name: load_log(path) for name, path in inputs.files(RawLogs).items()}
+    held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
+    training = tuple(log for name, log in found.items() if name.startswith("training"))
+    return RawLogs(training, held_out)
 
 
 @dataclass
@@ -204,6 +213,8 @@ class Runner:
             return load_coefficients(paths["coefficients"]) if paths else None
         if entry.type is Recordings:
             return self._recordings(inputs)
+        if entry.type is RawLogs:
+            return _logs(inputs)
         return self._artifact(entry, inputs)
 
     def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:

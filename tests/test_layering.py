@@ -18,7 +18,7 @@ LAYERS = [
     {"pipeline"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},
-    {"excitation", "reduction", "lean"},
+    {"excitation", "identification", "reduction", "lean"},
     {"multibody"},
     {"expressions"},
     {"importing"},

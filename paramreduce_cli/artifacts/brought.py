@@ -1,17 +1,13 @@
 """Files that users bring: Fourier coefficients, and recorded states and torques."""
 
-import array
-import csv
-import gzip
 import json
 import math
-import zlib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import check_is_file
+from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import Reader, reading
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import Coefficients, FloatArray, Recording
@@ -138,10 +134,7 @@ def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
 
 
 def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
-    header, data = _table(path)
-    twice = sorted({name for name in header if header.count(name) > 1})
-    if twice:
-        raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
+    header, data = read_csv(path)
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}
     for key in ("z", "dz", "ddz", "tau"):
@@ -164,37 +157,3 @@ def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
         if name in columns:
             arrays["time"] = columns[name]
     return arrays
-
-
-def _table(path: Path) -> tuple[list[str], FloatArray]:
-    """Headings and numbers of a CSV, (n_rows, n_columns); held as numbers from the start."""
-    numbers = array.array("d")
-    check_is_file(path)
-    try:
-        opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="utf-8-sig", newline="") as file:
-            rows = csv.reader(file)
-            header = [name.strip() for name in next(rows, [])]
-            if len(header) == 1 and ";" in header[0]:
-                raise DataError(f"{path}, line 1: columns must be separated by commas, not by ;.")
-            if not header:
-                raise DataError(f"{path}, line 1: the file is empty.")
-            for row in rows:
-                if row and len(row) != len(header):
-                    raise DataError(
-                        f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
-                        "headings."
-                    )
-                numbers.extend(_number(path, rows.line_num, cell) for cell in row)
-    except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
-        raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
-    return header, np.frombuffer(numbers, dtype=float).reshape(-1, len(header))
-
-
-def _number(path: Path, line: int, cell: str) -> float:
-    try:
-        return float(cell)
-    except ValueError as error:
-        raise DataError(f"{path}, line {line}: {cell!r} is not a number.") from error

@@ -107,9 +107,10 @@ def _save_value(writer: Writer, hint: Any, value: Any, path: str) -> None:
     if dataclasses.is_dataclass(value):
         save(writer, value, path)
     elif isinstance(value, Mapping) and dataclasses.is_dataclass(entry):
-        writer.dataset(path, np.array(list(value), dtype=str))
+        names, group = _listed(path)
+        writer.dataset(names, np.array(list(value), dtype=str))
         for name, record in value.items():
-            save(writer, record, name)
+            save(writer, record, _joined(group, name))
     elif isinstance(value, Mapping):
         writer.dataset(f"{path}/names", np.array(list(value), dtype=str))
         writer.dataset(f"{path}/values", np.array(list(value.values()), dtype=float))
@@ -122,6 +123,15 @@ def _save_value(writer: Writer, hint: Any, value: Any, path: str) -> None:
         writer.dataset(path, np.array(value, dtype=str))
     else:
         writer.dataset(path, value)
+
+
+_AT_THE_TOP = "heuristics"
+"""A mapping whose records stand at the top of the file."""
+
+
+def _listed(path: str) -> tuple[str, str]:
+    """Where the names of a mapping of records stand, and the group of these."""
+    return (path, "") if path == _AT_THE_TOP else (f"{path}/names", path)
 
 
 def save_table(writer: Writer, record: type, rows: tuple[Any, ...], path: str) -> None:
@@ -168,7 +178,8 @@ def _load_value(reader: Reader, hint: Any, path: str) -> Any:
         return reader.array(path).astype(dtype_of(hint), copy=False)
     if origin is Mapping and dataclasses.is_dataclass(entry):
         record = typing.cast(type, entry)
-        return {name: load(reader, record, name) for name in reader.texts(path)}
+        names, group = _listed(path)
+        return {name: load(reader, record, _joined(group, name)) for name in reader.texts(names)}
     if origin is Mapping:
         numbers = reader.array(f"{path}/values", 1).tolist()
         return dict(zip(reader.texts(f"{path}/names"), numbers, strict=True))
@@ -205,6 +216,8 @@ def load_table(reader: Reader, record: type, path: str) -> tuple[Any, ...]:
 def _entry(hint: Any) -> Any:
     """What a tuple of any length, or a mapping, holds."""
     origin, arguments = typing.get_origin(hint), typing.get_args(hint)
+    if origin in (typing.Union, types.UnionType):
+        return _entry(next(a for a in arguments if a is not type(None)))
     if origin is Mapping:
         return arguments[1]
     return arguments[0] if origin is tuple else None

@@ -23,7 +23,16 @@ from paramreduce_cli.artifacts.report_files import (
 )
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import Model, Reduction, Report, Samples, Trajectories, Validation
+from paramreduce_cli.records import (
+    Identification,
+    MeasuredLog,
+    Model,
+    Reduction,
+    Report,
+    Samples,
+    Trajectories,
+    Validation,
+)
 
 
 @dataclass(frozen=True)
@@ -42,8 +51,10 @@ LAYOUTS: dict[type, Layout] = {
         for record, file in (
             (Model, "model.h5"),
             (Trajectories, "trajectories.h5"),
+            (MeasuredLog, "log.h5"),
             (Reduction, "reduction.h5"),
             (Validation, "validation.h5"),
+            (Identification, "identification.h5"),
         )
     },
 }
@@ -202,8 +213,12 @@ def file_digest(path: Path) -> str:
     Raises:
         ArtifactError: It cannot be read.
     """
-    check_is_file(path)
+    if not path.is_dir():
+        check_is_file(path)
     try:
+        if path.is_dir():  # a bag
+            parts = {p.name: file_digest(p) for p in sorted(path.iterdir()) if p.is_file()}
+            return hashlib.sha256(repr(parts).encode()).hexdigest()
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError as error:

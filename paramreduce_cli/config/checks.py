@@ -322,7 +322,10 @@ def _remark_on_drives(config: Config) -> None:
     sampling = config.sampling
     missing = {name: drive.unknown() for name, drive in config.each_drive().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
-    if found and (sampling.estimation_file is None or sampling.torques == "model"):
+    measured = sampling.log is not None or (
+        sampling.estimation_file is not None and sampling.torques == "measured"
+    )
+    if found and not measured:
         _remark(f"unknown, and so zero in the torques of the model: {', '.join(found)}")
     for name, drive in config.each_drive().items():
         for kind, value in drive.effects().items():

@@ -233,10 +233,18 @@ def _with_paths(config: Config, folder: Path) -> Config:
         update = {name: folder / path for name, path in found.items() if path is not None}
         return section.model_copy(update=update)
 
+    sampling = resolved(config.sampling, "estimation_file", "validation_file")
+    if sampling.log is not None:
+        files = {
+            key: [folder / path for path in getattr(sampling.log, key)]
+            for key in ("files", "held_out_files")
+        }
+        log = sampling.log.model_copy(update=files)
+        sampling = sampling.model_copy(update={"log": log})
     return config.model_copy(
         update={
             "trajectories": resolved(config.trajectories, "file"),
-            "sampling": resolved(config.sampling, "estimation_file", "validation_file"),
+            "sampling": sampling,
             "source": None if config.source is None else resolved(config.source, "file"),
         }
     )

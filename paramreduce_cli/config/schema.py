@@ -9,6 +9,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from paramreduce_cli.config.constraints import ConstraintSection
+from paramreduce_cli.config.identification import IdentificationSection
+from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.fields.names import OneMethod, OneOf
 from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import (
@@ -147,6 +149,8 @@ class SamplingSection(Section):
     """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
     simulation: SimulationSection | None = None
     """Simulated motions instead of trajectories, for both sets."""
+    log: LogSection | None = None
+    """Logs of the machine instead of trajectories, for both sets."""
     torques: Literal["measured", "model"] = "measured"
     """Of recorded states: measured ones, which the files must hold, or those of the model, whatever they hold."""
     symmetries: list[Annotated[list[str], Field(min_length=1)]] = []
@@ -251,8 +255,8 @@ class ReductionSection(Section):
     """Search for proven subsets."""
     operations: OperationsCriterion = OperationsCriterion()
     """Selection by the cost of evaluating the model."""
-    weighting: Literal["nominal-torque", "none"] = "nominal-torque"
-    """Weight of each joint in fitting and scoring alike."""
+    weighting: Literal["nominal-torque", "noise", "none"] = "nominal-torque"
+    """What each joint's torques are divided by in fitting and scoring alike: nominal torques, the noise that a fit of all parameters leaves (for measured torques), or nothing."""
     groups: list[GroupSection] = []
     """Parameters that are selected or dropped together."""
     stop: Stop = Stop()
@@ -272,9 +276,13 @@ class SelectedSection(Section):
     """Largest acceleration error, a share."""
     operations: Positive | None = None
     """Most operations of the inverse dynamics."""
+    cross_validation: bool = False
+    """Whether the size is chosen by leaving out one part of the estimation set at a time: the smallest model whose error is within one standard error of the best; the validation set is not looked at."""
 
     @model_validator(mode="after")
     def _one(self) -> SelectedSection:
+        if self.cross_validation and (self.n is not None or self.tolerances()):
+            raise ValueError("cross_validation chooses n itself; leave out n and tolerances")
         if self.n is not None and self.tolerances():
             raise ValueError(f"give n or {', '.join(self.tolerances())}, not both")
         return self
@@ -385,5 +393,7 @@ class Config(Robot):
     """The model to judge."""
     validation: ValidationSection = ValidationSection()
     """Judgement."""
+    identification: IdentificationSection = IdentificationSection()
+    """Values from measured torques."""
     report: ReportSection = ReportSection()
     """Report."""

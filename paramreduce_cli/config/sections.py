@@ -7,6 +7,8 @@ stands at the top level itself.
 
 import hashlib
 import json
+import types
+import typing
 from collections.abc import Iterator
 from functools import cache
 from typing import Any
@@ -26,6 +28,8 @@ def _keys() -> dict[type, Key]:
 def _walk(model: type[BaseModel], path: Key) -> Iterator[tuple[type, Key]]:
     for name, field in model.model_fields.items():
         kind = field.annotation
+        if isinstance(kind, types.UnionType):  # a section that may be left out
+            kind = next(iter(typing.get_args(kind)))
         if isinstance(kind, type) and kind.__module__.startswith("paramreduce_cli."):
             yield kind, (*path, name)
             if issubclass(kind, BaseModel):

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 
 from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.judgement.cross_validation import one_standard_error
 from paramreduce_cli.judgement.picking import (
     Pick,
     best_of_size,
@@ -12,7 +13,13 @@ from paramreduce_cli.judgement.picking import (
     proven_necessary,
     smallest_within,
 )
-from paramreduce_cli.records import HeuristicValidation, Model, Reduction, Selected
+from paramreduce_cli.records import (
+    CrossValidation,
+    HeuristicValidation,
+    Model,
+    Reduction,
+    Selected,
+)
 from paramreduce_cli.reduction.models import reduced_model
 from paramreduce_cli.texts import share
 
@@ -24,10 +31,12 @@ def select(
     model: Model,
     reduction: Reduction,
     results: Mapping[str, HeuristicValidation],
+    cross_validation: Mapping[str, CrossValidation] | None,
 ) -> Selected:
     """The model of the size asked for, or the smallest one within the tolerances on both sets.
 
-    Where none keeps to them it is the nearest one, and says so.
+    Where none keeps to them it is the nearest one, and says so. With cross-validation it is the
+    smallest one that the estimation set cannot tell from the best.
 
     Raises:
         ConfigError: There is no model of that size.
@@ -40,7 +49,9 @@ def select(
             )
         results = {wanted.heuristic: results[wanted.heuristic]}
     missed = ""
-    if wanted.n is not None:
+    if cross_validation is not None:
+        heuristic, row, reason = _cross_validated(results, cross_validation)
+    elif wanted.n is not None:
         heuristic, row = _of_size(wanted.n, results)
         reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
     else:
@@ -56,6 +67,25 @@ def select(
             reason = _reason(wanted, tolerances, reduction, heuristic, n)
     chosen = reduced_model(reduction, heuristic, row, model.values)
     return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
+
+
+def _cross_validated(
+    results: Mapping[str, HeuristicValidation], found: Mapping[str, CrossValidation]
+) -> tuple[str, int, str]:
+    """Heuristic, row and reason of what cross-validation chooses."""
+    choice = one_standard_error(found)
+    row = results[choice.heuristic].row(choice.n)
+    assert row is not None  # only sizes of the heuristic itself are judged
+    own = found[choice.heuristic]
+    best = min(found.values(), key=lambda r: float(r.mean.min()))
+    k, least = own.row(choice.n), int(best.mean.argmin())
+    folds = own.torque_error.shape[0]
+    reason = (
+        f"{choice.heuristic} with n = {choice.n}: with each of {folds} parts left out in turn its torque error "
+        f"there is {share(own.mean[k])}, within one standard error ({share(best.standard_error[least])}) of "
+        f"the best, {share(best.mean[least])} with n = {best.n[least]}."
+    )
+    return choice.heuristic, row, reason
 
 
 def _of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:

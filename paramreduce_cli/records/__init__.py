@@ -5,6 +5,18 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 """
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.logs import (
+    Consistency,
+    Estimate,
+    Identification,
+    MeasuredLog,
+    MeasuredMotions,
+    RawLog,
+    RawLogs,
+    Residuals,
+    ShownSignals,
+    Spectra,
+)
 from paramreduce_cli.records.mechanism import (
     BASE,
     JOINT_AXES,
@@ -53,6 +65,7 @@ from paramreduce_cli.records.trajectories import (
 )
 from paramreduce_cli.records.validation import (
     About,
+    CrossValidation,
     DataChange,
     DataVariant,
     HeuristicValidation,

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
 
+import numpy as np
+
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
 from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
 
@@ -90,6 +92,27 @@ class Stability:
     """Of each subset on its own data, (n_variants,)."""
 
 
+@dataclass(frozen=True)
+class CrossValidation(BySize):
+    """Errors of one heuristic's subsets on parts of the data that were left out."""
+
+    torque_error: FloatArray
+    """(n_folds, m)"""
+
+    @property
+    def mean(self) -> FloatArray:
+        """Over the folds, (m,)."""
+        mean: FloatArray = self.torque_error.mean(axis=0)
+        return mean
+
+    @property
+    def standard_error(self) -> FloatArray:
+        """Of the mean, (m,)."""
+        folds = self.torque_error.shape[0]
+        error: FloatArray = self.torque_error.std(axis=0, ddof=1) / np.sqrt(folds)
+        return error
+
+
 class About(StrEnum):
     """What a remark is about."""
 
@@ -120,6 +143,8 @@ class Validation:
     """By growing n."""
     stability: Stability | None
     """Of the selected subset, where it was asked for."""
+    cross_validation: Mapping[str, CrossValidation] | None
+    """By heuristic, where the size was chosen by it."""
     accepted: bool | None
     """None where nothing is judged."""
     verdict: str

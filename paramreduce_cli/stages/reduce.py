@@ -36,6 +36,7 @@ from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
+from paramreduce_cli.reduction.noise import joint_noise
 from paramreduce_cli.reduction.objective import Objective
 from paramreduce_cli.reduction.setup import SIZES, effort, selection_columns, selection_problem
 from paramreduce_cli.reduction.task import SelectionTask
@@ -97,6 +98,9 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
         return np.where(np.isinf(weights), np.inf, 1.0) if weights is not None else np.ones(n_dof)
     if weights is None:
         weights = standard_deviation(block.tau for block in samples.estimation.blocks())
+    if wanted.weighting == "noise":
+        found = samples.estimation
+        weights = joint_noise(found.factors(), weights, found.n_samples)
     small, large = SIZES
     good = (weights > small) & (weights < large) | np.isinf(weights)
     if not good.all():

@@ -12,6 +12,7 @@ from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
+from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -22,7 +23,16 @@ from paramreduce_cli.multibody.observation import (
     standard_deviation,
 )
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.records import FloatArray, Model, Recording, Recordings, Samples, Trajectories
+from paramreduce_cli.records import (
+    FloatArray,
+    MeasuredLog,
+    Model,
+    Recording,
+    Recordings,
+    Samples,
+    SampleSet,
+    Trajectories,
+)
 
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
@@ -32,15 +42,18 @@ def sample(
     sampling: SamplingSection,
     model: Model,
     trajectories: Trajectories | None,
+    log: MeasuredLog | None,
     recordings: Recordings,
 ) -> Samples:
     """Sample both sets: states, torques and observation matrices.
 
-    From the optimised trajectories, or from recorded states where the config names them.
+    From the optimised trajectories, or from a log or recorded states where the config names them.
     """
     dynamics = Dynamics(model.mechanism)
 
-    def observed(name: str, recording: Recording | None, points: int | None) -> ObservedSet:
+    def observed(name: str, recording: Recording | None, points: int | None) -> SampleSet:
+        if sampling.log is not None:
+            return _logged(model, dynamics, log, name)
         if sampling.simulation is not None:
             return _simulated(sampling.simulation, model, dynamics, name)
         if recording is not None:
@@ -138,6 +151,21 @@ def _recorded(
     )
 
 
+def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str) -> LoggedSet:
+    if log is None:
+        raise DataError("there is no log.h5; make it with `paramreduce process-log`.")
+    motions = log.training if name == "estimation" else log.held_out
+    tau = _measured(model, "the log", motions.tau)
+    found = LoggedSet(replace(motions, tau=tau), log, dynamics, f"{name} set")
+    if found.n_samples == 0:
+        raise ConfigError(
+            f"leaves no sample for the {name} set: at {log.torque_cutoff:.3g} Hz the low-pass is longer than "
+            "the motion. Raise it, or bring a longer log.",
+            ("sampling", "log", "torque_cutoff"),
+        )
+    return found
+
+
 def _simulated(
     wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str
 ) -> ObservedSet:
@@ -231,7 +259,7 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
         )
 
 
-def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
+def _nominal_torque(model: Model, estimation: SampleSet) -> FloatArray:
     if model.nominal_torque_given:
         return model.nominal_torque
     deviation = standard_deviation(block.tau for block in estimation.blocks())
@@ -240,12 +268,13 @@ def _nominal_torque(model: Model, estimation: ObservedSet) -> FloatArray:
 
 
 def _nominal_acceleration(
-    sampling: SamplingSection, model: Model, estimation: ObservedSet
+    sampling: SamplingSection, model: Model, estimation: SampleSet
 ) -> FloatArray:
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
         return per_joint(given, model.mechanism.n_dof)
-    deviation = standard_deviation(block.ddz for block in estimation.states())
+    states = estimation.states() if isinstance(estimation, ObservedSet) else estimation.blocks()
+    deviation = standard_deviation(block.ddz for block in states)
     return _scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
 
 

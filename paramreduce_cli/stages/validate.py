@@ -1,12 +1,14 @@
 """validate: what every reduced model is worth, and whether the selected one is accepted."""
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, SelectedSection, ValidationSection
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
+from paramreduce_cli.judgement.cross_validation import cross_validated
 from paramreduce_cli.judgement.picking import pareto_front
 from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
@@ -17,6 +19,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.records import (
     CountedDynamics,
+    CrossValidation,
     DataChange,
     DataVariant,
     FloatArray,
@@ -46,6 +49,8 @@ _MEASURED_ON = frozenset(
 """What measurements and stability depend on."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
+_FOLD_NODES = 5_000
+"""Of each proof while folds are left out."""
 _NODES = 50_000
 """Of each proof while stability is looked at; the best found is good enough there."""
 
@@ -70,7 +75,11 @@ def validate(
     known = previous if run.unchanged >= _MEASURED_ON else None
     measured = known or _measured(model, samples, reduction, counted)
     heuristics, full = measured.heuristics, measured.full
-    selected = select(wanted, model, reduction, heuristics)
+    crossed = None
+    if wanted.cross_validation:
+        crossed = known.cross_validation if known else None
+        crossed = crossed or _cross_validation(search, wanted, model, samples, reduction, run)
+    selected = select(wanted, model, reduction, heuristics, crossed)
     chosen = (selected.heuristic, selected.n)
     if not judging.stability:
         repeated = None
@@ -86,6 +95,7 @@ def validate(
         selected=selected,
         pareto=pareto_front(heuristics),
         stability=repeated,
+        cross_validation=crossed,
         accepted=accepted,
         verdict=sentence,
         remarks=tuple(remarks(judging, heuristics, full, selected)),
@@ -205,6 +215,54 @@ def _full_model(
         min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])
     )
     return result
+
+
+def _cross_validation(
+    search: ReductionSection,
+    wanted: SelectedSection,
+    model: Model,
+    samples: Samples,
+    reduction: Reduction,
+    run: Run,
+) -> dict[str, CrossValidation]:
+    """Errors with each trajectory left out, of the heuristics that select by torque."""
+    factors = samples.estimation.factors()
+    if len(factors) < 2:
+        raise ConfigError(
+            "needs at least two trajectories, or folds of a log, to leave one out.",
+            ("selected", "cross_validation"),
+        )
+    grouped = selection_columns(search, samples)
+    weights = reduction.nominal_torque
+
+    def factor(part: FloatArray) -> FloatArray:
+        return merged_factor(combined_factor(part, weights), grouped.columns)
+
+    folds = [
+        (factor(np.delete(factors, k, axis=0)), factor(factors[k : k + 1]))
+        for k in range(len(factors))
+    ]
+    problem = selection_problem(reduction.factor, model, grouped)
+    quick = dataclasses.replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
+    methods = {name: SelectionMethod.parse(name) for name in reduction.heuristics}
+    if wanted.heuristic is not None:
+        methods = {name: m for name, m in methods.items() if name == wanted.heuristic}
+    found = {}
+    for name, method in methods.items():
+        if not method.by_torque:
+            continue
+
+        def select(other: SelectionProblem, heuristic: str = method.heuristic) -> Sequence[IntArray]:
+            task = SelectionTask(TorqueObjective(other), reduction.rank, effort=quick)
+            sizes = set(reduction.heuristics[heuristic].n.tolist())
+            return [s for s in run_heuristic(heuristic, task).subsets if s.size in sizes]
+
+        found[name] = cross_validated(problem, folds, select)
+    if not found:
+        raise ConfigError(
+            "needs a heuristic that selects by torque.", ("selected", "cross_validation")
+        )
+    return found
 
 
 def _stability(

@@ -1,0 +1,14 @@
+"""What a config says of values that are to be found from measured torques."""
+
+from typing import Literal
+
+from paramreduce_cli.fields.section import Section
+
+
+class IdentificationSection(Section):
+    """How values are found from measured torques."""
+
+    estimator: Literal["ordinary", "weighted", "robust"] = "weighted"
+    """Least squares: plain; each joint weighted by the noise of its residuals; or besides with less weight for outliers (Huber)."""
+    consistency: Literal["euclidean", "entropic", "none"] = "euclidean"
+    """Whether standard parameters that a machine can have are sought besides, and how their distance from the known ones is measured."""

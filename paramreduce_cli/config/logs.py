@@ -1,0 +1,131 @@
+"""What a config says of the logs of a machine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from pydantic import BeforeValidator, Field, model_validator
+
+from paramreduce_cli.fields.numbers import Number, Whole
+from paramreduce_cli.fields.section import PerJoint, Positive, Section
+from paramreduce_cli.records import FloatArray
+
+NUMBER = "{}"
+"""Stands for the number of the joint in names of columns."""
+
+Names = str | list[str]
+"""One name with ``{}`` for the joint's number, or a name for every joint."""
+Frequency = Positive | Literal["auto", "none"]
+Files = Annotated[
+    list[Path],
+    BeforeValidator(lambda value: value if isinstance(value, list) else [value]),
+    Field(min_length=1),
+]
+
+ANGLES = {"rad": 1.0, "deg": np.pi / 180, "rev": 2 * np.pi, "m": 1.0, "mm": 1e-3}
+SPEEDS = {"rad/s": 1.0, "deg/s": np.pi / 180, "rpm": 2 * np.pi / 60, "m/s": 1.0, "mm/s": 1e-3}
+ACCELERATIONS = {"rad/s^2": 1.0, "deg/s^2": np.pi / 180, "m/s^2": 1.0, "mm/s^2": 1e-3}
+TORQUES = {"N m": 1.0, "mN m": 1e-3, "kN m": 1e3, "N": 1.0, "A": 1.0, "mA": 1e-3}
+TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+
+
+class ColumnsSection(Section):
+    """Names of columns, datasets or topics in a log, `{}` standing for the joint's number, or one name for each joint."""
+
+    time: str = "t"
+    """Time."""
+    position: Names = "q{}"
+    """Positions."""
+    velocity: Names | None = None
+    """Speeds; made of the positions if left out."""
+    acceleration: Names | None = None
+    """Accelerations; made of the speeds if left out."""
+    torque: Names = "tau{}"
+    """Torques, or currents where torque_constants are given."""
+
+
+class UnitsSection(Section):
+    """Units of the columns of a log."""
+
+    time: Literal["s", "ms", "us", "ns"] = "s"
+    """Of time."""
+    position: Literal["rad", "deg", "rev", "m", "mm"] = "rad"
+    """Of positions."""
+    velocity: Literal["rad/s", "deg/s", "rpm", "m/s", "mm/s"] = "rad/s"
+    """Of speeds."""
+    acceleration: Literal["rad/s^2", "deg/s^2", "m/s^2", "mm/s^2"] = "rad/s^2"
+    """Of accelerations."""
+    torque: Literal["N m", "mN m", "kN m", "N", "A", "mA"] = "N m"
+    """Of torques or currents."""
+
+
+class LogSection(Section):
+    """Logs of the machine itself, as they were recorded: they are made ready and split into a part to learn from and a part held out."""
+
+    files: Files
+    """CSV (also .gz), HDF5, NPZ, or ROS 2 bags; relative to this file. If held_out_files are given all of them are learned from."""
+    held_out: Annotated[Number, Field(ge=0.05, le=0.9)] = 0.4
+    """Share of every file, at its end, that is held out."""
+    held_out_files: list[Path] = []
+    """Files that are held out, instead of a share of each."""
+    columns: ColumnsSection = ColumnsSection()
+    """What is where in a file."""
+    units: UnitsSection = UnitsSection()
+    """Of the columns."""
+    transmission: list[PerJoint] | PerJoint | None = None
+    """Motor over joint: one number per joint, or a matrix N of them (motor position = N joint position); recorded positions and torques are then the motors'."""
+    torque_constants: PerJoint | None = None
+    """N m (N) per recorded unit, where currents were recorded; before the transmission."""
+    signs: PerJoint = [1.0]
+    """1 or -1 for joints (or motors) that were counted the other way, in motion and torque alike."""
+    torque_signs: PerJoint = [1.0]
+    """The same for torques alone."""
+    offsets: PerJoint = [0.0]
+    """Added to the joint positions, rad (m)."""
+    delay: Number = 0.0
+    """By which torques were recorded later than positions, s."""
+    trim: Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=2, max_length=2)] = [0, 0]
+    """Seconds that are cut off at the start and at the end."""
+    standstill: Literal["cut", "keep"] = "cut"
+    """What becomes of the time before the first joint moves and after the last one stops."""
+    outliers: Literal["replace", "keep"] = "replace"
+    """What becomes of single torques and positions far from their neighbours; interpolated, or left."""
+    state_cutoff: Frequency = "auto"
+    """Of the zero-phase low-pass on positions and speeds, Hz; auto takes it from the spectrum."""
+    torque_cutoff: Frequency = "auto"
+    """Of the zero-phase low-pass that torques and observation matrix share, Hz; auto is the frequency up to which there is motion, none leaves torques as recorded."""
+    rate: Positive | None = None
+    """Samples per second that are used; if left out ten per period of the torque cut-off, or as recorded."""
+    folds: Annotated[Whole, Field(ge=2, le=100)] = 5
+    """Parts in time of what is learned from, one of which at a time is left out in cross-validation."""
+
+    @model_validator(mode="after")
+    def _signs(self) -> LogSection:
+        for name in ("signs", "torque_signs"):
+            if any(abs(value) != 1 for value in getattr(self, name)):
+                raise ValueError(f"{name} are 1 or -1")
+        return self
+
+    def motor_per_joint(self, n_dof: int) -> FloatArray | None:
+        """Motor positions per joint position, (n_dof, n_dof); None where joints were recorded.
+
+        Raises:
+            ValueError: Its shape does not fit, or it has no inverse.
+        """
+        if self.transmission is None:
+            return None
+        rows = self.transmission
+        matrix = np.array(rows, dtype=float)
+        if matrix.ndim == 2 and 1 in matrix.shape and n_dof > 1:
+            matrix = matrix.ravel()
+        if matrix.ndim == 1:
+            if matrix.size not in (1, n_dof):
+                raise ValueError(f"{matrix.size} ratios for {n_dof} joints")
+            matrix = np.diag(np.broadcast_to(matrix, n_dof))
+        if matrix.shape != (n_dof, n_dof):
+            raise ValueError(f"is {matrix.shape[0]} x {matrix.shape[1]} for {n_dof} joints")
+        if np.linalg.cond(matrix) > 1e9:
+            raise ValueError("has no inverse")
+        return matrix

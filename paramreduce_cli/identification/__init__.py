@@ -1,0 +1,1 @@
+"""From logs of a machine to samples, and from samples to values, how sure they are, and what looks wrong."""

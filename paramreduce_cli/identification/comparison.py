@@ -1,0 +1,28 @@
+"""How a reduced model stands against that of all base parameters, on data that neither has seen."""
+
+import numpy as np
+
+from paramreduce_cli.records import Estimate
+from paramreduce_cli.texts import share
+
+_SURE = 2.0
+"""Standard errors of the mean difference over folds that tell two models apart."""
+
+
+def compared(full: Estimate, reduced: Estimate) -> str:
+    """One sentence on held-out data, one on the parts left out in turn."""
+    better = reduced.held_out < full.held_out
+    n, m = len(reduced.names), len(full.names)
+    text = (
+        f"Held out, {n} parameters have an error of {share(reduced.held_out)}, all {m} "
+        f"{share(full.held_out)}: the reduced model {'beats the full one' if better else 'is worse'}."
+    )
+    if full.folds.size < 2 or full.folds.size != reduced.folds.size:
+        return text
+    difference = reduced.folds - full.folds
+    mean = float(difference.mean())
+    error = float(difference.std(ddof=1) / np.sqrt(difference.size))
+    apart = f"{100 * mean:+.2g} ± {100 * error:.2g} % over {difference.size} parts left out in turn"
+    if abs(mean) <= _SURE * error:
+        return f"{text} The training data cannot tell them apart ({apart})."
+    return f"{text} The training data agree that it is {'better' if mean < 0 else 'worse'} ({apart})."

@@ -1,0 +1,187 @@
+"""Standard parameters that a machine can have, from torques that tell only base parameters.
+
+A rigid body exists where its pseudo-inertia matrix is positive definite [Wen2018], a linear matrix
+inequality; friction, rotor inertia and stiffness are positive. Among what the torques leave open
+those nearest to the known parameters are taken.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, IntArray, Kind, Mechanism
+from paramreduce_cli.robots.inertia import pseudo_inertia
+
+_MARGIN = 1e-6
+"""Smallest eigenvalue of a pseudo-inertia matrix in units of the body's size."""
+_UNKNOWN_MASS = 1.0
+"""kg, where nothing is known."""
+_UNKNOWN_RADIUS = 0.1
+"""m, likewise."""
+_FREE = 1e6
+"""Deviation of parameters of which nothing is known beforehand, times their own unit."""
+
+
+@dataclass(frozen=True)
+class Physical:
+    """Which parameters make bodies and what must be positive.
+
+    Attributes:
+        names: Of bodies and payloads.
+        columns: Of each, its parameters in the order of ``INERTIAL``, (n_bodies, 10).
+        positive: Parameters that must not be negative.
+        sizes: How far each parameter may be from what is known, (n_parameters,): as much as it is
+            for a body of its mass and size.
+        known: (n_parameters,)
+    """
+
+    names: tuple[str, ...]
+    columns: IntArray
+    positive: IntArray
+    sizes: FloatArray
+    known: FloatArray
+
+
+def physical_parameters(mechanism: Mechanism, known: FloatArray) -> Physical:
+    """What of a mechanism's parameters must be physical.
+
+    Args:
+        mechanism: The robot.
+        known: Values that are known beforehand, zero where nothing is, (n_parameters,).
+    """
+    columns = np.array([[r.columns[kind] for kind in INERTIAL] for r in mechanism.rigid])
+    names = tuple(mechanism.parameters[row[0]].owner for row in columns)
+    drives = {k: p.kind for k, p in enumerate(mechanism.parameters) if p.kind in DRIVE}
+    positive = [k for k, kind in drives.items() if kind is not Kind.OFFSET]
+    sizes = np.full(known.size, _FREE)
+    for row in columns:
+        sizes[row] = _body_sizes(known[row])
+    return Physical(names, columns, np.array(positive, dtype=np.int64), sizes, known)
+
+
+def _body_sizes(values: FloatArray) -> FloatArray:
+    mass = abs(float(values[0])) or _UNKNOWN_MASS
+    squared = abs(float(values[[4, 7, 9]].sum())) / (2 * mass)
+    radius = np.sqrt(squared) if squared > 0 else _UNKNOWN_RADIUS
+    return mass * np.array([1.0, *[radius] * 3, *[radius**2] * 6])
+
+
+def pseudo_inertias(physical: Physical, values: FloatArray) -> FloatArray:
+    """Of every body, (n_bodies, 4, 4)."""
+    return np.array([_matrix(values[row]) for row in physical.columns])
+
+
+def _matrix(values: FloatArray) -> FloatArray:
+    return pseudo_inertia(dict(zip(INERTIAL, values.tolist(), strict=True)))
+
+
+def smallest_eigenvalues(physical: Physical, values: FloatArray) -> FloatArray:
+    """Of every body's pseudo-inertia matrix, (n_bodies,)."""
+    found: FloatArray = np.linalg.eigvalsh(pseudo_inertias(physical, values))[:, 0]
+    return found
+
+
+def unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
+    """The parameters nearest to the known ones that fit, whether they can be or not, (n_parameters,).
+
+    Args:
+        factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
+        physical: What is known.
+    """
+    A, b = _stacked(factor, physical)
+    solution = np.linalg.lstsq(A, b, rcond=None)[0]
+    found: FloatArray = physical.known + physical.sizes * solution
+    return found
+
+
+def _stacked(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
+    """Rows of the data and of what is known, in units of the sizes from the known values."""
+    W, tau = factor[:, :-1], factor[:, -1]
+    n = physical.known.size
+    A = np.vstack([W * physical.sizes, np.eye(n)])
+    return A, np.concatenate([tau - W @ physical.known, np.zeros(n)])
+
+
+def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatArray:
+    """The parameters nearest to the data and the known ones that a machine can have, (n_parameters,).
+
+    Args:
+        factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
+        physical: What is known and what must hold.
+        distance: To the known bodies: `euclidean` in units of their size, or `entropic`, the
+            divergence of their mass distributions [Lee2020].
+
+    Raises:
+        DataError: The solver finds no solution, or entropic distances are asked to bodies that are not
+            physical.
+        ImportError: cvxpy is not installed.
+    """
+    import cvxpy as cp  # late: an extra, and slow to load
+
+    x = cp.Variable(physical.known.size)
+    data, rest = _data_rows(factor, physical)
+    bodies, constraints = _bodies(cp, physical, x)
+    if physical.positive.size:
+        k = physical.positive
+        constraints.append(physical.known[k] / physical.sizes[k] + x[k] >= 0)
+    cost = cp.sum_squares(data @ x - rest)
+    if distance == "entropic":
+        cost += _divergence(cp, physical, bodies)
+    else:
+        cost += cp.sum_squares(x)
+    problem = cp.Problem(cp.Minimize(cost), constraints)
+    try:
+        problem.solve(solver=cp.CLARABEL)
+    except cp.SolverError as error:
+        raise DataError(f"no physically consistent parameters were found ({error}).") from error
+    if x.value is None:
+        raise DataError(f"no physically consistent parameters were found ({problem.status}).")
+    found = physical.known + physical.sizes * x.value
+    found[physical.positive] = np.maximum(found[physical.positive], 0.0)
+    result: FloatArray = found
+    return result
+
+
+def _data_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
+    W, tau = factor[:, :-1], factor[:, -1]
+    return W * physical.sizes, tau - W @ physical.known
+
+
+def _scale(physical: Physical, body: int) -> FloatArray:
+    """Units of a body's pseudo-inertia matrix, so that that of a body of its size is near the identity."""
+    mass, second = physical.sizes[physical.columns[body]][[0, 4]]
+    return np.diag([1 / np.sqrt(second)] * 3 + [1 / np.sqrt(mass)])
+
+
+def _bodies(cp: Any, physical: Physical, x: Any) -> tuple[list[Any], list[Any]]:
+    """Scaled pseudo-inertia matrices as expressions, and that they are positive definite."""
+    found, constraints = [], []
+    basis = [_matrix(unit) for unit in np.eye(len(INERTIAL))]
+    for body, row in enumerate(physical.columns):
+        S = _scale(physical, body)
+        whole = S @ _matrix(physical.known[row]) @ S
+        terms = [
+            (S @ E @ S * physical.sizes[column]) * x[int(column)]
+            for E, column in zip(basis, row, strict=True)
+        ]
+        matrix = sum(terms, start=cp.Constant(whole))
+        found.append(matrix)
+        constraints.append(matrix - _MARGIN * np.eye(4) >> 0)
+    return found, constraints
+
+
+def _divergence(cp: Any, physical: Physical, bodies: Sequence[Any]) -> Any:
+    cost = 0
+    for body, (name, row) in enumerate(zip(physical.names, physical.columns, strict=True)):
+        S = _scale(physical, body)
+        known = S @ _matrix(physical.known[row]) @ S
+        if np.linalg.eigvalsh(known)[0] <= _MARGIN:
+            raise DataError(
+                f"the known inertia of {name} is not that of any body, so nothing has an entropic distance "
+                "to it. Give physical parameters, or ask for the euclidean distance."
+            )
+        cost += cp.trace(np.linalg.inv(known) @ bodies[body]) - cp.log_det(bodies[body])
+    return cost

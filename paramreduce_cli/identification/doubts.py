@@ -1,0 +1,77 @@
+"""What looks wrong in recorded motions, before any model is asked."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from paramreduce_cli.identification import filters
+from paramreduce_cli.identification.signals import Signals
+from paramreduce_cli.records import FloatArray
+
+_SURE = 0.9
+"""Correlation from which on two signals are the same but for a factor."""
+_UNLIKE = 0.5
+_PER_DEGREE = 180 / np.pi
+_NEAR = 0.1
+"""Relative distance from a factor that counts as it."""
+_TURNS = 25.0
+"""Positions beyond this, in rad, are rather degrees."""
+_SATURATED = 20
+"""Samples in a row at the largest torque that tell a limit."""
+_FASTEST = 2.0
+"""Hz: motion compared when a recorded speed is held against the positions."""
+
+
+def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
+    """Sentences on joints that stand still, units, signs and order of columns, and limits.
+
+    Args:
+        piece: An uninterrupted motion as recorded.
+        rate: Samples per second.
+        names: Of the coordinates.
+    """
+    for j, name in enumerate(names):
+        z, tau = piece.z[:, j], piece.tau[:, j]
+        if np.ptp(z) == 0:
+            yield f"{name} never moves, so its inertia is not seen."
+        elif np.abs(z).max() > _TURNS:
+            yield (
+                f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees? Then say so "
+                "under units."
+            )
+        if np.ptp(tau) == 0:
+            yield f"the torque of {name} is constant: is it recorded?"
+        elif _longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:
+            yield f"the torque of {name} stays at its largest value: is it at a limit there?"
+    if piece.dz is not None:
+        yield from _speeds_against_positions(piece.z, piece.dz, rate, names)
+
+
+def _longest_run(flags: np.ndarray) -> int:
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
+    return int((edges[1::2] - edges[::2]).max(initial=0))
+
+
+def _speeds_against_positions(
+    z: FloatArray, dz: FloatArray, rate: float, names: Sequence[str]
+) -> Iterator[str]:
+    taps = filters.low_pass(_FASTEST, rate)
+    slopes = filters.filtered(np.gradient(z, 1 / rate, axis=0), taps)
+    speeds = filters.filtered(dz, taps)
+    for j, name in enumerate(names):
+        lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
+        if not lengths[j] > 0:
+            continue
+        alike = speeds[:, j] @ slopes / np.where(lengths > 0, lengths, np.inf)
+        gain = float(speeds[:, j] @ slopes[:, j] / (slopes[:, j] @ slopes[:, j]))
+        other = int(np.argmax(np.abs(alike)))
+        if abs(alike[j]) < _UNLIKE and abs(alike[other]) > _SURE:
+            yield f"the speed of {name} is that of {names[other]}: are columns swapped?"
+        elif alike[j] < -_SURE:
+            yield f"the speed of {name} has the other sign than its position's slope."
+        elif alike[j] > _SURE and abs(gain / _PER_DEGREE - 1) < _NEAR:
+            yield f"the speed of {name} is 57.3 times its position's slope: is it in degrees?"
+        elif alike[j] > _SURE and abs(gain * _PER_DEGREE - 1) < _NEAR:
+            yield f"the position of {name} moves 57.3 times faster than its speed says: degrees?"
+        elif alike[j] > _SURE and abs(gain - 1) > 2 * _NEAR:
+            yield f"the speed of {name} is {gain:.3g} times its position's slope: units?"

@@ -1,0 +1,224 @@
+"""Values of parameters from measured torques, with standard deviations for coloured noise."""
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy import stats
+
+from paramreduce_cli.identification.uncertainty import (
+    ColouredNoise,
+    autocovariance_of,
+    coloured_noise,
+    corrected,
+    effective_samples,
+    score_covariance,
+)
+from paramreduce_cli.multibody.observation import append_rows
+from paramreduce_cli.records import Block, FloatArray, Residuals
+
+_MOST_SAMPLES = 40_000
+"""That noise and standard deviations are taken from."""
+_ROUNDS = 3
+"""Of the correction for what a fit takes out of its residuals."""
+_DRAWS = 4
+"""Of noise in each."""
+_TUNING = 1.345
+"""Huber's constant: residuals beyond so many deviations count less."""
+_MOST_ROUNDS = 30
+_SETTLED = 1e-6
+_LAGS = 10
+"""Of the test of whiteness."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Rows of W for the columns of one model, with the torques, held in memory.
+
+    Attributes:
+        X: One array for each uninterrupted part, (n_samples, n_dof, p).
+        tau: (n_samples, n_dof) each.
+        dz: Speeds, like tau.
+        ddz: Accelerations, like tau.
+        step: Between samples, s.
+        share: Of all samples that these are.
+    """
+
+    X: tuple[FloatArray, ...]
+    tau: tuple[FloatArray, ...]
+    dz: tuple[FloatArray, ...]
+    ddz: tuple[FloatArray, ...]
+    step: float
+    share: float
+
+    @cached_property
+    def n_samples(self) -> int:
+        """Over all parts."""
+        return sum(part.shape[0] for part in self.tau)
+
+
+def rows_of(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Rows:
+    """Rows of a model, evenly from all trajectories where there are too many.
+
+    Args:
+        blocks: The samples.
+        columns: Standard parameters by those of the model, (n_standard, p).
+        n_samples: How many there are.
+    """
+    share = min(1.0, _MOST_SAMPLES / n_samples)
+    parts: dict[int, list[tuple[FloatArray, ...]]] = {}
+    step = 0.0
+    wanted = taken = 0.0
+    for block in blocks:
+        wanted += share * block.time.size
+        if taken + 0.5 * block.time.size <= wanted or share == 1.0:
+            taken += block.time.size
+            X = (block.W @ columns).reshape(*block.tau.shape, -1)
+            # Blocks left out part what is uninterrupted.
+            key = block.trajectory if share == 1.0 else len(parts)
+            parts.setdefault(key, []).append((X, block.tau, block.dz, block.ddz))
+            step = step or float(np.median(np.diff(block.time)))
+    joined = [tuple(map(np.concatenate, zip(*part, strict=True))) for part in parts.values()]
+    X, tau, dz, ddz = zip(*joined, strict=True)
+    return Rows(X, tau, dz, ddz, step, sum(t.shape[0] for t in tau) / n_samples)
+
+
+RowMaker = Callable[[], Iterable[tuple[FloatArray, FloatArray]]]
+"""Yields the rows of a model and the torques of all samples, block by block, anew with every call."""
+
+
+def robust_fit(
+    make: RowMaker, start: FloatArray, deviation: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Iteratively reweighted least squares with Huber's weights [Hub1964].
+
+    Args:
+        make: Yields (X, tau) blocks of all samples anew, (n, n_dof, p) and (n, n_dof).
+        start: Parameters to begin with, (p,).
+        deviation: Of each joint's noise, (n_dof,); infinite where torques are not measured.
+
+    Returns:
+        The parameters, and the deviations of the bulk of the residuals.
+    """
+    parameters = start
+    measured = np.isfinite(deviation)
+    for _ in range(_MOST_ROUNDS):
+        left = np.concatenate([np.abs(tau - X @ parameters) for X, tau in make()])
+        deviation = np.where(measured, 1.4826 * np.median(left, axis=0), np.inf)
+        deviation = np.maximum(deviation, 1e-12 * np.abs(left).max(initial=1e-300))
+        factor = np.zeros((0, start.size + 1))
+        for X, tau in make():
+            size = np.abs(tau - X @ parameters) / deviation
+            weight = np.sqrt(np.minimum(1.0, _TUNING / np.maximum(size, 1e-12))) / deviation
+            stacked = np.concatenate([X, tau[..., None]], axis=2) * weight[..., None]
+            factor = append_rows(factor, stacked.reshape(-1, start.size + 1))
+        found = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0]
+        change = np.linalg.norm(factor[:, :-1] @ (found - parameters))
+        parameters = found
+        if change <= _SETTLED * np.linalg.norm(factor[:, -1]):
+            break
+    return parameters, deviation
+
+
+@dataclass(frozen=True)
+class LinearFit:
+    """A weighted least-squares estimate with what its noise is like.
+
+    Attributes:
+        rows: Of its model.
+        parameters: (p,)
+        deviation: That torques of each joint were divided by, (n_dof,); infinite where not measured.
+    """
+
+    rows: Rows
+    parameters: FloatArray
+    deviation: FloatArray
+
+    @cached_property
+    def weights(self) -> FloatArray:
+        """Of squared residuals, (n_dof,)."""
+        return 1 / self.deviation**2
+
+    @cached_property
+    def _inverse(self) -> FloatArray:
+        """Inverse of X' W X over the rows."""
+        scaled = [X / self.deviation[:, None] for X in self.rows.X]
+        stacked = np.concatenate([X.reshape(-1, X.shape[2]) for X in scaled])
+        R = np.linalg.qr(stacked, mode="r")
+        inverse = np.linalg.pinv(R)
+        result: FloatArray = inverse @ inverse.T
+        return result
+
+    @cached_property
+    def residuals(self) -> list[FloatArray]:
+        """Torques that are left, (n_samples, n_dof) for each part."""
+        pairs = zip(self.rows.X, self.rows.tau, strict=True)
+        return [tau - X @ self.parameters for X, tau in pairs]
+
+    def left_of(self, noise: Sequence[FloatArray]) -> list[FloatArray]:
+        """What a fit leaves of other torques, (n_samples, n_dof) for each part."""
+        score = sum(
+            np.einsum("njp,nj->p", X, e * self.weights)
+            for X, e in zip(self.rows.X, noise, strict=True)
+        )
+        fitted = self._inverse @ score
+        return [e - X @ fitted for X, e in zip(self.rows.X, noise, strict=True)]
+
+    @cached_property
+    def noise(self) -> list[ColouredNoise]:
+        """Of each joint.
+
+        A fit takes slow noise out of its residuals; how much is seen on noise that is drawn and
+        fitted alike, and given back.
+        """
+        n_dof, n = self.deviation.size, self.rows.n_samples
+        seen = [autocovariance_of([e[:, j] for e in self.residuals]) for j in range(n_dof)]
+        models = [coloured_noise(a, n) for a in seen]
+        rng = np.random.default_rng(0)
+        for _ in range(_ROUNDS):
+            lost = [np.zeros_like(a) for a in seen]
+            for _ in range(_DRAWS):
+                drawn = [
+                    np.column_stack([model.drawn(e.shape[0], rng) for model in models])
+                    for e in self.residuals
+                ]
+                left = self.left_of(drawn)
+                for j in range(n_dof):
+                    whole = autocovariance_of([e[:, j] for e in drawn])
+                    lost[j] += (whole - autocovariance_of([e[:, j] for e in left])) / _DRAWS
+            models = [
+                coloured_noise(corrected(a, b), n) for a, b in zip(seen, lost, strict=True)
+            ]
+        return models
+
+    def covariance(self) -> FloatArray:
+        """Of the parameters, (p, p)."""
+        scores = score_covariance(self.rows.X, self.noise, self.weights)
+        result: FloatArray = self._inverse @ scores @ self._inverse * self.rows.share
+        return result
+
+    def judged_residuals(self, n_samples: int) -> Residuals:
+        """What the residuals are like.
+
+        Args:
+            n_samples: Of the whole training data.
+        """
+        every = np.concatenate(self.residuals)
+        lag_one, white = [], []
+        for j in range(self.deviation.size):
+            covariance = autocovariance_of([e[:, j] for e in self.residuals])
+            correlation = covariance / max(covariance[0], 1e-300)
+            lags = np.arange(1, min(_LAGS, covariance.size - 1) + 1)
+            n = every.shape[0]
+            statistic = n * (n + 2) * np.sum(correlation[lags] ** 2 / (n - lags))
+            lag_one.append(correlation[1] if correlation.size > 1 else 0.0)
+            white.append(stats.chi2.sf(statistic, max(1, lags.size)))
+        unknown = np.where(np.isfinite(self.deviation), 1.0, np.nan)
+        return Residuals(
+            deviation=np.std(every, axis=0) * unknown,
+            lag_one=np.array(lag_one) * unknown,
+            effective_samples=np.array([effective_samples(m, n_samples) for m in self.noise])
+            * unknown,
+            white=np.array(white) * unknown,
+        )

@@ -1,0 +1,120 @@
+"""Zero-phase low-passes, derivatives and spectra of evenly sampled signals, along the first axis.
+
+The low-pass is a symmetric FIR filter (windowed sinc, Kaiser window), so that nothing is shifted in
+time, and one output sample needs a known number of inputs: the observation matrix can pass the
+same filter block by block.
+"""
+
+import numpy as np
+from scipy import signal
+
+from paramreduce_cli.records import FloatArray
+
+_STOP_BAND = 50.0
+"""Attenuation, dB."""
+_TRANSITION = 0.8
+"""Width of the transition band, a share of the cut-off."""
+_NYQUIST = 0.45
+"""Cut-offs above this share of the sampling rate leave a signal as it is."""
+_ABOVE_FLOOR = 10.0
+"""Power over the noise floor at which a frequency belongs to the motion."""
+_IN_A_ROW = 5
+"""Frequencies below that, one after the other, that end the motion's band."""
+_SEGMENTS = 4
+"""Of the log in a spectrum: the longer, the finer in frequency."""
+_DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+"""Central differences of eighth order."""
+
+
+def low_pass(cutoff: float, rate: float) -> FloatArray:
+    """Coefficients of a symmetric low-pass, (2 k + 1,); a single one where it would change nothing.
+
+    Args:
+        cutoff: Frequency at which half of the amplitude passes, Hz; may be infinite.
+        rate: Samples per second.
+    """
+    if cutoff >= _NYQUIST * rate:
+        return np.ones(1)
+    order, beta = signal.kaiserord(_STOP_BAND, _TRANSITION * cutoff / (0.5 * rate))
+    taps: FloatArray = signal.firwin(order | 1, cutoff, window=("kaiser", beta), fs=rate)
+    return taps
+
+
+def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
+    """The signal through a symmetric filter, as long as it was.
+
+    Beyond its ends it is continued by its point reflection, which keeps values and slopes.
+
+    Args:
+        x: (n_samples, n)
+        taps: (2 k + 1,)
+    """
+    k = taps.size // 2
+    if k == 0:
+        return x * taps[0]
+    longer = _continued(x, k)
+    result: FloatArray = signal.oaconvolve(longer, taps[:, None], mode="valid", axes=0)
+    return result
+
+
+def _continued(x: FloatArray, k: int) -> FloatArray:
+    while k > 0:  # in steps where the filter is longer than the signal
+        step = min(k, x.shape[0] - 1)
+        x = np.vstack(
+            [2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]],
+        )
+        k -= step
+    return x
+
+
+def derivative(x: FloatArray, rate: float) -> FloatArray:
+    """Time derivative by central differences of eighth order, as long as the signal."""
+    return filtered(x, _DERIVATIVE[::-1]) * rate
+
+
+def thinned_low_pass(
+    rows: FloatArray, first: int, taps: FloatArray, outputs: np.ndarray
+) -> FloatArray:
+    """Single samples of a filtered signal.
+
+    Args:
+        rows: A stretch of the signal, (n_rows, n).
+        first: Number of its first row.
+        taps: Of a symmetric filter, (2 k + 1,).
+        outputs: Numbers of the wanted samples, whose neighbourhood of k rows must be there.
+
+    Returns:
+        (n_outputs, n)
+    """
+    k = taps.size // 2
+    operator = np.zeros((outputs.size, rows.shape[0]))
+    for row, output in enumerate(outputs - first):
+        operator[row, output - k : output + k + 1] = taps
+    result: FloatArray = operator @ rows
+    return result
+
+
+def spectrum(x: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Wel1967]."""
+    length = max(min(64, x.shape[0]), x.shape[0] // _SEGMENTS)
+    frequency, density = signal.welch(
+        x, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,
+        detrend="linear", axis=0,
+    )  # fmt: skip
+    return frequency, density
+
+
+def band_of_motion(frequency: FloatArray, density: FloatArray) -> float:
+    """Frequency up to which a signal stands out of its noise, in Hz; of several the highest.
+
+    The noise floor is the median density over the upper half of all frequencies.
+    """
+    upper = frequency > 0.5 * frequency[-1]
+    floor = np.median(density[upper], axis=0)
+    highest = 0.0
+    for above in (density > _ABOVE_FLOOR * floor).T:
+        ends = (
+            k for k in range(2, above.size - _IN_A_ROW) if not above[k : k + _IN_A_ROW].any()
+        )
+        highest = max(highest, float(frequency[next(ends, -1)]))
+    return highest

@@ -1,0 +1,370 @@
+"""Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import ndimage
+
+from paramreduce_cli.config.logs import Frequency, LogSection
+from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.identification import filters
+from paramreduce_cli.identification.doubts import doubts
+from paramreduce_cli.identification.signals import Signals, evened, signals
+from paramreduce_cli.records import (
+    FloatArray,
+    IntArray,
+    MeasuredLog,
+    MeasuredMotions,
+    RawLog,
+    RawLogs,
+    ShownSignals,
+    Spectra,
+)
+
+UNUSED = -1
+"""Fold of samples that only serve filters."""
+_WINDOW = 7
+"""Neighbours that tell an outlier."""
+_FAR = 12.0
+"""Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
+_TO_SIGMA = 1.4826
+"""Median absolute deviation to standard deviation of normal noise."""
+_STILL = 0.01
+"""Share of a joint's largest speed below which it stands still."""
+_PER_TORQUE_CUTOFF = 40
+"""Samples per period of the torque cut-off in which the observation matrix is filtered."""
+_PER_STATE_CUTOFF = 6
+"""Samples per period of the state cut-off that motions are kept with."""
+_USED_PER_CUTOFF = 10
+"""Samples per period of the torque cut-off that are used."""
+_ANTI_ALIAS = 0.4
+"""Cut-off of the low-pass before thinning, a share of the rate after it."""
+_FEWEST_USED = 20
+_MOST_SHOWN = 1500
+"""Samples in figures."""
+_SAME_RATE = 0.01
+
+
+@dataclass(frozen=True)
+class _Cutoffs:
+    state: float
+    torque: float
+
+
+def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> MeasuredLog:
+    """Make logs ready to identify from.
+
+    Args:
+        logs: As recorded.
+        wanted: What is where, and what is to be done.
+        names: Of the independent coordinates.
+
+    Raises:
+        DataError: They cannot be used; the message names file, row and column.
+        ConfigError: What is asked does not fit the robot.
+    """
+    steps: list[str] = []
+    training, rate = _read(logs.training, wanted, names, steps)
+    held_out, other_rate = _read(logs.held_out, wanted, names, steps)
+    if held_out and abs(other_rate - rate) > _SAME_RATE * rate:
+        raise DataError(
+            f"{logs.held_out[0].source}: is recorded at {other_rate:.6g} Hz, {logs.training[0].source} at "
+            f"{rate:.6g} Hz. Bring logs of one rate."
+        )
+    every = [piece for _, pieces in (*training, *held_out) for piece in pieces]
+    longest = max((p for _, pieces in training for p in pieces), key=lambda p: p.time.size)
+    spectra = _spectra(longest, rate)
+    cutoffs = _cutoffs(wanted, spectra, rate, steps)
+    thin = _thinning(wanted, cutoffs, rate)
+    ready = {id(piece): _ready(piece, rate, cutoffs, thin) for piece in every}
+    steps.append(_said_of_states(longest, thin, rate / thin))
+    if held_out:
+        parts = [_used(pieces, ready, wanted, rate / thin) for _, pieces in training]
+        others = [_used(pieces, ready, wanted, rate / thin) for _, pieces in held_out]
+    else:
+        halves = [
+            _split(_used(pieces, ready, wanted, rate / thin), 1 - wanted.held_out)
+            for _, pieces in training
+        ]
+        parts, others = [first for first, _ in halves], [second for _, second in halves]
+    learned = _motions([piece for part in parts for piece in part], wanted.folds)
+    tested = _motions([piece for part in others for piece in part], 1)
+    _check_enough(learned, tested)
+    steps.append(_said_of_split(learned, tested, wanted, rate / thin))
+    noise = _noise(learned, cutoffs, rate / thin)
+    used = learned.tau[learned.fold != UNUSED]
+    return MeasuredLog(
+        training=learned,
+        held_out=tested,
+        rate=rate / thin,
+        recorded_rate=rate,
+        state_cutoff=cutoffs.state,
+        torque_cutoff=cutoffs.torque,
+        output_rate=_output_rate(wanted, cutoffs, rate / thin),
+        noise=noise,
+        noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
+        shown=_shown(longest, ready[id(longest)], rate),
+        spectra=spectra,
+        steps=tuple(steps),
+        doubts=tuple(dict.fromkeys(text for p in every for text in doubts(p, rate, names))),
+    )
+
+
+def _read(
+    logs: Sequence[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
+) -> tuple[list[tuple[RawLog, list[Signals]]], float]:
+    found = []
+    rates: list[float] = []
+    for log in logs:
+        recorded = signals(log, wanted, names)
+        if wanted.delay:
+            recorded = _undelayed(recorded, wanted.delay)
+        try:
+            pieces, rate, said = evened(recorded)
+        except DataError as error:
+            raise DataError(f"{log.source}: {error}") from error
+        duration = recorded.time[-1] - recorded.time[0]
+        steps.append(
+            f"{log.source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz."
+        )
+        steps += said
+        if wanted.outliers == "replace":
+            pieces, count = _without_outliers(pieces)
+            if count:
+                steps.append(f"{count} outliers are replaced by what lies between their neighbours.")
+        if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
+            raise DataError(
+                f"{log.source}: is recorded at {rate:.6g} Hz, {logs[0].source} at {rates[0]:.6g} Hz. Bring "
+                "logs of one rate."
+            )
+        rates.append(rate)
+        found.append((log, pieces))
+    return found, rates[0] if rates else 0.0
+
+
+def _undelayed(found: Signals, delay: float) -> Signals:
+    """Torques at the times at which they acted."""
+    tau = np.column_stack([np.interp(found.time + delay, found.time, t) for t in found.tau.T])
+    return replace(found, tau=tau)
+
+
+def _without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
+    """Single samples far from the median of their neighbours, interpolated [Ham1974]."""
+    count = 0
+    cleaned = []
+    for piece in pieces:
+        changed = {}
+        for key in ("z", "tau"):
+            values = getattr(piece, key).copy()
+            for column in values.T:
+                away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
+                sigma = _TO_SIGMA * float(np.median(away))
+                # A signal that hardly ever leaves its median is one of few levels, not of outliers.
+                if sigma == 0:
+                    continue
+                far = away > _FAR * sigma
+                steep = np.abs(np.gradient(column)) * _WINDOW
+                far &= away > steep  # a turn or a step of the signal itself is none
+                if far.any() and far.mean() < 0.01:
+                    count += int(far.sum())
+                    good = np.flatnonzero(~far)
+                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
+            changed[key] = values
+        cleaned.append(replace(piece, **changed))
+    return cleaned, count
+
+
+def _speeds(piece: Signals, rate: float) -> FloatArray:
+    """As recorded, or differences of positions."""
+    if piece.dz is not None:
+        return piece.dz
+    # Plain differences: noise that is white in the positions rises to the end of the spectrum.
+    return np.diff(piece.z, axis=0, append=piece.z[-1:]) * rate
+
+
+def _spectra(piece: Signals, rate: float) -> Spectra:
+    frequency, velocity = filters.spectrum(_speeds(piece, rate), rate)
+    _, torque = filters.spectrum(piece.tau, rate)
+    return Spectra(frequency[1:], velocity[1:], torque[1:])
+
+
+def _cutoffs(wanted: LogSection, spectra: Spectra, rate: float, steps: list[str]) -> _Cutoffs:
+    band = filters.band_of_motion(spectra.frequency, spectra.velocity)
+
+    def chosen(given: Frequency, automatic: float, key: str) -> float:
+        if given == "none":
+            return np.inf
+        if given == "auto":
+            return automatic
+        if float(given) >= rate / 2:
+            raise ConfigError(
+                f"is {float(given):g} Hz, but the log is recorded at {rate:g} Hz; a cut-off is below half of "
+                "that. Write none for no low-pass.",
+                ("sampling", "log", key),
+            )
+        return float(given)
+
+    state = chosen(wanted.state_cutoff, band, "state_cutoff")
+    torque = chosen(wanted.torque_cutoff, band, "torque_cutoff")
+    steps.append(
+        f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_low_pass(state)}; "
+        f"torques and observation matrix: {_low_pass(torque)}."
+    )
+    return _Cutoffs(state, torque)
+
+
+def _low_pass(cutoff: float) -> str:
+    if np.isinf(cutoff):
+        return "as recorded"
+    return f"zero-phase low-pass at {cutoff:.3g} Hz"
+
+
+def _thinning(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
+    """Every how many samples of the log motions are kept."""
+    if np.isfinite(cutoffs.torque):
+        needed = _PER_TORQUE_CUTOFF * cutoffs.torque
+        if np.isfinite(cutoffs.state):
+            needed = max(needed, _PER_STATE_CUTOFF * cutoffs.state)
+    else:
+        needed = wanted.rate or rate
+    return max(1, int(rate / needed + 1e-9))
+
+
+def _output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
+    usual = rate if np.isinf(cutoffs.torque) else _USED_PER_CUTOFF * cutoffs.torque
+    return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
+
+
+def _ready(piece: Signals, rate: float, cutoffs: _Cutoffs, thin: int) -> Signals:
+    """Low-passed, differentiated, thinned."""
+    taps = filters.low_pass(cutoffs.state, rate)
+    z = filters.filtered(piece.z, taps)
+    dz = (
+        filters.derivative(z, rate) if piece.dz is None else filters.filtered(piece.dz, taps)
+    )
+    ddz = (
+        filters.derivative(dz, rate) if piece.ddz is None else filters.filtered(piece.ddz, taps)
+    )
+    tau = piece.tau
+    if thin > 1 and np.isfinite(cutoffs.torque):
+        tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
+    return Signals(piece.time, z, dz, ddz, tau).part(slice(None, None, thin))
+
+
+@dataclass(frozen=True)
+class _Piece:
+    """A stretch of a motion and which of its samples are used."""
+
+    signals: Signals
+    used: slice
+
+
+def _used(
+    pieces: list[Signals], ready: dict[int, Signals], wanted: LogSection, rate: float
+) -> list[_Piece]:
+    """Without what is cut off at the start and the end of a file."""
+    made = [ready[id(piece)] for piece in pieces]
+    first, last = made[0].time[0] + wanted.trim[0], made[-1].time[-1] - wanted.trim[1]
+    if wanted.standstill == "cut":
+        speeds = np.concatenate([m.dz for m in made if m.dz is not None])
+        times = np.concatenate([m.time for m in made])
+        moving = np.flatnonzero(
+            (np.abs(speeds) > _STILL * np.abs(speeds).max(axis=0, initial=1e-12)).any(axis=1)
+        )
+        if moving.size:
+            first, last = max(first, times[moving[0]]), min(last, times[moving[-1]])
+    found = []
+    for m in made:
+        start, stop = np.searchsorted(m.time, [first - 1e-9, last + 1e-9])
+        if stop > start:
+            found.append(_Piece(m, slice(int(start), int(stop))))
+    return found
+
+
+def _split(pieces: list[_Piece], share: float) -> tuple[list[_Piece], list[_Piece]]:
+    """A first share of the used samples, and the rest; no sample serves filters of both."""
+    left = int(share * sum(p.used.stop - p.used.start for p in pieces))
+    first, second = [], []
+    for piece in pieces:
+        size = piece.used.stop - piece.used.start
+        cut = piece.used.start + min(left, size)
+        left -= min(left, size)
+        if cut > piece.used.start:
+            first.append(_Piece(piece.signals.part(slice(cut)), slice(piece.used.start, cut)))
+        if cut < piece.used.stop:
+            rest = slice(cut, None) if cut > piece.used.start else slice(None)
+            start = 0 if cut > piece.used.start else piece.used.start
+            stop = start + piece.used.stop - cut
+            second.append(_Piece(piece.signals.part(rest), slice(start, stop)))
+    return first, second
+
+
+def _motions(pieces: list[_Piece], folds: int) -> MeasuredMotions:
+    """One after the other, folds parts in time of equal size."""
+    total = sum(p.used.stop - p.used.start for p in pieces)
+    fold_of: list[IntArray] = []
+    before = 0
+    for piece in pieces:
+        fold = np.full(piece.signals.time.size, UNUSED)
+        size = piece.used.stop - piece.used.start
+        fold[piece.used] = (before + np.arange(size)) * folds // max(1, total)
+        before += size
+        fold_of.append(fold)
+    joined = {
+        key: np.concatenate([getattr(p.signals, key) for p in pieces])
+        for key in ("time", "z", "dz", "ddz", "tau")
+    }
+    number = np.repeat(np.arange(len(pieces)), [p.signals.time.size for p in pieces])
+    return MeasuredMotions(**joined, piece=number, fold=np.concatenate(fold_of))
+
+
+def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:
+    for what, motions in (("to learn from", learned), ("held out", tested)):
+        if np.count_nonzero(motions.fold != UNUSED) < _FEWEST_USED:
+            raise DataError(
+                f"the log leaves hardly any samples {what}. Bring a longer one, or cut off less."
+            )
+
+
+def _said_of_states(piece: Signals, thin: int, rate: float) -> str:
+    made = [
+        *([] if piece.dz is not None else ["speeds"]),
+        *([] if piece.ddz is not None else ["accelerations"]),
+    ]
+    text = f"Differentiated: {' and '.join(made)}. " if made else ""
+    kept = "All samples are kept" if thin == 1 else f"One of {thin} samples is kept"
+    return f"{text}{kept}, {rate:.5g} Hz."
+
+
+def _said_of_split(
+    learned: MeasuredMotions, tested: MeasuredMotions, wanted: LogSection, rate: float
+) -> str:
+    one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))
+    cut = (learned.time.size + tested.time.size) / rate - one - two
+    how = "by file" if wanted.held_out_files else f"the last {100 * wanted.held_out:.3g} % of each file"
+    text = f"{one:.4g} s are learned from, in {wanted.folds} folds, {two:.4g} s held out ({how})"
+    return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
+
+
+def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArray:
+    """What of the torques lies above the band that a model is asked for."""
+    cutoff = cutoffs.torque if np.isfinite(cutoffs.torque) else cutoffs.state
+    taps = filters.low_pass(cutoff, rate)
+    left = []
+    for piece in np.unique(learned.piece).tolist():
+        rows = learned.piece == piece
+        tau = learned.tau[rows]
+        above = tau - filters.filtered(tau, taps)
+        left.append(above[learned.fold[rows] != UNUSED])
+    return np.std(np.concatenate(left), axis=0)
+
+
+def _shown(raw: Signals, ready: Signals, rate: float) -> ShownSignals:
+    one = slice(None, None, max(1, raw.time.size // _MOST_SHOWN))
+    two = slice(None, None, max(1, ready.time.size // _MOST_SHOWN))
+    assert ready.dz is not None
+    return ShownSignals(
+        raw.time[one], _speeds(raw, rate)[one], raw.tau[one],
+        ready.time[two], ready.dz[two], ready.tau[two],
+    )  # fmt: skip

@@ -1,0 +1,211 @@
+"""Recorded columns as the signals of a robot's joints, in SI units, even in time; or what is wrong."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from paramreduce_cli.config.logs import (
+    ACCELERATIONS,
+    ANGLES,
+    NUMBER,
+    SPEEDS,
+    TIMES,
+    TORQUES,
+    LogSection,
+    Names,
+)
+from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.records import FloatArray, RawLog
+
+_EVEN = 0.005
+"""Deviation of a time step from the usual one, a share, up to which time is even."""
+_GAP = 5.5
+"""Usual time steps that make a gap."""
+_FEWEST = 50
+"""Samples of an uninterrupted motion that is used."""
+_MOST_SHOWN = 12
+"""Names of columns in a message."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """An uninterrupted motion as recorded, in SI units, of joints; each (n_samples, n_dof)."""
+
+    time: FloatArray
+    """(n_samples,)"""
+    z: FloatArray
+    dz: FloatArray | None
+    ddz: FloatArray | None
+    tau: FloatArray
+
+    def part(self, rows: slice) -> "Signals":
+        """Some of its samples."""
+        return Signals(*(None if a is None else a[rows] for a in vars(self).values()))
+
+
+def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
+    """The signals of a file, row by row.
+
+    Args:
+        log: The file.
+        wanted: What is where in it.
+        names: Of the coordinates.
+
+    Raises:
+        DataError: Columns are missing, or hold what cannot be; file, line and column are named.
+        ConfigError: Signs, gears and the like do not fit the robot.
+    """
+    columns, units = wanted.columns, wanted.units
+    time = _column(log, columns.time) * TIMES[units.time]
+    position = _matrix(log, columns.position, names, "position") * ANGLES[units.position]
+    tau = _matrix(log, columns.torque, names, "torque") * TORQUES[units.torque]
+    dz = ddz = None
+    if columns.velocity is not None:
+        dz = _matrix(log, columns.velocity, names, "velocity") * SPEEDS[units.velocity]
+    if columns.acceleration is not None:
+        ddz = _matrix(log, columns.acceleration, names, "acceleration")
+        ddz = ddz * ACCELERATIONS[units.acceleration]
+    _check_time(log, columns.time, time)
+    return _of_joints(Signals(time, position, dz, ddz, tau), wanted, len(names))
+
+
+def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
+    """From motors to joints."""
+    sign = _each(wanted, "signs", n_dof)
+    tau = found.tau * sign * _each(wanted, "torque_signs", n_dof)
+    if wanted.torque_constants is not None:
+        tau = tau * _each(wanted, "torque_constants", n_dof)
+    motion = [None if a is None else a * sign for a in (found.z, found.dz, found.ddz)]
+    try:
+        gears = wanted.motor_per_joint(n_dof)
+    except ValueError as error:
+        raise ConfigError(str(error), ("sampling", "log", "transmission")) from error
+    if gears is not None:
+        inverse = np.linalg.inv(gears)
+        motion = [None if a is None else a @ inverse.T for a in motion]
+        tau = tau @ gears
+    z, dz, ddz = motion
+    assert z is not None
+    return replace(found, z=z + _each(wanted, "offsets", n_dof), dz=dz, ddz=ddz, tau=tau)
+
+
+def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:
+    values = getattr(wanted, key)
+    if len(values) not in (1, n_dof):
+        raise ConfigError(
+            f"has {len(values)} values for {n_dof} joints. Give one for each, or one for all.",
+            ("sampling", "log", key),
+        )
+    return per_joint(values, n_dof)
+
+
+def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str) -> FloatArray:
+    n_dof = len(joints)
+    if isinstance(names, str):
+        if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:
+            raise DataError(
+                f"{log.source}: there is a column {names.replace(NUMBER, str(n_dof + 1))}, but the robot "
+                f"has {n_dof} joints. Is the log of another robot? If not, name its columns one by one "
+                f"under sampling.log.columns.{key}."
+            )
+        listed = [
+            names.replace(NUMBER, str(j + 1)).replace("{name}", joint)
+            for j, joint in enumerate(joints)
+        ]
+    else:
+        listed = list(names)
+    if len(listed) != n_dof:
+        raise ConfigError(
+            f"names {len(listed)} columns for {n_dof} joints.", ("sampling", "log", "columns", key)
+        )
+    return np.column_stack([_column(log, name) for name in listed])
+
+
+def _column(log: RawLog, name: str) -> FloatArray:
+    column = log.columns.get(name)
+    if column is None:
+        known = list(log.columns)
+        shown = ", ".join(known[:_MOST_SHOWN]) + (", ..." if len(known) > _MOST_SHOWN else "")
+        raise DataError(
+            f"{log.source}: there is no column {name}; there are {shown}. Say under "
+            "sampling.log.columns what is where."
+        )
+    wrong = np.flatnonzero(~np.isfinite(column))
+    if wrong.size:
+        raise DataError(
+            f"{log.place(int(wrong[0]))}, column {name}: is not a finite number, nor are "
+            f"{wrong.size - 1} others. Remove such rows."
+        )
+    if column.size < _FEWEST:
+        raise DataError(f"{log.source}: {column.size} rows are too few; bring {_FEWEST} or more.")
+    sizes = {values.size for values in log.columns.values()}
+    if len(sizes) > 1 and column.size != next(iter(log.columns.values())).size:
+        raise DataError(
+            f"{log.source}: column {name} has {column.size} rows and others have not; bring signals "
+            "that were recorded together."
+        )
+    return column
+
+
+def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
+    steps = np.diff(time)
+    wrong = np.flatnonzero(steps <= 0)
+    if wrong.size:
+        row = int(wrong[0]) + 1
+        what = "stands still" if steps[row - 1] == 0 else "goes back"
+        raise DataError(
+            f"{log.place(row)}, column {name}: time {what}, from {time[row - 1]:.6g} s to "
+            f"{time[row]:.6g} s; so it does in {wrong.size} rows. Bring rows in the order in which they "
+            "were recorded, one file for each recording."
+        )
+
+
+def evened(found: Signals) -> tuple[list[Signals], float, list[str]]:
+    """Uninterrupted motions at an even rate.
+
+    Uneven time is resampled by cubic splines; gaps part motions.
+
+    Returns:
+        The motions, samples per second, and what was done.
+
+    Raises:
+        DataError: Nothing long enough is left.
+    """
+    step = float(np.median(np.diff(found.time)))
+    gaps = np.flatnonzero(np.diff(found.time) > _GAP * step)
+    edges = [0, *(gaps + 1).tolist(), found.time.size]
+    pieces = [found.part(slice(a, b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    kept = [piece for piece in pieces if piece.time.size >= _FEWEST]
+    if not kept:
+        raise DataError(
+            f"no motion of {_FEWEST} samples in a row is left between {gaps.size} gaps in time."
+        )
+    said = []
+    if gaps.size:
+        longest = float(np.diff(found.time).max())
+        said.append(
+            f"{gaps.size} gaps in time, the longest of {longest:.3g} s, part the log; {len(kept)} of "
+            f"{len(pieces)} pieces are long enough."
+        )
+    uneven = max(float(np.abs(np.diff(p.time) - step).max()) for p in kept) / step
+    if uneven > _EVEN:
+        kept = [_resampled(piece, step) for piece in kept]
+        said.append(
+            f"Time steps differ by up to {100 * uneven:.2g} %; resampled to {1 / step:.6g} Hz by cubic "
+            "splines."
+        )
+    return kept, 1 / step, said
+
+
+def _resampled(found: Signals, step: float) -> Signals:
+    time = found.time[0] + step * np.arange(int((found.time[-1] - found.time[0]) / step) + 1)
+
+    def at(values: FloatArray) -> FloatArray:
+        result: FloatArray = CubicSpline(found.time, values, axis=0)(time)
+        return result
+
+    others = (None if a is None else at(a) for a in (found.dz, found.ddz))
+    return Signals(time, at(found.z), *others, at(found.tau))

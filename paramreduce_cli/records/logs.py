@@ -1,0 +1,192 @@
+"""Logs of a machine: columns as recorded, and the motions that are made of them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class RawLog:
+    """One file as it was recorded."""
+
+    source: str
+    columns: Mapping[str, FloatArray]
+    """By name, (n_rows,) each; matrices are one column for each of theirs."""
+    first_line: int | None
+    """Line of the first row in the file, None where it has no lines."""
+
+    def place(self, row: int) -> str:
+        """Where a row stands, for messages."""
+        if self.first_line is None:
+            return f"{self.source}, row {row + 1}"
+        return f"{self.source}, line {self.first_line + row}"
+
+
+@dataclass(frozen=True)
+class RawLogs:
+    """What the user brought: files to train on, and files that are held out."""
+
+    training: tuple[RawLog, ...]
+    held_out: tuple[RawLog, ...]
+
+
+@dataclass(frozen=True)
+class MeasuredMotions:
+    """Measured motions one after the other, evenly spaced in time within each piece."""
+
+    time: FloatArray
+    """(n_samples,), s."""
+    z: FloatArray
+    """Like all others (n_samples, n_dof)."""
+    dz: FloatArray
+    ddz: FloatArray
+    tau: FloatArray
+    """Measured torques, before any low-pass that the observation matrix shares."""
+    piece: IntArray
+    """Number of the uninterrupted motion that a sample belongs to, (n_samples,)."""
+    fold: IntArray
+    """Part of the data that is left out together in cross-validation; -1 for samples that only serve
+    filters: before and after what is used, (n_samples,)."""
+
+
+@dataclass(frozen=True)
+class ShownSignals:
+    """Signals before and after, thinned for figures; of the first motion of a set."""
+
+    raw_time: FloatArray
+    raw_dz: FloatArray
+    """Speeds as recorded, or differences of the positions as recorded."""
+    raw_tau: FloatArray
+    time: FloatArray
+    dz: FloatArray
+    tau: FloatArray
+
+
+@dataclass(frozen=True)
+class Spectra:
+    """What signals are made of, by frequency."""
+
+    frequency: FloatArray
+    """(n_frequencies,), Hz."""
+    velocity: FloatArray
+    """Power spectral densities of the speeds as recorded, (n_frequencies, n_dof)."""
+    torque: FloatArray
+    """Of the torques, (n_frequencies, n_dof)."""
+
+
+@dataclass(frozen=True)
+class MeasuredLog:
+    """A log made ready: motions to train on and motions held out, and what was done to them."""
+
+    training: MeasuredMotions
+    held_out: MeasuredMotions
+    rate: float
+    """Samples per second of the motions."""
+    recorded_rate: float
+    """Of the files."""
+    state_cutoff: float
+    """Of the low-pass on positions and speeds, Hz; infinite where there is none."""
+    torque_cutoff: float
+    """Of the low-pass on torques and observation matrix alike, Hz; infinite where there is none."""
+    output_rate: float
+    """Samples per second that are taken of what passes that, Hz."""
+    noise: FloatArray
+    """Standard deviation of the torques above the torque cut-off, or above what the motion
+    contains where there is none, (n_dof,): no model explains it."""
+    noise_share: float
+    """The same of all joints together, a share of the torques."""
+    shown: ShownSignals
+    spectra: Spectra
+    steps: tuple[str, ...]
+    """What was done, one sentence each."""
+    doubts: tuple[str, ...]
+    """What looks wrong, one sentence each."""
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Values of a model's parameters from measured torques, and what they are worth."""
+
+    names: tuple[str, ...]
+    values: FloatArray
+    """(n,)"""
+    deviations: FloatArray
+    """Standard deviations, for noise as coloured as the residuals are, (n,)."""
+    standard: FloatArray
+    """The same values as standard parameters, (n_standard,)."""
+    train: float
+    """Norm of the residuals over that of the torques, N m (N), on what was learned from."""
+    held_out: float
+    """The same on what was held out."""
+    joint_train: FloatArray
+    """Root mean square of the residuals joint by joint, N m (N), (n_dof,); not a number where torques
+    are not measured, in all such arrays."""
+    joint_held_out: FloatArray
+    folds: FloatArray
+    """Error on each part of the training data when fitted without it, like ``train``, (n_folds,)."""
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """What the residuals of the model of all base parameters are like on the training data."""
+
+    deviation: FloatArray
+    """(n_dof,), N m (N)."""
+    lag_one: FloatArray
+    """Correlation of a residual with the one before, (n_dof,)."""
+    effective_samples: FloatArray
+    """White samples that would tell as much of a constant, (n_dof,)."""
+    white: FloatArray
+    """Probability of residuals like these if they were white (Ljung-Box), (n_dof,)."""
+
+
+@dataclass(frozen=True)
+class Consistency:
+    """The standard parameters nearest to the data that a machine can have."""
+
+    standard: FloatArray
+    """(n_standard,)"""
+    train: float
+    held_out: float
+    smallest_eigenvalues: FloatArray
+    """Of each body's pseudo-inertia matrix, kg (kg m^2), (n_bodies,)."""
+    unconstrained_eigenvalues: FloatArray
+    """Of the standard parameters nearest to the known ones that fit as well as can be, (n_bodies,)."""
+    bodies: tuple[str, ...]
+    smallest_drive: float
+    """Smallest friction, rotor inertia or stiffness; infinite where there is none."""
+
+    @property
+    def positive(self) -> bool:
+        """Whether every body and every drive can exist."""
+        return bool(np.all(self.smallest_eigenvalues > 0)) and self.smallest_drive >= 0
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What measured torques say of a robot."""
+
+    estimator: str
+    torque_deviation: FloatArray
+    """What torques of each joint were divided by, (n_dof,)."""
+    torque_size: FloatArray
+    """Root mean square of the torques held out, (n_dof,)."""
+    full: Estimate
+    """All base parameters."""
+    reduced: Estimate
+    """Those of the selected model."""
+    residuals: Residuals
+    consistency: Consistency | None
+    hints: tuple[str, ...]
+    """What the residuals suggest, one sentence each."""
+    comparison: str
+    """How the reduced model stands against the full one."""
+    shown_time: FloatArray
+    """Of some held-out samples, s."""
+    shown_measured: FloatArray
+    """(n_shown, n_dof), N m (N)."""
+    shown_full: FloatArray
+    shown_reduced: FloatArray

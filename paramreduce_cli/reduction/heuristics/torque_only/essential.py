@@ -1,0 +1,41 @@
+"""Essential parameters [Pha1991]."""
+
+import numpy as np
+
+from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.records import FloatArray
+from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
+
+
+def essential(task: SelectionTask) -> FoundSubsets:
+    """Remove, one by one, the parameter that is known least surely.
+
+    Starts from the preferred base set; the parameter with the largest relative standard deviation
+    goes, and the others are fitted again. A group is as sure as its surest member.
+    """
+    objective = task.objective
+    everything = tuple(range(len(objective.units)))
+    columns = independent_columns(objective.problem.W, objective.columns(everything))
+    left: Units = tuple(sorted(objective.units_of(np.array(columns))))
+    tail = completed(objective, left)[len(left) :]
+    while left:
+        unsure = _relative_deviations(objective, left)
+        gone = left[len(left) - 1 - int(np.argmax(unsure[::-1]))]  # ties: the least preferred
+        left, tail = without(left, gone), (gone, *tail)
+    return nested(task, tail)
+
+
+def _relative_deviations(objective: Objective, kept: Units) -> FloatArray:
+    """Standard deviation over value of each unit, up to a common factor, (n_kept,)."""
+    problem = objective.problem
+    columns = objective.columns(kept)
+    X = problem.X[:, columns]
+    u, s, vt = np.linalg.svd(X, full_matrices=False)
+    s = np.maximum(s, 1e-12 * s[0])
+    values = vt.T @ ((u.T @ problem.chi) / s)
+    deviations = np.linalg.norm(vt.T / s, axis=1)
+    with np.errstate(divide="ignore"):
+        relative = np.where(values != 0, deviations / np.abs(values), np.inf)
+    ends = np.cumsum([objective.units[unit].size for unit in kept])[:-1]
+    return np.array([part.min() for part in np.split(relative, ends)])

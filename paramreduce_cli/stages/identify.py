@@ -1,0 +1,228 @@
+"""identify: values from measured torques, how sure they are, and what looks wrong."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+
+from paramreduce_cli.config.identification import IdentificationSection
+from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.identification import consistency as physics
+from paramreduce_cli.identification.comparison import compared
+from paramreduce_cli.identification.estimation import LinearFit, robust_fit, rows_of
+from paramreduce_cli.identification.hints import hints
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.observation import combined_factor
+from paramreduce_cli.records import (
+    Consistency,
+    Estimate,
+    FloatArray,
+    Identification,
+    Model,
+    ReducedModel,
+    Samples,
+    SampleSet,
+    Validation,
+)
+from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.reduction.noise import joint_noise, least_squares
+
+_MOST_SHOWN = 1500
+"""Samples in figures."""
+_ACROSS = 1e-6
+"""Share of gravity below which an axis counts as level."""
+
+
+def identify(
+    identification: IdentificationSection,
+    model: Model,
+    samples: Samples,
+    validation: Validation,
+) -> Identification:
+    """Identify base parameters and those of the selected model, with standard deviations.
+
+    Also physically consistent standard parameters, and hints where residuals are not noise.
+    """
+    if samples.validation is None:
+        raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
+    training, held_out = samples.estimation, samples.validation
+    factors, n_samples = training.factors(), training.n_samples
+    scale = np.where(np.isfinite(model.nominal_torque), _sizes(training), np.inf)
+    deviation = np.where(np.isfinite(scale), 1.0, np.inf)
+    if identification.estimator != "ordinary":
+        deviation = joint_noise(factors, scale, n_samples)
+    full, full_fit = _estimate(identification, base_model(model), samples, deviation)
+    reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
+    suspected = hints(full_fit, model.mechanism.coordinate_names, _tilts(model, training, full_fit))
+    for text in suspected:
+        warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
+    time, measured = _shown(held_out)
+    return Identification(
+        estimator=identification.estimator,
+        torque_deviation=deviation,
+        torque_size=_sizes(held_out),
+        full=full,
+        reduced=reduced,
+        residuals=full_fit.judged_residuals(n_samples),
+        consistency=_consistency(identification, model, samples, deviation),
+        hints=tuple(suspected),
+        comparison=compared(full, reduced),
+        shown_time=time,
+        shown_measured=measured,
+        shown_full=_predicted(held_out, full.standard),
+        shown_reduced=_predicted(held_out, reduced.standard),
+    )
+
+
+def _columns(chosen: ReducedModel) -> FloatArray:
+    """Standard parameters by those of a model, (n_standard, n)."""
+    columns = np.zeros((chosen.position.size, chosen.n))
+    columns[chosen.kept, chosen.position[chosen.kept]] = 1.0
+    return columns
+
+
+def _merged(factors: FloatArray, columns: FloatArray) -> FloatArray:
+    """Factors of [W | tau] per trajectory and joint for the columns of a model."""
+    return np.concatenate([factors[..., :-1] @ columns, factors[..., -1:]], axis=-1)
+
+
+def _estimate(
+    wanted: IdentificationSection, chosen: ReducedModel, samples: Samples, deviation: FloatArray
+) -> tuple[Estimate, LinearFit]:
+    training, held_out = samples.estimation, samples.validation
+    assert held_out is not None
+    columns = _columns(chosen)
+    factors = _merged(training.factors(), columns)
+    values = least_squares(combined_factor(factors, deviation))
+    if wanted.estimator == "robust":
+        values, deviation = robust_fit(
+            lambda: (
+                ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau) for b in training.blocks()
+            ),
+            values,
+            deviation,
+        )
+    rows = rows_of(training.blocks(), columns, training.n_samples)
+    fitted = LinearFit(rows, values, deviation)
+    own, other = (_errors(part, columns @ values, deviation) for part in (training, held_out))
+    estimate = Estimate(
+        names=chosen.names,
+        values=values,
+        deviations=np.sqrt(np.maximum(0.0, np.diag(fitted.covariance()))),
+        standard=columns @ values,
+        train=own[0],
+        held_out=other[0],
+        joint_train=own[1],
+        joint_held_out=other[1],
+        folds=_folds(factors, deviation),
+    )
+    return estimate, fitted
+
+
+def _errors(part: SampleSet, standard: FloatArray, deviation: FloatArray) -> tuple[float, FloatArray]:
+    """Error of all joints together, and root mean squares joint by joint."""
+    measured = np.isfinite(deviation)
+    left, whole = np.zeros(measured.size), np.zeros(measured.size)
+    for block in part.blocks():
+        residual = block.tau - (block.W @ standard).reshape(block.tau.shape)
+        left += np.sum(residual**2, axis=0)
+        whole += np.sum(block.tau**2, axis=0)
+    joints = np.where(measured, np.sqrt(left / part.n_samples), np.nan)
+    return float(np.sqrt(left[measured].sum() / whole[measured].sum())), joints
+
+
+def _folds(factors: FloatArray, deviation: FloatArray) -> FloatArray:
+    """Error on each trajectory when fitted without it; no folds where there is but one."""
+    measured = np.isfinite(deviation)
+    found = []
+    for k in range(len(factors) if len(factors) > 1 else 0):
+        values = least_squares(combined_factor(np.delete(factors, k, axis=0), deviation))
+        own = factors[k, measured]
+        left = own[..., -1] - own[..., :-1] @ values
+        found.append(np.linalg.norm(left) / max(np.linalg.norm(own[..., -1]), 1e-300))
+    return np.array(found)
+
+
+def _sizes(part: SampleSet) -> FloatArray:
+    """Root mean squares of the torques, (n_dof,)."""
+    total: FloatArray = np.sqrt(
+        sum(np.sum(block.tau**2, axis=0) for block in part.blocks()) / part.n_samples
+    )
+    return np.where(total > 0, total, 1.0)
+
+
+def _tilts(
+    model: Model, training: SampleSet, fitted: LinearFit
+) -> list[tuple[FloatArray, ...]]:
+    """Torques of gravity along the base's level axes, of the known masses, where there are any."""
+    mechanism = model.mechanism
+    level = np.abs(mechanism.gravity) <= _ACROSS * np.linalg.norm(mechanism.gravity)
+    if not level[:2].all() or not np.any(model.values) or len(fitted.rows.X) != len(
+        {block.trajectory for block in training.blocks()}
+    ):
+        return []
+    found = []
+    for axis in np.eye(3)[:2]:
+        tilted = Dynamics(replace(mechanism, gravity=axis))
+        parts: dict[int, list[FloatArray]] = {}
+        for block in training.blocks():
+            still = np.zeros_like(block.q)
+            K = tilted.regressor(block.q, still, still)
+            parts.setdefault(block.trajectory, []).append(K @ model.values)
+        found.append(tuple(np.concatenate(part) for part in parts.values()))
+    return found
+
+
+def _consistency(
+    wanted: IdentificationSection, model: Model, samples: Samples, deviation: FloatArray
+) -> Consistency | None:
+    if wanted.consistency == "none":
+        return None
+    held_out = samples.validation
+    assert held_out is not None
+    factor = combined_factor(samples.estimation.factors(), deviation)
+    known = physics.physical_parameters(model.mechanism, model.values)
+    try:
+        standard = physics.consistent(factor, known, wanted.consistency)
+    except ImportError:
+        warnings.warn(
+            "physical consistency is not looked at, as cvxpy is not installed; "
+            "`pip install 'paramreduce[identify]'` does that",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+        return None
+    drives = standard[known.positive]
+    return Consistency(
+        standard=standard,
+        train=_errors(samples.estimation, standard, deviation)[0],
+        held_out=_errors(held_out, standard, deviation)[0],
+        smallest_eigenvalues=physics.smallest_eigenvalues(known, standard),
+        unconstrained_eigenvalues=physics.smallest_eigenvalues(
+            known, physics.unconstrained(factor, known)
+        ),
+        bodies=known.names,
+        smallest_drive=float(drives.min()) if drives.size else np.inf,
+    )
+
+
+def _shown(part: SampleSet) -> tuple[FloatArray, FloatArray]:
+    """Times and measured torques of the first samples."""
+    times, torques, count = [], [], 0
+    for block in part.blocks():
+        if count >= _MOST_SHOWN or block.trajectory != 0:
+            break
+        times.append(block.time)
+        torques.append(block.tau)
+        count += block.time.size
+    return np.concatenate(times), np.concatenate(torques)
+
+
+def _predicted(part: SampleSet, standard: FloatArray) -> FloatArray:
+    torques, count = [], 0
+    for block in part.blocks():
+        if count >= _MOST_SHOWN or block.trajectory != 0:
+            break
+        torques.append((block.W @ standard).reshape(block.tau.shape))
+        count += block.time.size
+    return np.concatenate(torques)

@@ -1,0 +1,21 @@
+"""process-log: logs of the machine, made ready."""
+
+import warnings
+
+from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.identification.processing import processed
+from paramreduce_cli.records import MeasuredLog, Model, RawLogs
+
+
+def process_log(log: LogSection | None, model: Model, logs: RawLogs) -> MeasuredLog:
+    """Make logs ready: clean, low-pass, differentiate, and split them.
+
+    What was done to them, and what looks wrong in them, is part of the result.
+    """
+    if log is None:
+        raise ConfigError("is missing: it says where the logs are.", ("sampling", "log"))
+    found = processed(logs, log, model.mechanism.coordinate_names)
+    for text in found.doubts:
+        warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
+    return found

@@ -1,0 +1,73 @@
+"""Logs of a machine whose truth is known."""
+
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+from scipy.signal import lfilter
+
+from paramreduce_cli.config import load_config
+from paramreduce_cli.excitation.fourier import fourier_basis
+from paramreduce_cli.multibody.base_parameters import base_parameters
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.random_states import random_states
+
+CONFIG = Path(__file__).resolve().parents[1] / "configs" / "puma560_friction.yaml"
+RATE = 100.0
+SECONDS = 20.0
+
+
+@dataclass(frozen=True)
+class Simulated:
+    """States of a smooth motion and exact torques, with columns of the base parameters."""
+
+    names: tuple[str, ...]
+    time: np.ndarray
+    z: np.ndarray
+    dz: np.ndarray
+    ddz: np.ndarray
+    tau: np.ndarray
+    X: np.ndarray
+    """(n_samples, n_dof, r)"""
+    values: np.ndarray
+    """Of the base parameters, (r,)."""
+    kinds: tuple[str, ...]
+    """Of the base parameters."""
+
+
+@cache
+def _arm():
+    config = load_config(CONFIG)
+    mechanism = config.mechanism()
+    dynamics = Dynamics(mechanism)
+    K = dynamics.regressor(*random_states(mechanism, 300, np.random.default_rng(0)))
+    base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, 1e-9)
+    return mechanism, dynamics, base, config.parameter_values()
+
+
+def simulated(seed):
+    """A motion of the arm with friction in puma560_friction.yaml."""
+    mechanism, dynamics, base, values = _arm()
+    rng = np.random.default_rng(seed)
+    harmonics = 5
+    time = np.arange(0, SECONDS, 1 / RATE)
+    basis = fourier_basis(SECONDS / 2, harmonics, time)
+    series = rng.normal(size=(mechanism.n_dof, 1 + 2 * harmonics))
+    series[:, 0] *= 0.3
+    z, dz, ddz = basis.states(series * 0.6)
+    K = dynamics.regressor(z, dz, ddz)
+    others = np.setdiff1d(np.arange(values.size), base.columns)
+    return Simulated(
+        mechanism.coordinate_names, time, z, dz, ddz, K @ values, K[:, :, base.columns],
+        values[base.columns] + base.beta @ values[others],
+        tuple(mechanism.parameters[k].kind.symbol for k in base.columns),
+    )  # fmt: skip
+
+
+def coloured(shape, size, pole, seed):
+    """Noise that forgets as a first-order system does, of a size for each joint."""
+    rng = np.random.default_rng([seed, 1])
+    settled = 1000
+    noise = lfilter([1], [1, -pole], rng.normal(size=(shape[0] + settled, shape[1])), axis=0)
+    return noise[settled:] * np.sqrt(1 - pole**2) * size
