@@ -7,9 +7,10 @@ JOBS ?= $(shell nproc 2>/dev/null || echo 1)
 
 # The paper's two systems; and small cases of seconds, for trying things out.
 PAPER := puma560 hexaglide
+MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) test check format regression reference benchmark robots torture graph clean
+.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -17,6 +18,7 @@ help:
 	@echo "make hexaglide   the same on the 6-PUS Hexaglide, in a few minutes"
 	@echo "make all         both, and one table over them"
 	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr, delta"
+	@echo "make ur10        identify and reduce from a recording of the robot; also panda, tx40"
 	@echo "make test        run the tests"
 	@echo "make check       lint, format and types"
 	@echo "make regression  compare with the committed references"
@@ -38,6 +40,14 @@ $(VENV)/.installed-dev: $(VENV)/.installed
 $(PARAMREDUCE): $(VENV)/.installed
 
 $(PAPER) $(SMALL): $(VENV)/.installed
+	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
+
+# Physical consistency needs a solver of its own.
+$(VENV)/.installed-identify: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[identify]'
+	@touch $@
+
+$(MEASURED): $(VENV)/.installed-identify
 	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
 
 all: $(PAPER)
@@ -97,7 +107,7 @@ graph: $(VENV)/.installed
 	$(PARAMREDUCE) graph --format make > pipelines/stages.mk
 
 clean:
-	rm -rf $(VENV) $(PAPER:%=results/%) $(SMALL:%=results/%) results/regression
+	rm -rf $(VENV) $(PAPER:%=results/%) $(SMALL:%=results/%) $(MEASURED:%=results/%) results/regression
 
 PARAMREDUCE_READY := $(VENV)/.installed
 include pipelines/stages.mk

@@ -2,6 +2,7 @@
 
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.pipeline import Stage, pipeline
+from paramreduce_cli.records import Identification, MeasuredLog, Trajectories
 
 
 def make_rules() -> str:
@@ -15,10 +16,15 @@ def make_rules() -> str:
         "PARAMREDUCE_FLAGS ?=",
         "# What must be there before paramreduce can be called, such as an installation.",
         "PARAMREDUCE_READY ?=",
+        "# Files that there are for robots with a log only, or for those without.",
+        "has_log = $(shell grep -Es '^ +log:' $(CONFIGS)/$(1).yaml)",
+        "with_log = $(if $(call has_log,$(1)),$(2))",
+        "without_log = $(if $(call has_log,$(1)),,$(2))",
+        ".SECONDEXPANSION:",
     ]
     for stage in pipeline():
         target = f"$(RESULTS)/%/{file_of(stage.output)}"
-        needs = [f"$(RESULTS)/%/{file_of(entry.type)}" for entry in stage.artifacts]
+        needs = [_prerequisite(entry.type) for entry in stage.artifacts]
         lines += [
             "",
             f"{target}: {' '.join(['$(CONFIGS)/%.yaml', *needs])} | $(PARAMREDUCE_READY)",
@@ -26,6 +32,21 @@ def make_rules() -> str:
         ]
     kept = " ".join(f"$(RESULTS)/%/{file_of(stage.output)}" for stage in pipeline())
     return "\n".join([*lines, "", f".PRECIOUS: {kept}", ""])
+
+
+_CONDITIONS: dict[type, str] = {
+    MeasuredLog: "with_log",
+    Identification: "with_log",
+    Trajectories: "without_log",
+}
+"""Functions in the rules that say which robots have a file."""
+
+
+def _prerequisite(record: type) -> str:
+    path = f"$(RESULTS)/%/{file_of(record)}"
+    if record not in _CONDITIONS:
+        return path
+    return f"$$(call {_CONDITIONS[record]},$$*,{path.replace('%', '$$*')})"
 
 
 def outline() -> str:

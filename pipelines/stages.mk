@@ -6,6 +6,11 @@ RESULTS ?= results
 PARAMREDUCE_FLAGS ?=
 # What must be there before paramreduce can be called, such as an installation.
 PARAMREDUCE_READY ?=
+# Files that there are for robots with a log only, or for those without.
+has_log = $(shell grep -Es '^ +log:' $(CONFIGS)/$(1).yaml)
+with_log = $(if $(call has_log,$(1)),$(2))
+without_log = $(if $(call has_log,$(1)),,$(2))
+.SECONDEXPANSION:
 
 $(RESULTS)/%/model.h5: $(CONFIGS)/%.yaml | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) build-model $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
@@ -13,7 +18,10 @@ $(RESULTS)/%/model.h5: $(CONFIGS)/%.yaml | $(PARAMREDUCE_READY)
 $(RESULTS)/%/trajectories.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) optimize-trajectories $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-$(RESULTS)/%/samples.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 | $(PARAMREDUCE_READY)
+$(RESULTS)/%/log.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) process-log $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/samples.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $$(call without_log,$$*,$(RESULTS)/$$*/trajectories.h5) $$(call with_log,$$*,$(RESULTS)/$$*/log.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) sample $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
 $(RESULTS)/%/reduction.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 | $(PARAMREDUCE_READY)
@@ -22,7 +30,10 @@ $(RESULTS)/%/reduction.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/
 $(RESULTS)/%/validation.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) validate $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-$(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 | $(PARAMREDUCE_READY)
+$(RESULTS)/%/identification.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/validation.h5 | $(PARAMREDUCE_READY)
+	$(PARAMREDUCE) identify $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
+
+$(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $$(call without_log,$$*,$(RESULTS)/$$*/trajectories.h5) $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 $$(call with_log,$$*,$(RESULTS)/$$*/log.h5) $$(call with_log,$$*,$(RESULTS)/$$*/identification.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) report $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-.PRECIOUS: $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/report/summary.json
+.PRECIOUS: $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/log.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/identification.h5 $(RESULTS)/%/report/summary.json

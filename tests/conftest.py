@@ -10,6 +10,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, befor
 
 import numpy as np
 import pytest
+from simulated_logs import log_config, two_link_log, write_log
 
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
@@ -159,6 +160,25 @@ def two_link_results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("two_link")
     run_stages(folder)
     return folder
+
+
+@pytest.fixture(scope="session")
+def measured_results(tmp_path_factory):
+    """A finished run of the small case on a log; look, do not touch."""
+    folder = tmp_path_factory.mktemp("measured")
+    write_log(folder / "log.csv", two_link_log())
+    config = load_config(log_config(folder))
+    for stage in stages_to_run(config):
+        Runner(config, Store(folder / "results")).run(stage)
+    return folder
+
+
+@pytest.fixture
+def measured_copy(measured_results, tmp_path):
+    """A finished run on a log to do things to."""
+    copy = tmp_path / "measured"
+    shutil.copytree(measured_results, copy)
+    return copy
 
 
 @pytest.fixture

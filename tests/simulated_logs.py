@@ -71,3 +71,57 @@ def coloured(shape, size, pole, seed):
     settled = 1000
     noise = lfilter([1], [1, -pole], rng.normal(size=(shape[0] + settled, shape[1])), axis=0)
     return noise[settled:] * np.sqrt(1 - pole**2) * size
+
+
+TWO_LINK = CONFIG.with_name("two_link.yaml")
+FRICTION = {"upper": (0.8, 1.2, 0.3), "fore": (0.2, 0.5, -0.1)}
+"""Viscous, Coulomb and constant torques of the two-link arm, N m s/rad, N m, N m."""
+LOG_CONFIG = """
+drives:
+  all: {viscous: unknown, coulomb: unknown, offset: unknown}
+
+sampling:
+  log:
+    files: log.csv
+    torque_cutoff: 8
+    folds: 4
+
+reduction:
+  weighting: noise
+  heuristics: [forward-selection, essential]
+"""
+
+
+def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0):
+    """Columns of a log of the two-link arm with friction, by name."""
+    mechanism = load_config(TWO_LINK).mechanism()
+    values = load_config(TWO_LINK).parameter_values()
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, seconds, 1 / rate)
+    series = np.array([[0.0, 1.0, 0.6, -1.1, 0.4, 0.7, 0.9], [0.2, -0.8, 0.9, 1.2, -0.5, 0.9, 0.7]])
+    z, dz, ddz = fourier_basis(seconds / 2, 3, time).states(1.2 * series)
+    tau = Dynamics(mechanism, once=True).regressor(z, dz, ddz) @ values
+    for j, (viscous, coulomb, offset) in enumerate(FRICTION.values()):
+        tau[:, j] += viscous * dz[:, j] + coulomb * np.sign(dz[:, j]) + offset
+    tau += noise * rng.normal(size=tau.shape)
+    columns = {"t": time}
+    for name, values in (("q", z), ("dq", dz), ("tau", tau)):
+        columns |= {f"{name}{j + 1}": values[:, j] for j in range(2)}
+    return columns
+
+
+def write_log(path, columns):
+    """As CSV."""
+    table = np.column_stack(list(columns.values()))
+    np.savetxt(path, table, "%.9g", ",", header=",".join(columns), comments="")
+
+
+def log_config(folder, extra=""):
+    """A config of the two-link arm for a log.csv beside it; its path."""
+    text = TWO_LINK.read_text().replace(
+        "selected:\n  heuristic: forward-selection\n  n: 4", "selected:\n  cross_validation: true"
+    )
+    text = text.replace("  accept:\n    torque_error_validation: 0.05", "  stability: false")
+    path = folder / "arm.yaml"
+    path.write_text(text + LOG_CONFIG + extra)
+    return path

@@ -86,7 +86,10 @@ class LogSection(Section):
     """Added to the joint positions, rad (m)."""
     delay: Number = 0.0
     """By which torques were recorded later than positions, s."""
-    trim: Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=2, max_length=2)] = [0, 0]
+    trim: Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=2, max_length=2)] = [
+        0,
+        0,
+    ]
     """Seconds that are cut off at the start and at the end."""
     standstill: Literal["cut", "keep"] = "cut"
     """What becomes of the time before the first joint moves and after the last one stops."""

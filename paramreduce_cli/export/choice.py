@@ -1,23 +1,39 @@
 """Which model is exported, and what it is called."""
 
+from dataclasses import replace
+
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.records import Model, ModelChoice, ReducedModel, Reduction, Validation
+from paramreduce_cli.records import (
+    Identification,
+    Model,
+    ModelChoice,
+    ReducedModel,
+    Reduction,
+    Validation,
+)
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
 from paramreduce_cli.texts import EXACT, share
 
 FULL, BASE = "full", "base"
+IDENTIFIED, CONSISTENT = "identified", "consistent"
+"""From measured torques: all base parameters, and standard parameters that a machine can have."""
 
 
 def chosen_model(
-    text: str | None, model: Model, reduction: Reduction | None, validation: Validation | None
+    text: str | None,
+    model: Model,
+    reduction: Reduction | None,
+    validation: Validation | None,
+    identification: Identification | None = None,
 ) -> tuple[ReducedModel, str]:
     """The model that is asked for, and its title.
 
     Args:
-        text: ``full``, ``base`` or ``HEURISTIC:N``; None for the selected one.
+        text: ``full``, ``base``, ``identified``, ``consistent`` or ``HEURISTIC:N``; None for the selected one.
         model: Of the robot.
         reduction: Where reduced models are; not needed for ``full`` and ``base``.
         validation: Says which one is selected.
+        identification: Where identified models are; needed for these alone.
 
     Raises:
         ConfigError: There is none of that name.
@@ -26,6 +42,9 @@ def chosen_model(
         return full_model(model), "full model"
     if text == BASE:
         return base_model(model), "base parameters"
+    if text in (IDENTIFIED, CONSISTENT):
+        assert identification is not None
+        return _identified(text, model, identification)
     assert reduction is not None
     if text is None:
         assert validation is not None
@@ -34,8 +53,29 @@ def chosen_model(
         choice = ModelChoice.parse(text)
     row = choice.row(reduction)
     if row is None:
-        raise ConfigError(f"--model {text}: there is {FULL}, {BASE}, {known_choices(reduction)}.")
+        raise ConfigError(
+            f"--model {text}: there is {FULL}, {BASE}, {known_choices(reduction)}; with a log also "
+            f"{IDENTIFIED} and {CONSISTENT}."
+        )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {share(error)}"
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
     return reduced_model(reduction, choice.heuristic, row, model.values), title
+
+
+def _identified(
+    text: str, model: Model, identification: Identification
+) -> tuple[ReducedModel, str]:
+    if text == IDENTIFIED:
+        found = identification.full
+        chosen = base_model(model)
+        worth = f"identified base parameters, {share(found.held_out)} held out"
+        return replace(chosen, values=found.values), worth
+    consistency = identification.consistency
+    if consistency is None:
+        raise ConfigError(
+            f"--model {CONSISTENT}: identification.h5 holds none; set identification.consistency, or install "
+            "cvxpy with `pip install 'paramreduce[identify]'`, and run `paramreduce identify` again."
+        )
+    worth = f"physically consistent parameters, {share(consistency.held_out)} held out"
+    return full_model(replace(model, values=consistency.standard)), worth

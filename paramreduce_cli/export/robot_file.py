@@ -10,16 +10,7 @@ from paramreduce_cli.importing import mjcf_writing, urdf_writing
 from paramreduce_cli.importing.imported import Inertial, matrix
 from paramreduce_cli.importing.reading import imported, kind_of
 from paramreduce_cli.importing.simplified import SimplifiedRobot
-from paramreduce_cli.records import (
-    DRIVE,
-    INERTIAL,
-    FloatArray,
-    Kind,
-    Mechanism,
-    Model,
-    ReducedModel,
-)
-from paramreduce_cli.reduction.models import closest_standard
+from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, Kind, Mechanism, Model
 from paramreduce_cli.robots.drives import EFFECTS
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 from paramreduce_cli.robots.placement import transform
@@ -35,16 +26,13 @@ _SAME = 1e-9
 FORMATS = ("urdf", "mjcf")
 
 
-def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) -> dict[str, bytes]:
-    """The robot's own file with the parameters of a model.
-
-    A model is torques for base parameters, which many standard ones share: those are written that
-    are closest to the model's own.
+def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) -> dict[str, bytes]:
+    """The robot's own file with other parameters.
 
     Args:
         config: With the file that it was made from.
         model: Of the robot.
-        chosen: What is written.
+        standard: Standard parameters that are written, (n_parameters,).
         kind: One of :data:`FORMATS`, which the file must be of.
 
     Raises:
@@ -61,7 +49,6 @@ def robot_file(config: Config, model: Model, chosen: ReducedModel, kind: str) ->
         raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
     robot = imported(config.source)
     _check_same(config, config.source, robot, gravity=kind == "mjcf")
-    standard = closest_standard(model, chosen)
     bodies = _bodies(model.mechanism, standard)
     _remark(model.mechanism, standard, bodies, kind)
     inertials = {name: _inertial(name, body) for name, body in bodies.items()}

@@ -25,4 +25,6 @@ def compared(full: Estimate, reduced: Estimate) -> str:
     apart = f"{100 * mean:+.2g} ± {100 * error:.2g} % over {difference.size} parts left out in turn"
     if abs(mean) <= _SURE * error:
         return f"{text} The training data cannot tell them apart ({apart})."
-    return f"{text} The training data agree that it is {'better' if mean < 0 else 'worse'} ({apart})."
+    return (
+        f"{text} The training data agree that it is {'better' if mean < 0 else 'worse'} ({apart})."
+    )

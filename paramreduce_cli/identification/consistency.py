@@ -5,6 +5,7 @@ inequality; friction, rotor inertia and stiffness are positive. Among what the t
 those nearest to the known parameters are taken.
 """
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -15,7 +16,7 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, IntArray, Kind, Mechanism
 from paramreduce_cli.robots.inertia import pseudo_inertia
 
-_MARGIN = 1e-6
+_MARGIN = 1e-3
 """Smallest eigenvalue of a pseudo-inertia matrix in units of the body's size."""
 _UNKNOWN_MASS = 1.0
 """kg, where nothing is known."""
@@ -80,8 +81,8 @@ def _matrix(values: FloatArray) -> FloatArray:
 
 def smallest_eigenvalues(physical: Physical, values: FloatArray) -> FloatArray:
     """Of every body's pseudo-inertia matrix, (n_bodies,)."""
-    found: FloatArray = np.linalg.eigvalsh(pseudo_inertias(physical, values))[:, 0]
-    return found
+    found = np.linalg.eigvalsh(pseudo_inertias(physical, values))[:, 0]
+    return np.asarray(found, dtype=float)
 
 
 def unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
@@ -134,7 +135,9 @@ def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatAr
         cost += cp.sum_squares(x)
     problem = cp.Problem(cp.Minimize(cost), constraints)
     try:
-        problem.solve(solver=cp.CLARABEL)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", UserWarning)  # accuracy is seen from eigenvalues
+            problem.solve(solver=cp.CLARABEL)
     except cp.SolverError as error:
         raise DataError(f"no physically consistent parameters were found ({error}).") from error
     if x.value is None:

@@ -101,7 +101,7 @@ def robust_fit(
     Returns:
         The parameters, and the deviations of the bulk of the residuals.
     """
-    parameters = start
+    parameters: FloatArray = start
     measured = np.isfinite(deviation)
     for _ in range(_MOST_ROUNDS):
         left = np.concatenate([np.abs(tau - X @ parameters) for X, tau in make()])
@@ -113,7 +113,9 @@ def robust_fit(
             weight = np.sqrt(np.minimum(1.0, _TUNING / np.maximum(size, 1e-12))) / deviation
             stacked = np.concatenate([X, tau[..., None]], axis=2) * weight[..., None]
             factor = append_rows(factor, stacked.reshape(-1, start.size + 1))
-        found = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0]
+        found = np.asarray(
+            np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0], dtype=float
+        )
         change = np.linalg.norm(factor[:, :-1] @ (found - parameters))
         parameters = found
         if change <= _SETTLED * np.linalg.norm(factor[:, -1]):
@@ -187,9 +189,7 @@ class LinearFit:
                 for j in range(n_dof):
                     whole = autocovariance_of([e[:, j] for e in drawn])
                     lost[j] += (whole - autocovariance_of([e[:, j] for e in left])) / _DRAWS
-            models = [
-                coloured_noise(corrected(a, b), n) for a, b in zip(seen, lost, strict=True)
-            ]
+            models = [coloured_noise(corrected(a, b), n) for a, b in zip(seen, lost, strict=True)]
         return models
 
     def covariance(self) -> FloatArray:

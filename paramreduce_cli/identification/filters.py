@@ -60,9 +60,7 @@ def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
 def _continued(x: FloatArray, k: int) -> FloatArray:
     while k > 0:  # in steps where the filter is longer than the signal
         step = min(k, x.shape[0] - 1)
-        x = np.vstack(
-            [2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]],
-        )
+        x = np.vstack([2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]])
         k -= step
     return x
 
@@ -113,8 +111,6 @@ def band_of_motion(frequency: FloatArray, density: FloatArray) -> float:
     floor = np.median(density[upper], axis=0)
     highest = 0.0
     for above in (density > _ABOVE_FLOOR * floor).T:
-        ends = (
-            k for k in range(2, above.size - _IN_A_ROW) if not above[k : k + _IN_A_ROW].any()
-        )
+        ends = (k for k in range(2, above.size - _IN_A_ROW) if not above[k : k + _IN_A_ROW].any())
         highest = max(highest, float(frequency[next(ends, -1)]))
     return highest

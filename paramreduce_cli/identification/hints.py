@@ -73,9 +73,7 @@ def hints(
     suspects = list(_suspects(fitted, names, tilts, gravity))
     while len(found) < _MOST:
         judged = [
-            (*_judged(fitted, suspect), k)
-            for k, suspect in enumerate(suspects)
-            if k not in tried
+            (*_judged(fitted, suspect), k) for k, suspect in enumerate(suspects) if k not in tried
         ]
         good = [entry for entry in judged if _convincing(*entry[:3])]
         if not good:
@@ -114,7 +112,9 @@ def _judged(fitted: LinearFit, suspect: _Suspect) -> tuple[float, float, float]:
 def _with(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
     """The fit with one more column."""
     rows = fitted.rows
-    X = tuple(np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True))
+    X = tuple(
+        np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True)
+    )
     return weighted_fit(replace(rows, X=X), fitted.deviation)
 
 
@@ -139,10 +139,7 @@ def _alone(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
 
 
 def _suspects(
-    fitted: LinearFit,
-    names: Sequence[str],
-    tilts: Sequence[tuple[FloatArray, ...]],
-    gravity: float,
+    fitted: LinearFit, names: Sequence[str], tilts: Sequence[tuple[FloatArray, ...]], gravity: float
 ) -> Iterator[_Suspect]:
     rows = fitted.rows
     fastest = np.max([np.abs(v).max(axis=0) for v in rows.dz], axis=0)
@@ -154,7 +151,9 @@ def _suspects(
         signs = [np.sign(v) for v in rows.dz]
         smooth = [np.tanh(v / (_SMOOTH * fastest)) for v in rows.dz]
         constant = [np.ones_like(v) for v in rows.dz]
-        yield _Suspect(j, _alone(signs, j), _missing(name, "the sign of its speed", "N m", "coulomb"))
+        yield _Suspect(
+            j, _alone(signs, j), _missing(name, "the sign of its speed", "N m", "coulomb")
+        )
         yield _Suspect(j, _alone(smooth, j), _smoother(name, _SMOOTH * fastest[j]))
         yield _Suspect(j, _alone(rows.dz, j), _missing(name, "its speed", "N m s/rad", "viscous"))
         yield _Suspect(

@@ -125,14 +125,14 @@ def _read(
         except DataError as error:
             raise DataError(f"{log.source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
-        steps.append(
-            f"{log.source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz."
-        )
+        steps.append(f"{log.source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         if wanted.outliers == "replace":
             pieces, count = _without_outliers(pieces)
             if count:
-                steps.append(f"{count} outliers are replaced by what lies between their neighbours.")
+                steps.append(
+                    f"{count} outliers are replaced by what lies between their neighbours."
+                )
         if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
             raise DataError(
                 f"{log.source}: is recorded at {rate:.6g} Hz, {logs[0].source} at {rates[0]:.6g} Hz. Bring "
@@ -240,12 +240,8 @@ def _ready(piece: Signals, rate: float, cutoffs: _Cutoffs, thin: int) -> Signals
     """Low-passed, differentiated, thinned."""
     taps = filters.low_pass(cutoffs.state, rate)
     z = filters.filtered(piece.z, taps)
-    dz = (
-        filters.derivative(z, rate) if piece.dz is None else filters.filtered(piece.dz, taps)
-    )
-    ddz = (
-        filters.derivative(dz, rate) if piece.ddz is None else filters.filtered(piece.ddz, taps)
-    )
+    dz = filters.derivative(z, rate) if piece.dz is None else filters.filtered(piece.dz, taps)
+    ddz = filters.derivative(dz, rate) if piece.ddz is None else filters.filtered(piece.ddz, taps)
     tau = piece.tau
     if thin > 1 and np.isfinite(cutoffs.torque):
         tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
@@ -342,7 +338,11 @@ def _said_of_split(
 ) -> str:
     one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))
     cut = (learned.time.size + tested.time.size) / rate - one - two
-    how = "by file" if wanted.held_out_files else f"the last {100 * wanted.held_out:.3g} % of each file"
+    how = (
+        "by file"
+        if wanted.held_out_files
+        else f"the last {100 * wanted.held_out:.3g} % of each file"
+    )
     text = f"{one:.4g} s are learned from, in {wanted.folds} folds, {two:.4g} s held out ({how})"
     return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
 

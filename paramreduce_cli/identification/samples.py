@@ -9,13 +9,13 @@ import numpy as np
 
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.processing import UNUSED
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
     ObservedSet,
     StateBlock,
     joint_factors,
 )
-from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, FloatArray, IntArray, MeasuredLog, MeasuredMotions
 
 _STATES = ("time", "z", "dz", "ddz", "q", "dq", "ddq")
@@ -74,7 +74,9 @@ class LoggedSet:
             rows = self._rows(piece)
             for start in range(rows.start, rows.stop, BLOCK_SAMPLES):
                 part = slice(start, min(start + BLOCK_SAMPLES, rows.stop))
-                yield StateBlock(piece, m.time[part], m.z[part], m.dz[part], m.ddz[part], m.tau[part])
+                yield StateBlock(
+                    piece, m.time[part], m.z[part], m.dz[part], m.ddz[part], m.tau[part]
+                )
 
     def _low_passed(self, piece: int, blocks: Iterator[Block]) -> Iterator[Block]:
         """Blocks of the samples that are used; only what the low-pass still needs is held."""
@@ -108,9 +110,7 @@ class LoggedSet:
         else:
             W = filters.thinned_low_pass(W, first, self._taps, outputs)
             tau = filters.thinned_low_pass(tau, first, self._taps, outputs)
-        return Block(
-            trajectory=fold, tau=tau, W=W.reshape(outputs.size * n_dof, -1), **states
-        )
+        return Block(trajectory=fold, tau=tau, W=W.reshape(outputs.size * n_dof, -1), **states)
 
     def factors(self) -> FloatArray:
         """Triangular factors per fold and joint."""

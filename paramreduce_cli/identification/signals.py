@@ -1,5 +1,6 @@
 """Recorded columns as the signals of a robot's joints, in SI units, even in time; or what is wrong."""
 
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -43,7 +44,9 @@ class Signals:
 
     def part(self, rows: slice) -> "Signals":
         """Some of its samples."""
-        return Signals(*(None if a is None else a[rows] for a in vars(self).values()))
+        dz = None if self.dz is None else self.dz[rows]
+        ddz = None if self.ddz is None else self.ddz[rows]
+        return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows])
 
 
 def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
@@ -177,7 +180,7 @@ def evened(found: Signals) -> tuple[list[Signals], float, list[str]]:
     step = float(np.median(np.diff(found.time)))
     gaps = np.flatnonzero(np.diff(found.time) > _GAP * step)
     edges = [0, *(gaps + 1).tolist(), found.time.size]
-    pieces = [found.part(slice(a, b)) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    pieces = [found.part(slice(a, b)) for a, b in itertools.pairwise(edges)]
     kept = [piece for piece in pieces if piece.time.size >= _FEWEST]
     if not kept:
         raise DataError(
@@ -207,5 +210,6 @@ def _resampled(found: Signals, step: float) -> Signals:
         result: FloatArray = CubicSpline(found.time, values, axis=0)(time)
         return result
 
-    others = (None if a is None else at(a) for a in (found.dz, found.ddz))
-    return Signals(time, at(found.z), *others, at(found.tau))
+    dz = None if found.dz is None else at(found.dz)
+    ddz = None if found.ddz is None else at(found.ddz)
+    return Signals(time, at(found.z), dz, ddz, at(found.tau))

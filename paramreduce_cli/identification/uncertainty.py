@@ -79,7 +79,9 @@ def coloured_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
     for order in (k for k in _ORDERS if k <= most):
         coefficients = np.zeros(0)
         if order and autocovariance[0] > 0:
-            coefficients = linalg.solve_toeplitz(autocovariance[:order], autocovariance[1 : order + 1])
+            coefficients = linalg.solve_toeplitz(
+                autocovariance[:order], autocovariance[1 : order + 1]
+            )
         variance = float(autocovariance[0] - coefficients @ autocovariance[1 : order + 1])
         variance = max(variance, 1e-12 * float(autocovariance[0]), 1e-300)
         criterion = n * np.log(variance) + 2 * order

@@ -10,6 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from paramreduce_cli.config.log_template import LOG_DRIVES, LOG_JUDGEMENT
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.config.template import JUDGEMENT
 from paramreduce_cli.importing.angles import angle_text, number_text
@@ -30,15 +31,19 @@ _RANGE = {
 """Where it has none of the position, rad or m."""
 
 
-def config_text(robot: SimplifiedRobot, source: SourceSection) -> str:
+def config_text(robot: SimplifiedRobot, source: SourceSection, log: str = "") -> str:
     """The config of a robot.
 
     Args:
         robot: With names that configs allow.
         source: Where it comes from, the file relative to the folder that the config is for.
+        log: Its section for logs of the machine, which tell friction and rotors.
     """
-    parts = [_head(robot), _source(source), _description(robot), _parameters(robot), _drives(robot)]
-    parts += [_limits(robot), JUDGEMENT]
+    parts = [_head(robot), _source(source), _description(robot), _parameters(robot)]
+    if log:
+        parts += [LOG_DRIVES, _limits(robot), log, LOG_JUDGEMENT]
+    else:
+        parts += [_drives(robot), _limits(robot), JUDGEMENT]
     return "\n".join(parts)
 
 

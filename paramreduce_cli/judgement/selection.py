@@ -13,13 +13,7 @@ from paramreduce_cli.judgement.picking import (
     proven_necessary,
     smallest_within,
 )
-from paramreduce_cli.records import (
-    CrossValidation,
-    HeuristicValidation,
-    Model,
-    Reduction,
-    Selected,
-)
+from paramreduce_cli.records import CrossValidation, HeuristicValidation, Model, Reduction, Selected
 from paramreduce_cli.reduction.models import reduced_model
 from paramreduce_cli.texts import share
 
@@ -78,11 +72,11 @@ def _cross_validated(
     assert row is not None  # only sizes of the heuristic itself are judged
     own = found[choice.heuristic]
     best = min(found.values(), key=lambda r: float(r.mean.min()))
-    k, least = own.row(choice.n), int(best.mean.argmin())
+    least = int(best.mean.argmin())
     folds = own.torque_error.shape[0]
     reason = (
         f"{choice.heuristic} with n = {choice.n}: with each of {folds} parts left out in turn its torque error "
-        f"there is {share(own.mean[k])}, within one standard error ({share(best.standard_error[least])}) of "
+        f"there is {share(float(own.mean[own.n == choice.n][0]))}, within one standard error ({share(best.standard_error[least])}) of "
         f"the best, {share(best.mean[least])} with n = {best.n[least]}."
     )
     return choice.heuristic, row, reason

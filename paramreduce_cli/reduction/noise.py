@@ -22,9 +22,7 @@ def least_squares(factor: FloatArray) -> FloatArray:
     return solution
 
 
-def residual_deviation(
-    factors: FloatArray, parameters: FloatArray, n_samples: int
-) -> FloatArray:
+def residual_deviation(factors: FloatArray, parameters: FloatArray, n_samples: int) -> FloatArray:
     """Root mean squares of each joint's residuals, (n_dof,).
 
     Args:

@@ -8,6 +8,8 @@ import numpy as np
 from paramreduce_cli.records import (
     Block,
     FloatArray,
+    Identification,
+    MeasuredLog,
     Model,
     ReducedModel,
     Reduction,
@@ -49,6 +51,10 @@ class ReportData:
     skeletons: tuple[Skeleton, ...]
     tracking: Tracking | None
     """Where it was asked for."""
+    log: MeasuredLog | None
+    """Where there is one."""
+    identification: Identification | None
+    """Where torques were measured."""
 
 
 def first_motion(

@@ -12,6 +12,15 @@ class PageSection(Enum):
     """A heading and what is said under it, a template over the summary ``s``; in this order."""
 
     ANSWER = ("", "")
+    IDENTIFICATION = (
+        "What the measurements say",
+        "Measured torques of the part that was held out: nothing was learned from it, nor the number of "
+        "parameters chosen by it. Standard deviations are for noise as coloured as the residuals.",
+    )
+    LOG = (
+        "The log",
+        "What was recorded, and what became of it before anything was learned from it.",
+    )
     SELECTED = (
         "The selected model",
         "Each parameter below stands for itself and takes over a share of those that were dropped.",

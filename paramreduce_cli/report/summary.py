@@ -8,6 +8,7 @@ import numpy as np
 from paramreduce_cli.records import (
     About,
     HeuristicValidation,
+    Identification,
     IntArray,
     Model,
     ModelChoice,
@@ -25,6 +26,7 @@ def summary_of(
     trajectories: Trajectories | None,
     reduction: Reduction,
     validation: Validation,
+    identification: Identification | None,
     provenance: Provenance,
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite ones become None."""
@@ -52,6 +54,7 @@ def summary_of(
         },
         "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
+        "identification": _identification(identification),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,
@@ -120,6 +123,37 @@ def _stability(reduction: Reduction, validation: Validation) -> dict[str, Any] |
         "variants": [str(variant) for variant in found.variants],
         "torque_error": found.torque_error,
         "share_chosen": {reduction.columns.names[k]: often[k] for k in np.flatnonzero(often)},
+    }
+
+
+def _identification(found: Identification | None) -> dict[str, Any] | None:
+    if found is None:
+        return None
+    consistency = found.consistency
+    full, reduced = (
+        {
+            "n": len(estimate.names),
+            "train": estimate.train,
+            "held_out": estimate.held_out,
+            "joint_held_out": estimate.joint_held_out,
+            "folds": estimate.folds,
+            "values": dict(zip(estimate.names, estimate.values, strict=True)),
+            "deviations": dict(zip(estimate.names, estimate.deviations, strict=True)),
+        }
+        for estimate in (found.full, found.reduced)
+    )
+    physical = consistency and {
+        "train": consistency.train,
+        "held_out": consistency.held_out,
+        "bodies_positive": consistency.positive,
+    }
+    return {
+        "estimator": found.estimator,
+        "full": full,
+        "reduced": reduced,
+        "consistent": physical,
+        "comparison": found.comparison,
+        "hints": list(found.hints),
     }
 
 

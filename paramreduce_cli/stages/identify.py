@@ -34,10 +34,7 @@ _ACROSS = 1e-6
 
 
 def identify(
-    identification: IdentificationSection,
-    model: Model,
-    samples: Samples,
-    validation: Validation,
+    identification: IdentificationSection, model: Model, samples: Samples, validation: Validation
 ) -> Identification:
     """Identify base parameters and those of the selected model, with standard deviations.
 
@@ -96,9 +93,7 @@ def _estimate(
     values = least_squares(combined_factor(factors, deviation))
     if wanted.estimator == "robust":
         values, deviation = robust_fit(
-            lambda: (
-                ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau) for b in training.blocks()
-            ),
+            lambda: (((b.W @ columns).reshape(*b.tau.shape, -1), b.tau) for b in training.blocks()),
             values,
             deviation,
         )
@@ -119,7 +114,9 @@ def _estimate(
     return estimate, fitted
 
 
-def _errors(part: SampleSet, standard: FloatArray, deviation: FloatArray) -> tuple[float, FloatArray]:
+def _errors(
+    part: SampleSet, standard: FloatArray, deviation: FloatArray
+) -> tuple[float, FloatArray]:
     """Error of all joints together, and root mean squares joint by joint."""
     measured = np.isfinite(deviation)
     left, whole = np.zeros(measured.size), np.zeros(measured.size)
@@ -139,26 +136,24 @@ def _folds(factors: FloatArray, deviation: FloatArray) -> FloatArray:
         values = least_squares(combined_factor(np.delete(factors, k, axis=0), deviation))
         own = factors[k, measured]
         left = own[..., -1] - own[..., :-1] @ values
-        found.append(np.linalg.norm(left) / max(np.linalg.norm(own[..., -1]), 1e-300))
+        found.append(np.linalg.norm(left) / (np.linalg.norm(own[..., -1]) or 1.0))
     return np.array(found)
 
 
 def _sizes(part: SampleSet) -> FloatArray:
     """Root mean squares of the torques, (n_dof,)."""
-    total: FloatArray = np.sqrt(
-        sum(np.sum(block.tau**2, axis=0) for block in part.blocks()) / part.n_samples
-    )
-    return np.where(total > 0, total, 1.0)
+    total = np.sum([np.sum(block.tau**2, axis=0) for block in part.blocks()], axis=0)
+    return np.where(total > 0, np.sqrt(total / part.n_samples), 1.0)
 
 
-def _tilts(
-    model: Model, training: SampleSet, fitted: LinearFit
-) -> list[tuple[FloatArray, ...]]:
+def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[FloatArray, ...]]:
     """Torques of gravity along the base's level axes, of the known masses, where there are any."""
     mechanism = model.mechanism
     level = np.abs(mechanism.gravity) <= _ACROSS * np.linalg.norm(mechanism.gravity)
-    if not level[:2].all() or not np.any(model.values) or len(fitted.rows.X) != len(
-        {block.trajectory for block in training.blocks()}
+    if (
+        not level[:2].all()
+        or not np.any(model.values)
+        or len(fitted.rows.X) != len({block.trajectory for block in training.blocks()})
     ):
         return []
     found = []

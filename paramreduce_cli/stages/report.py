@@ -9,6 +9,8 @@ from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
     FloatArray,
+    Identification,
+    MeasuredLog,
     Model,
     Provenance,
     Reduction,
@@ -38,6 +40,8 @@ def report(
     samples: Samples,
     reduction: Reduction,
     validation: Validation,
+    log: MeasuredLog | None,
+    identification: Identification | None,
     provenance: Provenance,
 ) -> Report:
     """Draw the figures, set the tables and write the page and summary.json."""
@@ -58,8 +62,10 @@ def report(
         motion=motion,
         skeletons=tuple(skeleton(model, q) for q in _shown_poses(section, model, motion)),
         tracking=_tracking(section, model, selected, motion),
+        log=log,
+        identification=identification,
     )
-    summary = summary_of(model, trajectories, reduction, validation, provenance)
+    summary = summary_of(model, trajectories, reduction, validation, identification, provenance)
     files: dict[str, bytes] = {}
     images = {}
     formats = [str(name) for name in section.formats]

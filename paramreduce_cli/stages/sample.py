@@ -12,8 +12,8 @@ from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
-from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import (

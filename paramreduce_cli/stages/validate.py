@@ -252,7 +252,9 @@ def _cross_validation(
         if not method.by_torque:
             continue
 
-        def select(other: SelectionProblem, heuristic: str = method.heuristic) -> Sequence[IntArray]:
+        def select(
+            other: SelectionProblem, heuristic: str = method.heuristic
+        ) -> Sequence[IntArray]:
             task = SelectionTask(TorqueObjective(other), reduction.rank, effort=quick)
             sizes = set(reduction.heuristics[heuristic].n.tolist())
             return [s for s in run_heuristic(heuristic, task).subsets if s.size in sizes]

@@ -17,7 +17,16 @@ from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import Mechanism, Model, Reduction, Samples, Trajectories, Validation
+from paramreduce_cli.records import (
+    Identification,
+    MeasuredLog,
+    Mechanism,
+    Model,
+    Reduction,
+    Samples,
+    Trajectories,
+    Validation,
+)
 
 VERSIONS = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
 STAMP = Stamp(SCHEMA, "arm", "build-model", VERSIONS, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)
@@ -142,8 +151,11 @@ DAMAGES = {
 
 @pytest.mark.parametrize("damage", list(DAMAGES))
 @pytest.mark.parametrize("record", list(LAYOUTS))
-def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy):
-    path = Store(two_link_copy).path(record)
+def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy, request):
+    folder = two_link_copy
+    if record in (MeasuredLog, Identification):
+        folder = request.getfixturevalue("measured_copy") / "results"
+    path = Store(folder).path(record)
     DAMAGES[damage](path)
     with pytest.raises(ArtifactError, match=path.name):
         load_file(path, record, "two_link", "make-it")

@@ -11,13 +11,21 @@ from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.export.choice import BASE, FULL, chosen_model
+from paramreduce_cli.export.choice import BASE, CONSISTENT, FULL, IDENTIFIED, chosen_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
 from paramreduce_cli.pipeline import maker_of
-from paramreduce_cli.records import Model, Reduction, Validation
+from paramreduce_cli.records import (
+    FloatArray,
+    Identification,
+    Model,
+    ReducedModel,
+    Reduction,
+    Validation,
+)
+from paramreduce_cli.reduction.models import closest_standard
 from paramreduce_cli.runner import Runner
 
 
@@ -34,7 +42,10 @@ from paramreduce_cli.runner import Runner
     help="Inverse dynamics, direct dynamics [M | delta], both, or the regressor.",
 )  # fmt: skip
 @click.option(
-    "--model", "text", metavar="HEURISTIC:N", help="Or full, or base.  [default: the selected one]"
+    "--model",
+    "text",
+    metavar="HEURISTIC:N",
+    help="Or full, or base; with a log also identified, or consistent.  [default: the selected one]",
 )
 @click.option("--constants", is_flag=True, help="Put the parameters' values into the code.")
 @click.option("--single", is_flag=True, help="Single precision, in C.")
@@ -67,16 +78,22 @@ def export(
     if kind in FORMATS and (what != Exported.BOTH or constants):
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
     records: list[type] = [Model]
-    if text not in (FULL, BASE):
+    if text in (IDENTIFIED, CONSISTENT):
+        records.append(Identification)
+    elif text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
     loading = {record: _loaded(loaded, store, record) for record in records}
     chosen, title = chosen_model(
-        text, loading[Model], loading.get(Reduction), loading.get(Validation)
+        text,
+        loading[Model],
+        loading.get(Reduction),
+        loading.get(Validation),
+        loading.get(Identification),
     )
     stamp = store.stamp(records[-1])
     folder = output or store.folder / "export" / kind
     if kind in FORMATS:
-        files = robot_file(loaded, loading[Model], chosen, kind)
+        files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:
         files = exported(
             loading[Model],
@@ -90,6 +107,18 @@ def export(
         )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")
+
+
+def _standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) -> FloatArray:
+    """Standard parameters for a robot's file.
+
+    A model is torques for base parameters, which many standard ones share: those closest to the
+    robot's own, but for consistent ones, which are what they are.
+    """
+    if text == CONSISTENT:
+        consistent: FloatArray = loading[Identification].consistency.standard
+        return consistent
+    return closest_standard(loading[Model], chosen)
 
 
 def _loaded(config: Config, store: Store, record: type) -> Any:

@@ -3,12 +3,14 @@
 import os
 import re
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
 
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.loading import load_config
+from paramreduce_cli.config.log_template import guessed_columns, log_text
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.config.template import (
     dh_template,
@@ -47,17 +49,20 @@ _FARTHEST = 1e6
               help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
 @click.option("--floating", is_flag=True, help="The root moves freely.")
 @click.option("--uncouple", is_flag=True, help="Joints that follow others move on their own.")
+@click.option("--log", "logs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="A log of the machine to identify from; may be repeated.")  # fmt: skip
 @click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
 def init(
     source: str | None, kind: str | None, joints: int, root: str | None, tip: str | None,
-    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool, output: Path | None,
+    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool,
+    logs: tuple[Path, ...], output: Path | None,
 ) -> None:  # fmt: skip
     """Write a commented config: from a URDF or MJCF, or with --dh, --tree, --loop or --recorded one to be filled in.
 
     Of a file links that cannot move against each other become one body, rounded angles are taken
     for what they were, limits and inertias are taken over. The config is the robot from then on.
 
-    Example: paramreduce init robot.urdf --output configs/robot.yaml
+    Example: paramreduce init robot.urdf --log recording.csv --output configs/robot.yaml
     """
     if source is None:
         raise ConfigError(
@@ -70,14 +75,15 @@ def init(
         ignored=list(ignored), floating=floating, uncoupled=uncouple,
     )  # fmt: skip
     if kind is not None:
-        if choice != SourceSection(file=choice.file):
+        if logs or choice != SourceSection(file=choice.file):
             raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
         path = output or Path("configs") / f"{source}.yaml"
         text = _described(source, kind, joints)
     else:
         robot = imported(choice)
         path = output or Path("configs") / f"{robot.name}.yaml"
-        text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}))
+        log = _log(path, logs, robot.independent) if logs else ""
+        text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
         for remark in robot.remarks:
             say(f"- {remark}.")
     if path.exists():
@@ -90,6 +96,17 @@ def init(
         raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
     todo = "Fill in what is marked TODO, then: " if "TODO" in text else ""
     say(f"Wrote {path}. {todo}paramreduce run {path}")
+
+
+def _log(config: Path, logs: Sequence[Path], joints: Sequence[str]) -> str:
+    """The section for logs, with columns by their usual names."""
+    from paramreduce_cli.artifacts.log_files import load_log  # late: HDF5 and NumPy
+
+    columns = guessed_columns(list(load_log(logs[0]).columns), joints)
+    for key, value in columns.items():
+        shown = value if isinstance(value, str) else ", ".join(value)
+        say(f"- {key}: {shown}.")
+    return log_text([_from(config, path) for path in logs], columns)
 
 
 def _from(config: Path, file: Path) -> Path:

@@ -110,8 +110,15 @@ def _say_summary(summary: dict[str, Any]) -> None:
                 table.add_row(name, *_summary_cells(row))
     full = summary["full"]
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
-    table.add_row("full model", "", "", "", "", *operations)
+    found = summary["identification"]
+    table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
     out.print(table, width=max(out.width, _TABLE_WIDTH))
+    if found is not None:
+        say(found["comparison"])
+        if found["consistent"] is not None:
+            say(
+                f"Physically consistent parameters: {share(found['consistent']['held_out'])} held out"
+            )
 
 
 def _summary_cells(row: dict[str, Any]) -> list[str]:

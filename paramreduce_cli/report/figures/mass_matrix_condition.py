@@ -30,7 +30,8 @@ def mass_matrix_condition(data: ReportData) -> Figure:
             )  # fmt: skip
     full = data.validation.full["mass_matrix_condition"]
     axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
-    axes.annotate("full model", (1.0, full), xycoords=("axes fraction", "data"), ha="right",
+    name = "full model" if data.identification is None else "values of the config"
+    axes.annotate(name, (1.0, full), xycoords=("axes fraction", "data"), ha="right",
                   va="bottom", fontsize=8, color="#57606a")  # fmt: skip
     axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
     mark_selected(axes, data)

@@ -10,7 +10,8 @@ from paramreduce_cli.report.style import joint_label, joint_style
 
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
-    """Normalised torques of the full and of the selected model along the validation trajectory."""
+    """Torques, full or measured, and those of the selected model over the nominal ones, along the validation set."""
+    label = "full" if data.identification is None else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
     n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1
@@ -19,7 +20,7 @@ def torques(data: ReportData) -> Figure:
     grid = np.atleast_1d(drawn.subplots(rows, columns, sharex=True)).ravel()
     for axes, j in zip(grid, measured, strict=False):
         colour, _ = joint_style(j)
-        axes.plot(data.motion.time, data.motion.full[:, j], color=colour, label="full")
+        axes.plot(data.motion.time, data.motion.full[:, j], color=colour, label=label)
         axes.plot(
             data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=(0, (3, 2)),
             linewidth=1.1, label=f"n = {data.validation.selected.n}",

@@ -1,0 +1,91 @@
+"""The command that says what a log is good for."""
+
+from pathlib import Path
+
+import click
+import rich.box
+import rich.table
+
+from paramreduce_cli.cli.options import SET
+from paramreduce_cli.cli.terminal import out, remark, say
+from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.config.log_template import guessed_columns
+from paramreduce_cli.config.logs import ColumnsSection, LogSection
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.texts import share
+
+_MOST_JOINTS = 60
+_MOST_SHOWN = 12
+_TABLE_WIDTH = 100
+
+
+@click.command("check-data")
+@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("config", type=click.Path(path_type=Path, dir_okay=False), required=False)
+@SET
+def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:
+    """Say what a log is good for: rate, gaps, noise, and with a CONFIG how well it excites the robot.
+
+    Columns are those of the config's log, or found by their usual names.
+
+    Example: paramreduce check-data recording.csv configs/ur10.yaml
+    """
+    # Late: these load all numerics.
+    from paramreduce_cli.artifacts.log_files import load_log
+    from paramreduce_cli.identification.processing import processed
+    from paramreduce_cli.identification.quality import quality
+    from paramreduce_cli.records import RawLogs
+
+    loaded = load_config(config, overrides) if config is not None else None
+    raw = load_log(file)
+    names = list(raw.columns)
+    mechanism = None if loaded is None else loaded.mechanism()
+    joints = _joints(names) if mechanism is None else list(mechanism.coordinate_names)
+    section = None if loaded is None else loaded.sampling.log
+    if section is None:
+        columns = ColumnsSection(**guessed_columns(names, joints))  # type: ignore[arg-type]
+        section = LogSection(files=[file], columns=columns)
+    section = section.model_copy(update={"held_out_files": []})
+    with placed_errors(config, overrides):
+        log = processed(RawLogs((raw,), ()), section, joints)
+        found = None if mechanism is None else quality(mechanism, log)
+    for text in log.steps:
+        say(text)
+    table = rich.table.Table(box=rich.box.SIMPLE)
+    for heading in ("joint", "range", "fastest", "torque, rms", "noise", "noise / torque"):
+        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    m = log.training
+    for j, name in enumerate(joints):
+        rms = float((m.tau[:, j] ** 2).mean() ** 0.5)
+        z = m.z[:, j]
+        table.add_row(
+            name, f"{z.min():.3g} ... {z.max():.3g}", f"{abs(m.dz[:, j]).max():.3g}", f"{rms:.3g}",
+            f"{log.noise[j]:.2g}", share(float(log.noise[j]) / rms if rms else None),
+        )  # fmt: skip
+    out.print(table, width=max(out.width, _TABLE_WIDTH))
+    if found is not None:
+        say(
+            f"Excitation: rank {found.rank} of {found.n_base} base parameters, kappa {found.condition:.4g} with "
+            "columns of unit length."
+        )
+        if found.weak:
+            more = ", ..." if len(found.weak) > _MOST_SHOWN else ""
+            remark(
+                f"{len(found.weak)} can hardly be told from the others: "
+                f"{', '.join(found.weak[:_MOST_SHOWN])}{more}"
+            )
+    for text in log.doubts:
+        remark(text.rstrip("."))
+
+
+def _joints(names: list[str]) -> list[str]:
+    """Joints by number, as many as the columns speak of."""
+    for n in range(_MOST_JOINTS, 0, -1):
+        joints = [f"q{k + 1}" for k in range(n)]
+        try:
+            guessed_columns(names, joints)
+        except ConfigError:
+            continue
+        return joints
+    guessed_columns(names, ["q1"])  # says what is missing
+    raise AssertionError

@@ -1,0 +1,124 @@
+"""The part of a config that is for logs, with a guess of what is where in them."""
+
+import json
+import re
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from paramreduce_cli.config.logs import NUMBER
+from paramreduce_cli.errors import ConfigError
+
+_WORDS = {
+    "position": ("q", "pos", "position", "positions", "z", "theta", "actual_q", "joint_position", "qm"),
+    "velocity": ("dq", "qd", "qdot", "v", "vel", "velocity", "velocities", "dz", "actual_qd", "omega"),
+    "acceleration": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "ddz"),
+    "torque": (
+        "tau", "torque", "torques", "effort", "efforts", "taum", "current", "actual_current", "i", "moment",
+    ),
+}  # fmt: skip
+_TIMES = ("t", "time", "timestamp", "stamp", "time_s", "seconds")
+_NEEDED = ("position", "torque")
+
+
+def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
+    """Names of the columns of time, positions, speeds, accelerations and torques, as far as there are.
+
+    Joints are numbered from 0 or 1, or stand in the names of columns themselves.
+
+    Args:
+        names: Of all columns.
+        joints: Names of the coordinates.
+
+    Raises:
+        ConfigError: Time, positions or torques are not among them by any usual name.
+    """
+    found: dict[str, str | list[str]] = {}
+    times = [name for name in names if _plain(name) in _TIMES]
+    times += [name for name in names if _plain(name.rpartition("/")[2]) in _TIMES]
+    for key, words in _WORDS.items():
+        columns = _numbered(names, words, len(joints)) or _by_joint(names, words, joints)
+        if columns is not None:
+            found[key] = columns
+    missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
+    if missing:
+        raise ConfigError(
+            f"no columns for {' and '.join(missing)} of {len(joints)} joints by any usual name among "
+            f"{', '.join(names[:30])}. Write sampling.log.columns by hand."
+        )
+    return {"time": times[0], **found}
+
+
+def _plain(name: str) -> str:
+    return name.strip().strip("/").lower()
+
+
+def _numbered(names: Sequence[str], words: Iterable[str], n: int) -> str | list[str] | None:
+    """A pattern where joints count from 1, a list where from 0; None if there are none."""
+    known = set(names)
+    stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
+    for stem in sorted(stems):
+        word = _plain(re.split(r"[/.]", stem.rstrip("_./"))[-1])
+        if word not in words and not any(word.endswith(f"_{w}") for w in words if len(w) > 2):
+            continue
+        for form in (f"{stem}{NUMBER}", f"{stem}[{NUMBER}]"):
+            if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
+                return form
+            listed = [form.replace(NUMBER, str(j)) for j in range(n)]
+            if all(name in known for name in listed):
+                return listed
+    return None
+
+
+def _by_joint(
+    names: Sequence[str], words: Iterable[str], joints: Sequence[str]
+) -> list[str] | None:
+    found = []
+    for joint in joints:
+        for name in names:
+            rest = [part.lower() for part in re.split(r"[/.]", name.replace(joint, "")) if part]
+            if joint in name and any(part.strip("_") in words for part in rest):
+                found.append(name)
+                break
+    return found if len(found) == len(joints) else None
+
+
+LOG_DRIVES = """\
+drives:
+  # Friction and rotors, whose values the log tells: a number, or unknown if yet to be found. Coulomb friction goes as
+  # tanh(speed / smoothing), rad/s (m/s); without smoothing as the sign. Leave out what your sensors do not see: torque
+  # sensors behind the gears see no rotors.
+  all: {inertia: unknown, viscous: unknown, coulomb: unknown, offset: unknown, smoothing: 0.05}
+"""
+
+LOG_JUDGEMENT = """\
+reduction:
+  weighting: noise              # each joint by the noise that a fit of all parameters leaves
+  heuristics: [forward-selection, essential, swap, best-subset]
+  best_subset: {time_limit: 10} # s
+
+selected:
+  heuristic: swap
+  cross_validation: true        # the smallest model that the training data cannot tell from the best
+"""
+
+
+def log_text(files: Iterable[Path], columns: dict[str, str | list[str]]) -> str:
+    """The section ``sampling`` of a config for logs.
+
+    Args:
+        files: As the config names them.
+        columns: What is where in them.
+    """
+    listed = ", ".join(json.dumps(str(path)) for path in files)
+    shown = "".join(f"      {key}: {json.dumps(value)}\n" for key, value in columns.items())
+    return (
+        "sampling:\n"
+        "  log:\n"
+        "    # As recorded; rad, rad/s, rad/s^2, N m, s unless `units` says otherwise. Motors instead of joints: `transmission`,\n"
+        "    # `torque_constants`, `signs`, `offsets`.\n"
+        f"    files: [{listed}]\n"
+        "    held_out: 0.4               # the last share of every file, which nothing is learned from\n"
+        f"    columns:\n{shown}"
+        "    state_cutoff: auto          # Hz, of positions and speeds; auto is from the spectrum\n"
+        "    torque_cutoff: auto         # Hz, of torques and model alike; none leaves torques as recorded\n"
+    )

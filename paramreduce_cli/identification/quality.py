@@ -1,0 +1,72 @@
+"""What a log is good for: how many parameters its motion tells, and which it does not."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.identification.samples import LoggedSet
+from paramreduce_cli.multibody.base_parameters import base_parameters
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.observation import combined_factor
+from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.records import FloatArray, MeasuredLog, Mechanism
+
+_STATES = 200
+"""Random states on which the base parameters are found."""
+_RANK_TOLERANCE = 1e-9
+_TELLING = 0.02
+"""Share of a column's length that the others must leave for its parameter to be told from them."""
+_DEPENDENT = 1e-6
+
+
+@dataclass(frozen=True)
+class LogQuality:
+    """How well a log excites a robot."""
+
+    n_base: int
+    """Base parameters that motions can tell."""
+    rank: int
+    """Those that this one does, noise apart."""
+    condition: float
+    """Of the observation matrix of the base parameters with columns of unit length."""
+    weak: tuple[str, ...]
+    """Base parameters that can hardly be told from the others."""
+
+
+def quality(mechanism: Mechanism, log: MeasuredLog) -> LogQuality:
+    """How well the part of a log to learn from excites a robot's base parameters.
+
+    Args:
+        mechanism: The robot.
+        log: Made ready.
+    """
+    dynamics = Dynamics(mechanism, once=True)
+    states = random_states(mechanism, _STATES, np.random.default_rng(0))
+    K = dynamics.regressor(*states)
+    base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE)
+    factors = LoggedSet(log.training, log, dynamics, "training part").factors()
+    scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))
+    scale = np.where(scale > 0, scale, np.inf)
+    W = combined_factor(factors, scale)[:, base.columns]
+    lengths = np.linalg.norm(W, axis=0)
+    X = W / np.where(lengths > 0, lengths, 1.0)
+    sizes = np.linalg.svd(X, compute_uv=False)
+    rank = int(np.sum(sizes > _DEPENDENT * sizes[0]))
+    names = [mechanism.parameter_names[k] for k in base.columns]
+    left = _independent_shares(X, lengths)
+    order = np.argsort(left)
+    return LogQuality(
+        n_base=base.columns.size,
+        rank=rank,
+        condition=float(sizes[0] / sizes[-1]) if rank == sizes.size else np.inf,
+        weak=tuple(names[k] for k in order if left[k] < _TELLING),
+    )
+
+
+def _independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
+    """What of each column of unit length the others leave, (n,)."""
+    inverse = np.linalg.pinv(X.T @ X, rcond=_DEPENDENT**2, hermitian=True)
+    diagonal = np.diag(inverse)
+    hidden = 1 - np.diag(inverse @ (X.T @ X))  # columns that others make up altogether
+    shares = np.where(diagonal > 0, 1 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
+    return np.where((lengths > 0) & (np.abs(hidden) < 1e-3), np.minimum(shares, 1.0), 0.0)

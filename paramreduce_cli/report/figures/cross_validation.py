@@ -1,0 +1,44 @@
+"""How many parameters the data can tell."""
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import WIDE, mark_selected
+
+_OVER_BEST = 4.0
+"""Largest error shown, times the smallest."""
+
+
+@placed(PageSection.IDENTIFICATION, 1)
+def cross_validation(data: ReportData) -> Figure | None:
+    """Torque error against the number of parameters where the selection was learned, on parts left out in turn (with one standard error), and held out."""
+    crossed = data.validation.cross_validation
+    if crossed is None:
+        return None
+    name = data.validation.selected.heuristic
+    result, own = data.validation.heuristics[name], crossed[name]
+    drawn = Figure(figsize=WIDE)
+    axes = drawn.subplots()
+    axes.plot(result.n, 100 * result.torque_error_estimation, color="#7d8590", label="learned from")
+    axes.errorbar(
+        own.n, 100 * own.mean, 100 * own.standard_error, color="#0b62c4", capsize=2, linewidth=1.2,
+        label="parts left out in turn",
+    )  # fmt: skip
+    axes.plot(result.n, 100 * result.torque_error_validation, color="#d9730d", label="held out")
+    k = int(own.mean.argmin())
+    limit = 100 * float(own.mean[k] + own.standard_error[k])
+    axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")
+    if data.log is not None:
+        floor = 100 * data.log.noise_share
+        axes.annotate(
+            f"noise above the band of the model: {floor:.2g} % of the torques as recorded", (0.98, 0.97),
+            xycoords="axes fraction", ha="right", va="top", fontsize=8, color="#57606a",
+        )  # fmt: skip
+    best = 100 * float(own.mean.min())
+    axes.set_ylim(0, _OVER_BEST * best)
+    mark_selected(axes, data)
+    axes.set_xlabel(f"number of parameters n ({name})")
+    axes.set_ylabel(r"$\varepsilon_\tau$, %")
+    axes.legend(fontsize=8, loc="upper center")
+    return drawn

@@ -1,0 +1,40 @@
+"""Measured torques of the held-out part beside those of two models."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import joint_label, joint_style
+
+
+@placed(PageSection.IDENTIFICATION, 2)
+def measured_torques(data: ReportData) -> Figure | None:
+    """Held out: measured torques and those of the reduced model (left), residuals of both models (right), N m (N)."""
+    found = data.identification
+    if found is None:
+        return None
+    joints = np.flatnonzero(np.isfinite(found.torque_deviation)).tolist()
+    drawn = Figure(figsize=(7.2, 1.25 * len(joints) + 0.6))
+    grid = drawn.subplots(len(joints), 2, sharex=True, squeeze=False)
+    n, m = len(found.reduced.names), len(found.full.names)
+    for (left, right), j in zip(grid, joints, strict=True):
+        colour, _ = joint_style(j)
+        measured = found.shown_measured[:, j]
+        left.plot(found.shown_time, measured, color=colour, linewidth=1.0, label="measured")
+        left.plot(found.shown_time, found.shown_reduced[:, j], color="#111", linewidth=0.9,
+                  linestyle=(0, (3, 2)), label=f"n = {n}")  # fmt: skip
+        for values, line_colour, label in (
+            (found.shown_full, "#b9c2cc", f"all {m}"),
+            (found.shown_reduced, "#111", f"n = {n}"),
+        ):
+            right.plot(found.shown_time, measured - values[:, j], color=line_colour, linewidth=0.8,
+                       label=label)  # fmt: skip
+        left.set_ylabel(f"τ  {joint_label(data, j)}", fontsize=7)
+        for axes in (left, right):
+            axes.tick_params(labelsize=7)
+    for axes in grid[0]:
+        axes.legend(fontsize=7, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+    for axes in grid[-1]:
+        axes.set_xlabel("t (s)")
+    return drawn

@@ -1,0 +1,19 @@
+"""What residuals suggest."""
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.IDENTIFICATION, 0)
+def hints(data: ReportData) -> Table:
+    """How the reduced model stands against all base parameters, and what the residuals suggest, the strongest first."""
+    found = data.identification
+    rows: list[tuple[str, str]] = []
+    if found is not None:
+        rows = [("comparison", found.comparison), *(("hint", text) for text in found.hints)]
+        if found.consistency is not None:
+            verdict = "can exist" if found.consistency.positive else "do not all exist"
+            text = f"{100 * found.consistency.held_out:.3g} % held out"
+            rows.append(("physical", f"Bodies and drives of the physical fit {verdict}; {text}."))
+    return Table("What the measurements say", ("", "what"), tuple(rows))

@@ -1,0 +1,44 @@
+"""Errors of measured torques, joint by joint."""
+
+import math
+
+import numpy as np
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts import share
+
+
+@placed(PageSection.IDENTIFICATION, 3)
+def identified_errors(data: ReportData) -> Table:
+    """Held-out errors joint by joint, root mean squares in N m (N), as shares of the torques and of the nominal torque, which may be the limit; correlation of a residual with the one before, and white samples that would tell as much of a constant."""
+    found = data.identification
+    header = (
+        "joint", "noise", "all, N m", "reduced, N m", "of torques", "of nominal", "lag-1", "eff. samples",
+    )  # fmt: skip
+    rows = []
+    if found is not None:
+        nominal = data.model.nominal_torque if data.model.nominal_torque_given else None
+        for j, name in enumerate(data.model.mechanism.coordinate_names):
+            if not math.isfinite(found.torque_deviation[j]):
+                continue
+            error = float(found.reduced.joint_held_out[j])
+            rows.append(
+                (
+                    name,
+                    "-" if data.log is None else f"{data.log.noise[j]:.3g}",
+                    f"{found.full.joint_held_out[j]:.3g}",
+                    f"{error:.3g}",
+                    share(error / float(found.torque_size[j])),
+                    "-" if nominal is None else share(error / float(nominal[j])),
+                    f"{found.residuals.lag_one[j]:.2f}",
+                    f"{found.residuals.effective_samples[j]:.0f}",
+                )
+            )
+        worst = f"{np.nanmax(found.reduced.joint_held_out):.3g}"
+        rows.append(
+            ("all", "", share(found.full.held_out), share(found.reduced.held_out), f"worst {worst}",
+             "", "", "")
+        )  # fmt: skip
+    return Table("Errors on measured torques", header, tuple(rows))

@@ -1,0 +1,28 @@
+"""Identified base parameters."""
+
+import numpy as np
+
+from paramreduce_cli.records import Estimate
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.IDENTIFICATION, 5, tall=True)
+def identified_parameters(data: ReportData) -> Table:
+    """Values, standard deviations and relative ones of the reduced model, then of all base parameters."""
+    found = data.identification
+    rows: list[tuple[str, ...]] = []
+    if found is not None:
+        rows = [*_rows("reduced", found.reduced), *_rows("all", found.full)]
+    header = ("model", "parameter", "value", "std. dev.", "relative, %")
+    return Table("Identified parameters", header, tuple(rows))
+
+
+def _rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
+    relative = 100 * estimate.deviations / np.maximum(np.abs(estimate.values), 1e-300)
+    cells = zip(estimate.names, estimate.values, estimate.deviations, relative, strict=True)
+    return [
+        (model, name, f"{value:.6g}", f"{deviation:.2g}", f"{percent:.2g}")
+        for name, value, deviation, percent in cells
+    ]

@@ -1,0 +1,14 @@
+"""What was done to the log."""
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.table import Table
+
+
+@placed(PageSection.LOG, 1)
+def log_steps(data: ReportData) -> Table:
+    """What was done to the log, and what looks wrong in it."""
+    log = data.log
+    rows = [] if log is None else [("done", text) for text in log.steps]
+    rows += [] if log is None else [("doubt", text) for text in log.doubts]
+    return Table("The log", ("", "what"), tuple(rows))
