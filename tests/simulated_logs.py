@@ -125,3 +125,16 @@ def log_config(folder, extra=""):
     path = folder / "arm.yaml"
     path.write_text(text + LOG_CONFIG + extra)
     return path
+
+
+def tilt_torques(seed):
+    """Torques of gravity of one m/s^2 along x and y of the arm's base in the motion of a seed."""
+    from dataclasses import replace
+
+    mechanism, _, _, values = _arm()
+    log = simulated(seed)
+    still = np.zeros_like(log.z)
+    return [
+        Dynamics(replace(mechanism, gravity=axis)).regressor(log.z, still, still) @ values
+        for axis in np.eye(3)[:2]
+    ]

@@ -84,6 +84,10 @@ def hints(
         if text is None:
             continue
         found.append(text)
+        if (
+            suspects[k].joint is None
+        ):  # all joints are wrong in it, and what else is seen follows from that
+            break
         fitted = _with(fitted, suspects[k].signal)
     return found
 

@@ -28,6 +28,8 @@ _WINDOW = 7
 """Neighbours that tell an outlier."""
 _FAR = 12.0
 """Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
+_SMALL = 0.02
+"""Share of a signal's own deviation that its noise is taken for at least."""
 _TO_SIGMA = 1.4826
 """Median absolute deviation to standard deviation of normal noise."""
 _STILL = 0.01
@@ -159,20 +161,24 @@ def _without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
             values = getattr(piece, key).copy()
             for column in values.T:
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
-                sigma = _TO_SIGMA * float(np.median(away))
-                # A signal that hardly ever leaves its median is one of few levels, not of outliers.
-                if sigma == 0:
-                    continue
-                far = away > _FAR * sigma
-                steep = np.abs(np.gradient(column)) * _WINDOW
-                far &= away > steep  # a turn or a step of the signal itself is none
-                if far.any() and far.mean() < 0.01:
+                # In smooth signals every peak is far from its neighbours, but never by much.
+                sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
+                far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
+                if far.any():
                     count += int(far.sum())
                     good = np.flatnonzero(~far)
                     column[far] = np.interp(np.flatnonzero(far), good, column[good])
             changed[key] = values
         cleaned.append(replace(piece, **changed))
     return cleaned, count
+
+
+def _alone(column: FloatArray, least: float) -> np.ndarray:
+    """Samples that stick out from both neighbours to one side; a step's samples do not."""
+    before = np.diff(column, prepend=column[:1])
+    after = -np.diff(column, append=column[-1:])
+    found: np.ndarray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
+    return found
 
 
 def _speeds(piece: Signals, rate: float) -> FloatArray:

@@ -42,8 +42,8 @@ def sample(
     sampling: SamplingSection,
     model: Model,
     trajectories: Trajectories | None,
-    log: MeasuredLog | None,
     recordings: Recordings,
+    log: MeasuredLog | None = None,
 ) -> Samples:
     """Sample both sets: states, torques and observation matrices.
 

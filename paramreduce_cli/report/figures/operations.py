@@ -15,7 +15,7 @@ from paramreduce_cli.report.style import (
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
-    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: the full model."""
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters."""
     drawn = Figure(figsize=WIDE)
     axes = drawn.subplots()
     for name, result in data.validation.heuristics.items():

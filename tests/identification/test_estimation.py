@@ -1,0 +1,158 @@
+import re
+
+import numpy as np
+import pytest
+from simulated_logs import RATE, coloured, simulated
+
+from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit
+from paramreduce_cli.identification.hints import hints, weighted_fit
+from paramreduce_cli.identification.uncertainty import ColouredNoise, score_covariance
+
+
+def rows_of(log, tau, X=None):
+    return Rows((log.X if X is None else X,), (tau,), (log.dz,), (log.ddz,), 1 / RATE, 1.0)
+
+
+def fitted(log, tau, X=None):
+    """Weighted by what is left, as a user would have it."""
+    rows, deviation = rows_of(log, tau, X), np.std(tau, axis=0)
+    for _ in range(4):
+        left = weighted_fit(rows, deviation).residuals[0]
+        deviation = np.maximum(np.std(left, axis=0), 1e-9)
+    return weighted_fit(rows, deviation)
+
+
+def test_exact_torques_give_exact_values():
+    log = simulated(0)
+    found = weighted_fit(rows_of(log, log.tau), np.std(log.tau, axis=0))
+    assert np.allclose(
+        found.parameters, log.values, rtol=1e-7, atol=1e-8 * np.abs(log.values).max()
+    )
+
+
+def test_the_covariance_of_scores_by_brute_force():
+    """X' V X with the Toeplitz matrix of an autoregressive process written out."""
+    rng = np.random.default_rng(0)
+    X, pole, weights = rng.normal(size=(60, 2, 3)), 0.7, np.array([2.0, 0.5])
+    noise = [ColouredNoise(np.array([pole]), 1.5), ColouredNoise(np.zeros(0), 0.3)]
+    lags = np.abs(np.subtract.outer(np.arange(60), np.arange(60)))
+    V = [1.5 / (1 - pole**2) * pole**lags, 0.3 * np.eye(60)]
+    expected = sum(weights[j] ** 2 * X[:, j].T @ V[j] @ X[:, j] for j in range(2))
+    assert np.allclose(score_covariance([X], noise, weights), expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+def test_intervals_hold_the_truth(pole):
+    """Of few logs; `make benchmark` does it with two hundred."""
+    hits = []
+    for seed in range(12):
+        log = simulated(seed)
+        tau = log.tau + coloured(log.tau.shape, 0.05 * np.std(log.tau, axis=0), pole, seed)
+        found = fitted(log, tau)
+        deviations = np.sqrt(np.diag(found.covariance()))
+        hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
+    assert 0.90 < np.mean(hits) < 0.985
+
+
+def test_deviations_for_white_noise_would_be_far_too_small():
+    log = simulated(3)
+    size = 0.05 * np.std(log.tau, axis=0)
+    found = fitted(log, log.tau + coloured(log.tau.shape, size, 0.9, 3))
+    X = (log.X / found.deviation[:, None]).reshape(-1, log.X.shape[2])
+    white = np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
+    assert np.median(np.sqrt(np.diag(found.covariance())) / white) > 2
+    assert np.all(found.judged_residuals(log.time.size).white < 1e-6)
+
+
+def test_white_residuals_are_called_white():
+    log = simulated(4)
+    size = 0.05 * np.std(log.tau, axis=0)
+    found = fitted(log, log.tau + coloured(log.tau.shape, size, 0.0, 4))
+    judged = found.judged_residuals(log.time.size)
+    assert np.all(judged.white > 1e-3)
+    assert np.allclose(judged.deviation, size, rtol=0.1)
+
+
+def test_robust_values_withstand_outliers():
+    log = simulated(5)
+    rng = np.random.default_rng(5)
+    size = 0.02 * np.std(log.tau, axis=0)
+    tau = log.tau + size * rng.normal(size=log.tau.shape)
+    bad = rng.random(tau.shape) < 0.05
+    tau += bad * 60 * size * rng.normal(size=tau.shape)
+    plain = fitted(log, tau)
+    values, _ = robust_fit(lambda: [(log.X, tau)], plain.parameters, plain.deviation)
+    scale = np.linalg.norm(log.X.reshape(-1, log.X.shape[2]), axis=0)
+
+    def miss(found):
+        return np.linalg.norm(scale * (found - log.values))
+
+    assert miss(values) < 0.3 * miss(plain.parameters)
+
+
+def test_joints_without_torques_do_not_count():
+    log = simulated(6)
+    deviation = np.std(log.tau, axis=0)
+    deviation[2] = np.inf
+    tau = log.tau.copy()
+    tau[:, 2] = 0.0
+    found = LinearFit(
+        rows_of(log, tau), weighted_fit(rows_of(log, tau), deviation).parameters, deviation
+    )
+    assert np.isnan(found.judged_residuals(10).deviation[2])
+    assert np.all(np.isfinite(np.diag(found.covariance())))
+
+
+def late(log, seconds):
+    return np.column_stack([np.interp(log.time - seconds, log.time, t) for t in log.tau.T])
+
+
+def flipped(log, joint):
+    tau = log.tau.copy()
+    tau[:, joint] *= -1
+    return tau
+
+
+def scaled(log, joint, gain):
+    tau = log.tau.copy()
+    tau[:, joint] *= gain
+    return tau
+
+
+CASES = {
+    "delay": (lambda log: late(log, 0.01), None, r"Torques come (9|10|11)\S* ms later"),
+    "sign": (lambda log: flipped(log, 1), None, "torque_signs"),
+    "gain": (lambda log: scaled(log, 1, 1.2), None, r"z_2 are 1\.(1[5-9]|2)"),
+    "coulomb": (None, "fc", "coulomb is missing"),
+    "viscous": (None, "fv", "viscous is missing"),
+    "inertia": (None, "Ia", "inertia is missing"),
+}
+
+
+@pytest.mark.parametrize("case", list(CASES))
+@pytest.mark.parametrize("seed", [0, 1])
+def test_hints(case, seed):
+    change, left_out, said = CASES[case]
+    log = simulated(seed)
+    tau = log.tau if change is None else change(log)
+    tau = tau + coloured(tau.shape, 0.03 * np.std(log.tau, axis=0), 0.9, seed)
+    X = log.X if left_out is None else log.X[:, :, [kind != left_out for kind in log.kinds]]
+    assert any(re.search(said, text) for text in hints(fitted(log, tau, X), log.names))
+
+
+@pytest.mark.parametrize("pole", [0.0, 0.9])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_no_hints_where_nothing_is_wrong(pole, seed):
+    log = simulated(seed)
+    tau = log.tau + coloured(log.tau.shape, 0.03 * np.std(log.tau, axis=0), pole, seed)
+    assert hints(fitted(log, tau), log.names) == []
+
+
+def test_gravity_that_is_tilted_is_suspected():
+    log = simulated(2)
+    from simulated_logs import tilt_torques
+
+    tilts = tilt_torques(2)
+    tau = log.tau + 0.5 * tilts[0] + coloured(log.tau.shape, 0.02 * np.std(log.tau, axis=0), 0.5, 2)
+    found = hints(fitted(log, tau), log.names, [(t,) for t in tilts])
+    assert any("Gravity seems to have 0.5" in text and "along x" in text for text in found)

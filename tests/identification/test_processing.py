@@ -1,0 +1,143 @@
+import numpy as np
+import pytest
+from simulated_logs import two_link_log
+
+from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.identification.processing import UNUSED, processed
+from paramreduce_cli.records import RawLog, RawLogs
+
+NAMES = ("upper", "fore")
+COLUMNS = {"velocity": "dq{}"}
+
+
+def made(log, held_out=None, **keys):
+    logs = RawLogs((RawLog("log.csv", log, 2),), () if held_out is None else (held_out,))
+    keys.setdefault("columns", COLUMNS)
+    return processed(logs, LogSection(files=["log.csv"], **keys), NAMES)
+
+
+def used(motions):
+    return motions.time[motions.fold != UNUSED]
+
+
+def test_the_last_share_is_held_out_and_folds_are_equal_parts_in_time():
+    found = made(two_link_log(), folds=4)
+    learned, tested = used(found.training), used(found.held_out)
+    assert learned.max() < tested.min()
+    assert tested.size == pytest.approx(0.4 * (learned.size + tested.size), abs=2)
+    sizes = np.bincount(found.training.fold[found.training.fold != UNUSED])
+    assert sizes.size == 4
+    assert np.ptp(sizes) <= 1
+
+
+def test_nothing_is_learned_from_what_is_held_out():
+    """Another end of the log changes nothing in what is learned from, but near the border."""
+    one, two = two_link_log(), two_link_log()
+    border = int(0.6 * one["t"].size)
+    for key in ("q1", "tau2", "dq1"):
+        two[key] = two[key].copy()
+        two[key][border + 40 :] += 0.3
+    a, b = (made(log, state_cutoff=20, torque_cutoff=8).training for log in (one, two))
+    for key in ("z", "dz", "tau"):
+        assert np.array_equal(getattr(a, key)[:-80], getattr(b, key)[:-80])
+    assert a.time.size == b.time.size
+
+
+def test_held_out_files():
+    other = RawLog("other.csv", two_link_log(seed=1), 2)
+    found = made(two_link_log(), other, held_out_files=["other.csv"])
+    assert np.count_nonzero(found.training.fold != UNUSED) == found.training.time.size
+    assert any("by file" in step for step in found.steps)
+
+
+def test_another_rate_of_a_held_out_file_is_refused():
+    other = RawLog("other.csv", two_link_log(rate=100.0), 2)
+    with pytest.raises(DataError, match=r"other\.csv: is recorded at 100 Hz, log\.csv at 200 Hz"):
+        made(two_link_log(), other, held_out_files=["other.csv"])
+
+
+def test_standstill_is_cut_but_serves_filters():
+    log = two_link_log()
+    still = 200
+    held = {
+        key: np.concatenate([np.full(still, values[0] if key.startswith("q") else 0.0), values])
+        for key, values in log.items()
+    }
+    held["t"] = np.arange(held["q1"].size) / 200.0
+    found = made(held, state_cutoff=20, torque_cutoff=8)
+    assert used(found.training).min() == pytest.approx(still / 200, abs=0.06)
+    assert found.training.time.min() == 0
+    assert used(made(held, standstill="keep").training).min() == 0
+
+
+def test_derivatives_without_recorded_speeds():
+    log = {key: values for key, values in two_link_log(noise=0.0).items() if "dq" not in key}
+    exact = two_link_log(noise=0.0)
+    found = made(log, columns={}, state_cutoff=20)
+    m = found.training
+    inner = slice(100, -100)
+    truth = np.interp(m.time, exact["t"], exact["dq1"])
+    assert np.abs(m.dz[inner, 0] - truth[inner]).max() < 1e-3 * np.abs(truth).max()
+    slope = np.gradient(exact["dq1"], exact["t"])
+    assert (
+        np.abs(m.ddz[inner, 0] - np.interp(m.time, exact["t"], slope)[inner]).max()
+        < 0.01 * np.abs(slope).max()
+    )
+
+
+def test_single_outliers_are_replaced():
+    log, clean = two_link_log(), two_link_log()
+    log["tau1"] = log["tau1"].copy()
+    log["tau1"][[300, 700, 1500]] += 40
+    found, usual = made(log, torque_cutoff="none"), made(clean, torque_cutoff="none")
+    assert any("3 outliers" in step for step in found.steps)
+    assert np.abs(found.training.tau - usual.training.tau).max() < 1.5
+    kept = made(log, torque_cutoff="none", outliers="keep")
+    assert np.abs(kept.training.tau - usual.training.tau).max() > 30
+
+
+def test_steps_of_friction_are_no_outliers():
+    assert not any("outliers" in step for step in made(two_link_log()).steps)
+
+
+def test_a_delay_is_taken_back():
+    log = two_link_log(noise=0.0)
+    late = log | {f"tau{j}": np.interp(log["t"] - 0.02, log["t"], log[f"tau{j}"]) for j in (1, 2)}
+    found, usual = made(late, delay=0.02, torque_cutoff="none"), made(log, torque_cutoff="none")
+    error = np.abs(found.training.tau - usual.training.tau)[20:-20]
+    assert np.median(error) < 1e-6
+
+
+def test_a_cutoff_above_half_the_rate_is_refused():
+    with pytest.raises(ConfigError, match=r"is 150 Hz, but the log is recorded at 200 Hz"):
+        made(two_link_log(), state_cutoff=150)
+
+
+def test_noise_is_what_lies_above_the_band():
+    found = made(two_link_log(noise=0.5), state_cutoff=10, torque_cutoff=10)
+    # White noise of which a tenth of the band passes the low-pass.
+    assert found.noise == pytest.approx([0.5 * np.sqrt(0.9)] * 2, rel=0.15)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda log: log | {"q1": np.degrees(log["q1"]) * 1, "dq1": log["dq1"]}, "degrees"),
+        (lambda log: log | {"dq2": -log["dq2"]}, "fore has the other sign"),
+        (lambda log: log | {"dq1": log["dq2"], "dq2": log["dq1"]}, "columns swapped"),
+        (lambda log: log | {"dq1": np.degrees(log["dq1"])}, "is it in degrees"),
+        (lambda log: log | {"tau1": np.clip(log["tau1"], -5, 5)}, "at a limit"),
+        (lambda log: log | {"tau2": np.zeros_like(log["t"])}, "is constant"),
+        (
+            lambda log: log | {"q2": np.zeros_like(log["t"]), "dq2": np.zeros_like(log["t"])},
+            "never moves",
+        ),
+    ],
+)
+def test_doubts(change, said):
+    assert any(said in text for text in made(change(two_link_log())).doubts)
+
+
+def test_no_doubts_of_a_good_log():
+    assert made(two_link_log()).doubts == ()

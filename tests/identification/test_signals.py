@@ -1,0 +1,187 @@
+import gzip
+
+import h5py
+import numpy as np
+import pytest
+from simulated_logs import two_link_log, write_log
+
+from paramreduce_cli.artifacts.log_files import load_log
+from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
+from paramreduce_cli.identification.signals import evened, signals
+from paramreduce_cli.records import RawLog
+
+NAMES = ("upper", "fore")
+LOG = two_link_log(seconds=2.0)
+
+
+def section(**keys):
+    return LogSection(files=["log.csv"], **keys)
+
+
+def raw(**changed):
+    return RawLog("log.csv", {**LOG, **changed}, 2)
+
+
+def as_csv(path):
+    write_log(path, LOG)
+
+
+def as_gz(path):
+    write_log(path.with_suffix(""), LOG)
+    path.write_bytes(gzip.compress(path.with_suffix("").read_bytes()))
+
+
+def as_hdf5(path):
+    with h5py.File(path, "w") as file:
+        for name, values in LOG.items():
+            file[name] = values
+
+
+def as_matrices(path):
+    matrices = {
+        key: np.column_stack([LOG[f"{key}1"], LOG[f"{key}2"]]) for key in ("q", "dq", "tau")
+    }
+    np.savez(path, t=LOG["t"], **matrices)
+
+
+@pytest.mark.parametrize(
+    ("name", "write"),
+    [("log.csv", as_csv), ("log.csv.gz", as_gz), ("log.h5", as_hdf5), ("log.npz", as_matrices)],
+)
+def test_all_formats_hold_the_same(name, write, tmp_path):
+    write(tmp_path / name)
+    found = load_log(tmp_path / name).columns
+    assert set(found) == set(LOG)
+    assert all(np.allclose(found[key], LOG[key], rtol=1e-8, atol=1e-12) for key in LOG)
+
+
+def test_joint_states_of_a_bag(tmp_path):
+    """Joints come in another order than in the robot, as they do in bags."""
+    pytest.importorskip("rosbags")
+    from rosbags.rosbag2 import Writer
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    State, Header = (
+        store.types[f"{kind}"] for kind in ("sensor_msgs/msg/JointState", "std_msgs/msg/Header")
+    )
+    Time = store.types["builtin_interfaces/msg/Time"]
+    with Writer(tmp_path / "bag", version=9) as writer:
+        connection = writer.add_connection("/joint_states", State.__msgtype__, typestore=store)
+        for k, t in enumerate(LOG["t"]):
+            stamp = round(1e9 * (t + 1000))
+            header = Header(Time(stamp // 10**9, stamp % 10**9), "")
+            rows = [np.array([LOG[f"{key}2"][k], LOG[f"{key}1"][k]]) for key in ("q", "dq", "tau")]
+            message = State(header, ["fore", "upper"], *rows)
+            writer.write(connection, stamp, store.serialize_cdr(message, State.__msgtype__))
+    log = load_log(tmp_path / "bag")
+    columns = {
+        "time": "/joint_states/time",
+        "position": "/joint_states/position/{name}",
+        "velocity": "/joint_states/velocity/{name}",
+        "torque": "/joint_states/effort/{name}",
+    }
+    found = signals(log, section(columns=columns), NAMES)
+    assert np.allclose(found.time, LOG["t"], atol=1e-6)
+    assert np.allclose(found.z[:, 0], LOG["q1"])
+    assert np.allclose(found.tau[:, 1], LOG["tau2"])
+
+
+@pytest.mark.parametrize("name", ["log.npz", "log.h5", "log.csv", "log.db3"])
+@pytest.mark.parametrize("content", [b"", b"nonsense", None])
+def test_files_that_are_no_logs(name, content, tmp_path):
+    if name.endswith("db3"):
+        pytest.importorskip("rosbags")
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises((ArtifactError, DataError), match=name):
+        signals(load_log(tmp_path / name), section(), NAMES)
+
+
+def test_units_signs_offsets_motors():
+    """From what the motors would have recorded, in other units, back to the joints."""
+    N = np.array([[50.0, 0.0], [20.0, 40.0]])
+    q = np.column_stack([LOG["q1"] - 0.1, LOG["q2"] + 0.2])
+    tau = np.column_stack([LOG["tau1"], LOG["tau2"]])
+    motors, currents = q @ N.T, tau @ np.linalg.inv(N) / [0.5, 0.25]
+    sign = np.array([1, -1])
+    recorded = {"t": 1e3 * LOG["t"]}
+    recorded |= {f"q{j + 1}": np.degrees(motors[:, j] * sign[j]) for j in range(2)}
+    recorded |= {f"tau{j + 1}": 1e3 * currents[:, j] * sign[j] for j in range(2)}
+    wanted = section(
+        units={"time": "ms", "position": "deg", "torque": "mA"},
+        torque_constants=[0.5, 0.25], signs=[1, -1], transmission=N.tolist(), offsets=[0.1, -0.2],
+    )  # fmt: skip
+    found = signals(RawLog("log.csv", recorded, 2), wanted, NAMES)
+    assert np.allclose(found.time, LOG["t"])
+    assert np.allclose(found.z, np.column_stack([LOG["q1"], LOG["q2"]]))
+    assert np.allclose(found.tau, tau)
+
+
+def swapped_rows(values):
+    values = values.copy()
+    values[[100, 101]] = values[[101, 100]]
+    return values
+
+
+def with_at(values, row, value):
+    values = values.copy()
+    values[row] = value
+    return values
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"t": swapped_rows(LOG["t"])}, r"log\.csv, line 103, column t: time goes back"),
+        ({"t": with_at(LOG["t"], 7, LOG["t"][6])}, r"line 9, column t: time stands still"),
+        ({"q2": with_at(LOG["q2"], 50, np.nan)}, r"line 52, column q2: is not a finite number"),
+        ({"tau1": with_at(LOG["tau1"], 3, np.inf)}, r"line 5, column tau1"),
+        ({"q3": LOG["q1"]}, r"column q3, but the robot has 2 joints"),
+    ],
+)
+def test_what_cannot_be_is_said_with_row_and_column(changes, said):
+    with pytest.raises(DataError, match=said):
+        signals(raw(**changes), section(), NAMES)
+
+
+def test_missing_columns_are_listed():
+    with pytest.raises(DataError, match=r"no column tau1; there are t, q1.*sampling\.log\.columns"):
+        signals(RawLog("x", {k: v for k, v in LOG.items() if "tau" not in k}, 2), section(), NAMES)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"transmission": [[1, 2], [2, 4]]}, "has no inverse"),
+        ({"transmission": [1, 2, 3]}, "3 ratios for 2 joints"),
+        ({"offsets": [1, 2, 3]}, "has 3 values for 2 joints"),
+        ({"columns": {"position": ["q1", "q2", "q1"]}}, "names 3 columns for 2 joints"),
+    ],
+)
+def test_settings_that_do_not_fit_the_robot(keys, said):
+    with pytest.raises(ConfigError, match=said):
+        signals(raw(), section(**keys), NAMES)
+
+
+def test_uneven_time_is_resampled():
+    """Onto what the true motion is at even times."""
+    rng = np.random.default_rng(0)
+    time = np.sort(LOG["t"] + 0.001 * rng.uniform(-1, 1, LOG["t"].size))
+    uneven = {key: np.interp(time, LOG["t"], values) for key, values in LOG.items()} | {"t": time}
+    uneven["q1"] = np.sin(3 * time)
+    pieces, rate, said = evened(signals(RawLog("x", uneven, 2), section(), NAMES))
+    assert len(pieces) == 1
+    assert rate == pytest.approx(200, rel=0.01)
+    assert "resampled" in said[0]
+    assert np.allclose(np.diff(pieces[0].time), 1 / rate)
+    assert np.abs(pieces[0].z[:, 0] - np.sin(3 * pieces[0].time)).max() < 1e-6
+
+
+def test_gaps_part_a_log():
+    kept = np.r_[0:150, 230:390]
+    log = RawLog("x", {key: values[kept] for key, values in LOG.items()}, 2)
+    pieces, _, said = evened(signals(log, section(), NAMES))
+    assert [piece.time.size for piece in pieces] == [150, 160]
+    assert "1 gaps in time, the longest of 0.405 s" in said[0]

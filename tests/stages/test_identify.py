@@ -1,0 +1,165 @@
+"""The stages on a log of the two-link arm with friction, whose truth is known."""
+
+import json
+
+import h5py
+import numpy as np
+import pytest
+from simulated_logs import FRICTION, log_config, two_link_log, write_log
+
+from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.config import load_config
+from paramreduce_cli.records import Identification, Samples, Validation
+
+
+@pytest.fixture(scope="module")
+def identification(measured_results):
+    path = Store(measured_results / "results").path(Identification)
+    return load_file(path, Identification, "two_link", "identify")[0]
+
+
+def test_friction_is_what_it_was(identification):
+    full = dict(zip(identification.full.names, identification.full.values, strict=True))
+    deviations = dict(zip(identification.full.names, identification.full.deviations, strict=True))
+    for name, truth in FRICTION.items():
+        for symbol, value in zip(("fv", "fc", "off"), truth, strict=True):
+            key = f"{symbol}_{'z_' if f'{symbol}_{name}' not in full else ''}{name}"
+            assert abs(full[key] - value) < 4 * deviations[key] + 0.01
+
+
+def test_errors_are_those_of_the_samples(identification, measured_results):
+    """Anew, by plain NumPy on what samples.h5 holds."""
+    path = Store(measured_results / "results").path(Samples)
+    samples = load_file(path, Samples, "two_link", "sample")[0]
+    for part, which in ((samples.estimation, "train"), (samples.validation, "held_out")):
+        W = np.concatenate([b.W for b in part.blocks()])
+        tau = np.concatenate([b.tau for b in part.blocks()])
+        for estimate in (identification.full, identification.reduced):
+            left = tau.ravel() - W @ estimate.standard
+            assert getattr(estimate, which) == pytest.approx(
+                np.linalg.norm(left) / np.linalg.norm(tau)
+            )
+
+
+def test_bodies_can_exist(identification):
+    pytest.importorskip("cvxpy")
+    assert identification.consistency.positive
+    assert identification.consistency.held_out < 1.1 * identification.full.held_out + 1e-3
+
+
+def test_a_good_log_gives_no_hints(identification):
+    assert identification.hints == ()
+
+
+def test_the_size_is_chosen_without_the_held_out_part(measured_copy, invoke):
+    """Noise on what is held out changes errors there, and nothing else."""
+    results = Store(measured_copy / "results")
+    before = load_file(results.path(Validation), Validation, "two_link", "validate")[0]
+    with h5py.File(results.path(Samples), "a") as file:
+        file["validation/tau"][...] += np.random.default_rng(0).normal(
+            size=file["validation/tau"].shape
+        )
+    invoke("validate", measured_copy / "arm.yaml", "--results", results.folder, "--force")
+    after = load_file(results.path(Validation), Validation, "two_link", "validate")[0]
+    assert after.selected.n == before.selected.n
+    name = before.selected.heuristic
+    assert np.array_equal(
+        after.cross_validation[name].torque_error, before.cross_validation[name].torque_error
+    )
+    worse = after.heuristics[name].torque_error_validation
+    assert np.all(worse > before.heuristics[name].torque_error_validation)
+
+
+def test_summary_and_page(measured_results):
+    report = measured_results / "results" / "report"
+    found = json.loads((report / "summary.json").read_text())["identification"]
+    assert set(found["full"]) >= {"train", "held_out"}
+    assert set(found["reduced"]) >= {"n", "train", "held_out"}
+    assert found["reduced"]["held_out"] < 0.1
+    page = (report / "index.html").read_text()
+    assert "What the measurements say" in page
+    assert "full model" not in page.lower().replace("beats the full one", "")
+    for name in ("log_signals", "log_spectra", "measured_torques", "cross_validation"):
+        assert (report / "figures" / f"{name}.svg").exists()
+
+
+@pytest.mark.parametrize("model", ["identified", "consistent"])
+def test_identified_models_are_exported(model, measured_copy, invoke, tmp_path):
+    if model == "consistent":
+        pytest.importorskip("cvxpy")
+    invoke(
+        "export", measured_copy / "arm.yaml", "--results", measured_copy / "results", "--format", "python",
+        "--model", model, "--output", tmp_path / "code",
+    )  # fmt: skip
+    assert list((tmp_path / "code").glob("*.py"))
+
+
+@pytest.mark.parametrize("estimator", ["ordinary", "robust"])
+def test_other_estimators_agree_on_a_good_log(estimator, measured_copy, invoke, identification):
+    folder = measured_copy / "results"
+    settings = [f"identification.estimator={estimator}", "identification.consistency=none"]
+    invoke("identify", measured_copy / "arm.yaml", "--results", folder, settings=settings)
+    found = load_file(Store(folder).path(Identification), Identification, "two_link", "identify")[0]
+    assert found.consistency is None
+    close = np.abs(found.full.values - identification.full.values)
+    assert np.all(close < 4 * identification.full.deviations + 1e-6)
+
+
+def test_a_log_that_is_missing_or_wrong_is_said(tmp_path, invoke):
+    path = log_config(tmp_path)
+    error = invoke("run", path, "--results", tmp_path / "r", code=2).err
+    assert "log.csv: there is no such file" in error
+    log = two_link_log()
+    log["t"] = log["t"][::-1]
+    write_log(tmp_path / "log.csv", log)
+    error = invoke("run", path, "--results", tmp_path / "r", code=2).err
+    assert "log.csv, line 3, column t: time goes back" in error
+    assert not (tmp_path / "r" / "log.h5").exists()
+
+
+def test_a_log_of_which_nothing_is_left(tmp_path, invoke):
+    log = two_link_log(seconds=2)
+    write_log(tmp_path / "log.csv", log)
+    path = log_config(tmp_path)
+    settings = ["sampling.log.torque_cutoff=0.3", "sampling.log.state_cutoff=5"]
+    error = invoke("run", path, "--results", tmp_path / "r", settings=settings, code=2).err
+    assert "sampling.log.torque_cutoff" in error
+    assert "longer than the motion" in error
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("sampling.log.signs=[1, 2]", "signs are 1 or -1"),
+        ("sampling.log.units.position=degrees", "'degrees'"),
+        ("sampling.log.held_out=0.99", "held_out"),
+        ("selected.n=3", "cross_validation chooses n itself"),
+    ],
+)
+def test_settings_that_cannot_be(setting, said, tmp_path, invoke):
+    write_log(tmp_path / "log.csv", two_link_log(seconds=2))
+    error = invoke(
+        "run", log_config(tmp_path), "--results", tmp_path / "r", settings=[setting], code=2
+    ).err
+    assert said in error
+
+
+def test_check_data(measured_results, invoke):
+    log = measured_results / "log.csv"
+    alone = invoke("check-data", log).out
+    assert "at 200 Hz" in alone
+    with_robot = invoke("check-data", log, measured_results / "arm.yaml").out
+    assert "Excitation: rank" in with_robot
+
+
+def test_columns_are_guessed(tmp_path, invoke):
+    from conftest import ROOT
+
+    folder = ROOT / "configs" / "logs"
+    path = tmp_path / "arm.yaml"
+    out = invoke(
+        "init", folder / "ur10.urdf", "--log", folder / "ur10.csv.gz", "--output", path
+    ).out
+    assert "torque: tau{}" in out
+    log = load_config(path).sampling.log
+    assert (log.columns.position, log.columns.velocity) == ("q{}", "dq{}")
