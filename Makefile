@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots torture graph clean
+.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots identification torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -25,6 +25,7 @@ help:
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
+	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -97,6 +98,10 @@ benchmark: $(VENV)/.installed-dev
 # Arms that people have, from their URDF to code: sizes, operations and times in results/robots.
 robots: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.robots
+
+# How often intervals hold the truth and hints are right, on hundreds of simulated logs.
+identification: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.identification
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1

@@ -320,7 +320,7 @@ class ValidationSection(Section):
     stability: bool = True
     """Whether the selection is repeated with each trajectory left out and with fewer samples."""
     condition_factor: Annotated[Number, Field(gt=1)] = 10.0
-    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than the full model's, or its smallest eigenvalue this much smaller."""
+    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than with all given parameters, or its smallest eigenvalue this much smaller."""
     error_factor: Annotated[Number, Field(gt=1)] = 2.0
     """Estimation and validation errors are said to part where one is this much larger than the other."""
 

@@ -1,6 +1,6 @@
 """Standard parameters that a machine can have, from torques that tell only base parameters.
 
-A rigid body exists where its pseudo-inertia matrix is positive definite [Wen2018], a linear matrix
+A rigid body exists where its pseudo-inertia matrix is positive definite [Wensing2018], a linear matrix
 inequality; friction, rotor inertia and stiffness are positive. Among what the torques leave open
 those nearest to the known parameters are taken.
 """

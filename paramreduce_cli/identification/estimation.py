@@ -91,7 +91,7 @@ RowMaker = Callable[[], Iterable[tuple[FloatArray, FloatArray]]]
 def robust_fit(
     make: RowMaker, start: FloatArray, deviation: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Iteratively reweighted least squares with Huber's weights [Hub1964].
+    """Iteratively reweighted least squares with Huber's weights [Huber1964].
 
     Args:
         make: Yields (X, tau) blocks of all samples anew, (n, n_dof, p) and (n, n_dof).

@@ -93,7 +93,7 @@ def thinned_low_pass(
 
 
 def spectrum(x: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Wel1967]."""
+    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Welch1967]."""
     length = max(min(64, x.shape[0]), x.shape[0] // _SEGMENTS)
     frequency, density = signal.welch(
         x, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,

@@ -152,7 +152,7 @@ def _undelayed(found: Signals, delay: float) -> Signals:
 
 
 def _without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
-    """Single samples far from the median of their neighbours, interpolated [Ham1974]."""
+    """Single samples far from the median of their neighbours, interpolated [Hampel1974]."""
     count = 0
     cleaned = []
     for piece in pieces:

@@ -26,7 +26,7 @@ class LoggedSet:
     """Samples of measured motions, computed as they are read; folds are their trajectories.
 
     Where torques pass a low-pass, every column of the observation matrix passes the same one, so that
-    the model stays linear and exact [Gau1997]; states are those at the sample's own time.
+    the model stays linear and exact [Gautier1997]; states are those at the sample's own time.
     """
 
     motions: MeasuredMotions

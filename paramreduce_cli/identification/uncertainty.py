@@ -68,7 +68,7 @@ def corrected(seen: FloatArray, lost: FloatArray) -> FloatArray:
 
 
 def coloured_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
-    """The autoregressive model of residuals, by the Yule-Walker equations [Sto2005], Sec. 3.4.
+    """The autoregressive model of residuals, by the Yule-Walker equations [Stoica2005], Sec. 3.4.
 
     Args:
         autocovariance: (n_lags,)

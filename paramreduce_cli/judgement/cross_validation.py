@@ -15,7 +15,7 @@ Selector = Callable[[SelectionProblem], Sequence[IntArray]]
 def cross_validated(
     problem: SelectionProblem, folds: Sequence[tuple[FloatArray, FloatArray]], select: Selector
 ) -> CrossValidation:
-    """Selection repeated without each fold, and judged on it [Has2009], Sec. 7.10.
+    """Selection repeated without each fold, and judged on it [Hastie2009], Sec. 7.10.
 
     Args:
         problem: On all data.

@@ -72,7 +72,7 @@ def _doubts(
         unsafe,
         f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass matrix loses "
         f"positive definiteness on the samples, or comes more than {section.condition_factor:g} times "
-        "nearer to singular than the full model's.",
+        "nearer to singular than with all given parameters.",
         "is not safe for direct dynamics: use its inverse dynamics only.",
     )
     for what in ("torque", "acceleration"):

@@ -38,7 +38,7 @@ def residual_deviation(factors: FloatArray, parameters: FloatArray, n_samples: i
 def joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int) -> FloatArray:
     """Standard deviation of each joint's torque noise, (n_dof,); infinite where none is measured.
 
-    Iterated weighted least squares on all parameters [Gau1997]; degrees of freedom that the
+    Iterated weighted least squares on all parameters [Gautier1997]; degrees of freedom that the
     fit uses up are given back.
 
     Args:

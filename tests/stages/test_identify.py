@@ -79,7 +79,7 @@ def test_summary_and_page(measured_results):
     page = (report / "index.html").read_text()
     assert "What the measurements say" in page
     assert "full model" not in page.lower().replace("beats the full one", "")
-    for name in ("log_signals", "log_spectra", "measured_torques", "cross_validation"):
+    for name in ("log-signals", "log-spectra", "measured-torques", "cross-validation"):
         assert (report / "figures" / f"{name}.svg").exists()
 
 

@@ -1,4 +1,4 @@
-"""Essential parameters [Pha1991]."""
+"""Essential parameters [Pham1991]."""
 
 import numpy as np
 

@@ -1,0 +1,98 @@
+"""How often intervals hold the truth, and hints are right, on simulated logs: `make identification`.
+
+The arm is that of puma560_friction.yaml, 20 s at 100 Hz; each log has a motion and noise of its own.
+"""
+
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+
+from simulated_logs import RATE, coloured, simulated  # noqa: E402
+
+from paramreduce_cli.identification.estimation import Rows  # noqa: E402
+from paramreduce_cli.identification.hints import hints, weighted_fit  # noqa: E402
+
+_NOISE = 0.03
+"""Standard deviation of the noise, a share of each joint's torques."""
+_LEFT_OUT = {"coulomb": "fc", "viscous": "fv", "inertia": "Ia"}
+_SAID = {
+    "delay": "ms later than positions",
+    "sign": "torque_signs",
+    "gain": "times what those of the other joints let expect",
+    "coulomb": "coulomb is missing",
+    "viscous": "viscous is missing",
+    "inertia": "inertia is missing",
+}
+_SHARED = 3
+"""Joints whose torques share parameters with others, so that their scale can be told."""
+
+
+def fitted(log, tau, X):
+    rows = Rows((X,), (tau,), (log.dz,), (log.ddz,), 1 / RATE, 1.0)
+    deviation = np.std(tau, axis=0)
+    for _ in range(4):
+        left = weighted_fit(rows, deviation).residuals[0]
+        deviation = np.maximum(np.std(left, axis=0), 1e-9)
+    return weighted_fit(rows, deviation)
+
+
+def noisy(log, tau, pole, seed):
+    return tau + coloured(tau.shape, _NOISE * np.std(log.tau, axis=0), pole, seed)
+
+
+def coverage(pole, count):
+    """Share of the true values within 1.96 standard deviations, and its extremes over parameters."""
+    hits = []
+    for seed in range(count):
+        log = simulated(seed)
+        found = fitted(log, noisy(log, log.tau, pole, seed), log.X)
+        deviations = np.sqrt(np.diag(found.covariance()))
+        hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
+    return np.mean(hits), np.mean(hits, axis=0).min(), np.mean(hits, axis=0).max()
+
+
+def changed(case, log, seed):
+    """Torques and columns with something wrong."""
+    rng = np.random.default_rng([seed, 7])
+    tau, X = log.tau.copy(), log.X
+    if case == "delay":
+        tau = np.column_stack([np.interp(log.time - 0.01, log.time, t) for t in tau.T])
+    elif case == "sign":
+        tau[:, rng.integers(tau.shape[1])] *= -1
+    elif case == "gain":
+        tau[:, rng.integers(_SHARED)] *= rng.choice([0.8, 1.2, 1.5])
+    elif case in _LEFT_OUT:
+        X = X[:, :, [kind != _LEFT_OUT[case] for kind in log.kinds]]
+    return tau, X
+
+
+def right(case, pole, count):
+    """Share of logs whose first hint is the right one; of none where nothing is wrong."""
+    good = 0
+    for seed in range(count):
+        log = simulated(seed)
+        tau, X = changed(case, log, seed)
+        found = hints(fitted(log, noisy(log, tau, pole, seed), X), log.names)
+        good += _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
+    return good / count
+
+
+def main(logs=200, cases=100):
+    warnings.simplefilter("ignore")
+    print(f"{logs} simulated logs, {100 * _NOISE:g} % noise: true values within 95 % intervals")
+    for pole in (0.0, 0.9, 0.97):
+        mean, least, most = coverage(pole, logs)
+        print(f"  noise with a pole at {pole:<4}: {100 * mean:.1f} % ({100 * least:.0f} ... {100 * most:.0f} % "
+              "by parameter)", flush=True)  # fmt: skip
+    print(f"{cases} logs each: right hint first; for clean logs none at all")
+    for case in ("clean", *_SAID):
+        for pole in (0.0, 0.9):
+            print(f"  {case:8} pole {pole}: {100 * right(case, pole, cases):.0f} %", flush=True)
+
+
+if __name__ == "__main__":
+    main(*map(int, sys.argv[1:]))
