@@ -11,10 +11,10 @@ import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
-from simulated_logs import RATE, coloured, simulated  # noqa: E402
+from simulated_logs import RATE, coloured, simulated
 
-from paramreduce_cli.identification.estimation import Rows  # noqa: E402
-from paramreduce_cli.identification.hints import hints, weighted_fit  # noqa: E402
+from paramreduce_cli.identification.estimation import Rows
+from paramreduce_cli.identification.hints import hints, weighted_fit
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""
@@ -77,7 +77,9 @@ def right(case, pole, count):
         log = simulated(seed)
         tau, X = changed(case, log, seed)
         found = hints(fitted(log, noisy(log, tau, pole, seed), X), log.names)
-        good += _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
+        good += (
+            _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
+        )
     return good / count
 
 
