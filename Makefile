@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots identification torture graph clean
+.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots identification controllers torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -26,6 +26,7 @@ help:
 	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
 	@echo "make identification  intervals and hints on simulated logs"
+	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -102,6 +103,10 @@ robots: $(VENV)/.installed-dev
 # How often intervals hold the truth and hints are right, on hundreds of simulated logs.
 identification: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.identification
+
+# Rest-to-rest trajectories of two arms against limits of torque and distance.
+controllers: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.controllers
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1

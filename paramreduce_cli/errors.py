@@ -32,6 +32,8 @@ class Concern(Enum):
     """Bounds on quantities that no position keeps."""
     BOUNDED_MOTION = auto()
     """Bounds on quantities that no motion keeps."""
+    LOADS = auto()
+    """Limits of torque and power that no motion keeps."""
     GRID = auto()
     """How many points a trajectory is optimised on."""
     SYMMETRIES = auto()

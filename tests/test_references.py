@@ -29,13 +29,13 @@ def test_selection_on_the_committed_trajectories(robot):
     config, model = config_and_model(robot, *QUICK)
 
     def series(name):
-        empty = ({}, *[np.zeros(0)] * 4, 0, 0, "")
+        empty = ({}, *[np.zeros(0)] * 5, 0, 0, "")
         found = summary["trajectories"][name]
         return tuple(Trajectory(np.array(t["coefficients"]), 0, 0, *empty) for t in found)
 
     wanted = config.trajectories
     trajectories = Trajectories(
-        summary["trajectories"]["period"], wanted.points, "", "", wanted.use_full_range, "",
+        summary["trajectories"]["period"], wanted.points, "", "", wanted.use_full_range, False, "",
         wanted.limits(config.n_dof), (), series("estimation"), series("validation"),
     )  # fmt: skip
     samples = sample(config.sampling, model, trajectories, Recordings(None, None))

@@ -41,7 +41,15 @@ _NAMES: dict[tuple[type, str], str] = {
 """Fields whose datasets have another name; a group without one is that of the record itself."""
 _ATTRIBUTES = {
     (Trajectories, name)
-    for name in ("period", "points", "criterion", "scaling", "use_full_range", "source")
+    for name in (
+        "period",
+        "points",
+        "criterion",
+        "scaling",
+        "use_full_range",
+        "rest_to_rest",
+        "source",
+    )
 }
 """Fields that are attributes of the file."""
 _TEXTS = {(Model, "mechanism"), (Model, "formulations"), (Trajectories, "constraints")}

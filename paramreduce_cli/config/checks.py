@@ -199,6 +199,9 @@ def _per_joint(config: Config) -> Iterator[Problem]:
             trajectories.acceleration_limits,
             "rad/s^2 (m/s^2 for a prismatic joint)",
         ),
+        (("trajectories", "torque_limits"), trajectories.torque_limits, "N m (N)"),
+        (("trajectories", "power_limits"), trajectories.power_limits, "W"),
+        (("trajectories", "start_pose"), trajectories.start_pose, "rad (m)"),
         (
             ("sampling", "nominal_acceleration"),
             config.sampling.nominal_acceleration,

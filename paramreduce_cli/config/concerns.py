@@ -26,6 +26,10 @@ _KEYS: dict[Concern, tuple[Key, str]] = {
         _CONSTRAINTS,
         "Loosen it, or set trajectories.use_full_range to false if it is true.",
     ),
+    Concern.LOADS: (
+        ("trajectories", "torque_limits"),
+        "If trajectories.use_full_range is true every motion reaches the limits: set it to false.",
+    ),
     Concern.GRID: (("trajectories", "points"), ""),
     Concern.SYMMETRIES: (("sampling", "symmetries"), ""),
 }

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, get_args
 import numpy as np
 from pydantic import Field, model_validator
 
+from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.constraints import ConstraintSection
 from paramreduce_cli.config.identification import IdentificationSection
 from paramreduce_cli.config.logs import LogSection
@@ -66,6 +67,16 @@ class TrajectoriesSection(Section):
     """Largest speed, one for all joints or a list; rad/s (m/s if prismatic)."""
     acceleration_limits: LimitPerJoint | None = None
     """Largest acceleration, one for all joints or a list; rad/s^2 (m/s^2 if prismatic)."""
+    torque_limits: LimitPerJoint | None = None
+    """Largest torque of the model with the values in the config, one for all joints or a list; N m (N if prismatic)."""
+    power_limits: LimitPerJoint | None = None
+    """Largest product of torque and speed, one for all joints or a list; W."""
+    rest_to_rest: bool = False
+    """Whether trajectories begin and end at rest, without acceleration."""
+    start_pose: PerJoint | None = None
+    """Where the machine stands before and after, rad or m: exported trajectories go there and back, and motions with bounds are looked for around it."""
+    clearance: ClearanceSection | None = None
+    """Distances that bodies keep from each other and from planes."""
     use_full_range: bool = True
     """Whether every joint must reach one of its limits."""
     constraints: list[ConstraintSection] = []
@@ -93,6 +104,8 @@ class TrajectoriesSection(Section):
             upper=pairs[:, 1],
             velocity=per_joint(self.velocity_limits, n_dof),
             acceleration=per_joint(self.acceleration_limits or [np.inf], n_dof),
+            torque=per_joint(self.torque_limits or [np.inf], n_dof),
+            power=per_joint(self.power_limits or [np.inf], n_dof),
         )
 
 

@@ -24,7 +24,10 @@ _INSET = 0.98
 
 
 def resting_position(
-    excitation: Excitation, limits: JointLimits, margin: float = 1.0
+    excitation: Excitation,
+    limits: JointLimits,
+    margin: float = 1.0,
+    wanted: FloatArray | None = None,
 ) -> FloatArray:
     """Independent coordinates inside all limits and bounds, (n_dof,).
 
@@ -34,13 +37,14 @@ def resting_position(
         excitation: With the bounds.
         limits: Of the independent coordinates.
         margin: Share of the limits that may be used.
+        wanted: Where to look first, (n_dof,).
 
     Raises:
         ConcernError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * margin * limits.reach
-    tried = [middle]
+    tried = [middle] if wanted is None else [np.clip(wanted, middle - reach, middle + reach)]
     if mechanism.loops is not None:
         home = mechanism.loops.assembly[list(mechanism.independent)]
         tried.append(np.clip(home, middle - reach, middle + reach))
@@ -96,6 +100,12 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
             return drawn
         share *= _SHRINKS
     nearest = objective.worst_bound(drawn.ravel())
+    if nearest.excess < 0:
+        raise ConcernError(
+            "leave no motion: even the smallest about a position that keeps all bounds needs more. Raise "
+            "them and the power limits, or move the position limits to where gravity is weaker.",
+            Concern.LOADS,
+        )
     if np.isinf(nearest.excess):
         raise ConcernError(
             f"no motion was found that keeps the loops closed; {nearest.name}", Concern.FULL_RANGE
@@ -128,15 +138,16 @@ def drawn_inside(
         return still + share * (coefficients - still)
 
     def inside(share: float) -> bool:
-        z = basis.states(drawn(share))[0]
+        z, dz, ddz = basis.states(drawn(share))
         positions = Follower(excitation.coordinates)
         if excitation.worst_bound(z, positions).excess > 0:
             return False
         try:
-            excitation.coordinates.check_motion(basis.time, positions(z))
+            q = positions(z)
+            excitation.coordinates.check_motion(basis.time, q)
         except DataError:
             return False
-        return True
+        return excitation.load_share(q, dz, ddz) <= 1
 
     if inside(1.0):
         return coefficients

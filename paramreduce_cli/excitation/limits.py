@@ -34,14 +34,27 @@ class LimitMap:
         limits: Of all joints.
         basis: The series on an equidistant grid over one period.
         mapping: ``gauge`` or ``ball``.
+        rest_to_rest: Whether motions begin and end without velocity and acceleration: two linear
+            conditions on the harmonics of each joint, onto which free ones are projected.
     """
 
-    def __init__(self, limits: JointLimits, basis: FourierBasis, mapping: LimitMapping) -> None:
+    def __init__(
+        self,
+        limits: JointLimits,
+        basis: FourierBasis,
+        mapping: LimitMapping,
+        *,
+        rest_to_rest: bool = False,
+    ) -> None:
         points, columns = basis.position.shape
         self.n_dof = limits.middle.size
         self.n_columns = columns
         self.margin = grid_margin((columns - 1) // 2, points)
         self._mapping = mapping
+        self._projection = np.eye(columns - 1)
+        if rest_to_rest:
+            ends = np.vstack([basis.velocity[0, 1:], basis.acceleration[0, 1:]])
+            self._projection -= np.linalg.pinv(ends) @ ends
         self._middle, self._reach = limits.middle, limits.reach
         self._positions = _harmonic_shares(basis.position, limits.reach * self.margin)
         speeds = _harmonic_shares(basis.velocity, limits.velocity * self.margin)
@@ -50,7 +63,7 @@ class LimitMap:
 
     def shares(self, free: FloatArray) -> FloatArray:
         """Largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
-        up, down, rate = self._extremes(free[:, 1:])
+        up, down, rate = self._extremes(free[:, 1:] @ self._projection)
         return np.maximum((up + down) / 2, rate)
 
     def scaled(self, free: FloatArray) -> FloatArray:
@@ -58,7 +71,7 @@ class LimitMap:
         share = self.shares(free)
         if self._mapping == "ball":
             share = np.maximum(share, 1.0)
-        harmonics = free[:, 1:] / share[:, None]
+        harmonics = free[:, 1:] @ self._projection / share[:, None]
         up, down, _ = self._extremes(harmonics)
         return self._with_offset(free[:, 0], harmonics, up, down)
 
@@ -71,7 +84,7 @@ class LimitMap:
             free: Offset and harmonics of each joint, (n_dof, 1 + 2 harmonics).
             norm: Exponent of the smooth maxima; they are never below the true ones.
         """
-        offset, harmonics = free[:, 0], free[:, 1:]
+        offset, harmonics = free[:, 0], free[:, 1:] @ self._projection
         position = _apply(self._positions, harmonics)
         rates = _apply(self._rates, harmonics)
         up, up_slope = _smooth_maximum(np.maximum(position, 0.0), self._positions, norm)
@@ -101,6 +114,7 @@ class LimitMap:
             result[:, 1:] -= _times(along * slope / divisor**2, g_slope)
             result[:, 1:] += _times(centre_bar / (2 * divisor), down_slope - up_slope)
             result[:, 1:] -= _times(room_bar / divisor, span_slope)
+            result[:, 1:] = result[:, 1:] @ self._projection  # which is symmetric
             return result
 
         harmonics_in = harmonics / divisor[:, None]

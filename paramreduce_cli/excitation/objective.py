@@ -15,6 +15,7 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.excitation.criteria import Criterion
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
+from paramreduce_cli.excitation.loads import Loads
 from paramreduce_cli.excitation.scalings import Scaling, scalings
 from paramreduce_cli.multibody.dynamics import ObservationFunction
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -64,6 +65,8 @@ class Excitation:
     """(n_dof,), N m or N."""
     criterion: Criterion
     scaling: Scaling
+    loads: Loads
+    """Limits of torque and power."""
 
     def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
         """W with every row divided by its joint's nominal torque; smooth."""
@@ -91,7 +94,10 @@ class Excitation:
     def value_and_gradient(
         self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
-        """The criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics)."""
+        """The criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics).
+
+        With a barrier where torque or power are limited; infinite beyond the limits.
+        """
         states = basis.states(coefficients)
         weights = self._row_weights(states[0].shape[0])
         q, rates = positions(states[0]), states[1:]
@@ -101,8 +107,18 @@ class Excitation:
         eigenvalues, vectors = scipy.linalg.eigh(gram, driver="evd", check_finite=False)
         value, slope = self.criterion(eigenvalues, level.sharpness)
         W_bar = pull(gram, (2 * vectors * slope) @ vectors.T)
+        load_dz_bar: FloatArray | float = 0.0
+        if self.loads.limited:
+            torques = self.loads.torques(W)
+            load, bar = _log_barrier(self.loads.rows(torques, rates[0]), level)
+            if np.isinf(load):
+                return np.inf, np.full_like(coefficients, np.nan)
+            value += load
+            torque_bar, load_dz_bar = self.loads.pulled(torques, rates[0], bar)
+            W_bar += np.outer(torque_bar, self.loads.values)
         W_bar *= weights
         z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, W_bar)
+        dz_bar = dz_bar + load_dz_bar
         gradient = (
             z_bar.T @ basis.position + dz_bar.T @ basis.velocity + ddz_bar.T @ basis.acceleration
         )
@@ -119,16 +135,25 @@ class Excitation:
         if not self.quantities.constraints:
             return 0.0, np.zeros_like(coefficients)
         q = positions(basis.states(coefficients)[0])
-        rows = self.quantities.rows(q)
-        largest = rows.max(axis=0)
-        terms = np.exp(level.maxima * (rows - largest))
-        total = terms.sum(axis=0)
-        room = -largest - np.log(total) / level.maxima
-        if (room <= 0).any():
+        value, slopes = _log_barrier(self.quantities.rows(q), level)
+        if np.isinf(value):
             return np.inf, np.full_like(coefficients, np.nan)
-        slopes = level.barrier * terms / total / room
         z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.jacobian(q))
-        return -level.barrier * float(np.log(room).sum()), z_bar.T @ basis.position
+        return value, z_bar.T @ basis.position
+
+    def load_share(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
+        """Largest share of a limit of torque or power that a motion uses, zero without limits."""
+        if not self.loads.limited:
+            return 0.0
+        W = self.measured(q, dz, ddz) * self._row_weights(q.shape[0])
+        rows = self.loads.rows(self.loads.torques(W), dz)
+        return float(np.sqrt(max(0.0, rows.max() + 1)))
+
+    def peak_torques(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        """Largest torques of the model with the values that are known, (n_dof,)."""
+        W = self.measured(q, dz, ddz)
+        peaks: FloatArray = np.abs(self.loads.torques(W)).max(axis=0)
+        return peaks
 
     def worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
         """Of the positions z, (n_samples, n_dof); infinite where the loops cannot be closed."""
@@ -147,6 +172,20 @@ class Excitation:
             bounds.append(f"at most {constraint.upper:.4g}")
         name = f"{constraint.name} ({constraint.kind}, {' and '.join(bounds)})"
         return Bound(float(rows[:, worst].max()), name)
+
+
+def _log_barrier(rows: FloatArray, level: Level) -> tuple[float, FloatArray]:
+    """Logarithmic barrier of the smooth maximum over time of each row, and its derivative by the rows.
+
+    Infinite where one of them, (n_points, n_rows), is above zero.
+    """
+    largest = rows.max(axis=0)
+    terms = np.exp(level.maxima * (rows - largest))
+    total = terms.sum(axis=0)
+    room = -largest - np.log(total) / level.maxima
+    if (room <= 0).any():
+        return np.inf, np.full_like(rows, np.nan)
+    return -level.barrier * float(np.log(room).sum()), level.barrier * terms / total / room
 
 
 @dataclass(frozen=True)
@@ -176,8 +215,9 @@ class FreeObjective:
             barrier, barrier_bar = self.excitation.barrier(*along)
             if np.isfinite(barrier):
                 value, bar = self.excitation.value_and_gradient(*along)
-                self.positions.keep()
-                return value + barrier, pull(bar + barrier_bar)
+                if np.isfinite(value):
+                    self.positions.keep()
+                    return value + barrier, pull(bar + barrier_bar)
         except DataError:
             pass
         return np.nan, np.full(x.size, np.nan)

@@ -65,6 +65,15 @@ BOUNDED = Plan(
         Step(Level(16, 80, 400, 0.001), 0.0, TIGHT),
     ),
 )
+BOUNDED_TREE = Plan(
+    # Without loops an iteration is cheap and the way to a good motion short.
+    1,
+    (
+        Step(Level(1, 80, 100, 0.1), 1.0, LOOSE, most=80),
+        Step(Level(4, 80, 200, 0.01), 0.0, TIGHT, most=150),
+        Step(Level(16, 80, 400, 0.001), 0.0, TIGHT, most=150),
+    ),
+)
 
 
 @dataclass(frozen=True)
@@ -78,6 +87,10 @@ class Settings:
     """Of the grid on which the criterion and the limits are evaluated."""
     limits: JointLimits
     mapping: LimitMapping
+    rest_to_rest: bool
+    """Whether motions begin and end without velocity and acceleration."""
+    start_pose: FloatArray | None
+    """Where to look for motions with bounds; None for where the middle of the limits leads."""
     starts: int
     """How many series are optimised at first."""
     polished: int
@@ -167,14 +180,21 @@ class _Search:
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings
         self._basis = settings.basis()
-        self._limits = LimitMap(settings.limits, self._basis, settings.mapping)
+        self._limits = LimitMap(
+            settings.limits, self._basis, settings.mapping, rest_to_rest=settings.rest_to_rest
+        )
         mechanism = excitation.coordinates.mechanism
-        self._bounded = bool(excitation.quantities.constraints) or mechanism.loops is not None
-        self.plan = BOUNDED if self._bounded else FREE
+        bounded = bool(excitation.quantities.constraints) or excitation.loads.limited
+        self._bounded = bounded or mechanism.loops is not None
+        self.plan = FREE
+        if self._bounded:
+            self.plan = BOUNDED_TREE if mechanism.loops is None else BOUNDED
         self._rest = settings.limits.middle
         self._mixing = np.eye(mechanism.n_dof)
         if self._bounded:
-            self._rest = resting_position(excitation, settings.limits, self._limits.margin)
+            self._rest = resting_position(
+                excitation, settings.limits, self._limits.margin, settings.start_pose
+            )
             q = excitation.coordinates.positions(self._rest[None], None)
             R = excitation.coordinates.tangent(q)[0]
             values, vectors = np.linalg.eigh(R.T @ R)
@@ -295,6 +315,7 @@ def describe(
         kappa_variants=variants,
         peak_position=np.abs(z - limits.middle).max(axis=0),
         peak_velocity=np.abs(dz).max(axis=0),
+        peak_torque=excitation.peak_torques(q[::FINER], dz, ddz),
         reach=np.max([share.max(axis=0) for share in shares], axis=0),
         extremes=np.column_stack([quantities.min(axis=0), quantities.max(axis=0)]),
         cpu_seconds=cpu_seconds,

@@ -25,6 +25,7 @@ import numpy as np
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.criteria import criteria
+from paramreduce_cli.excitation.loads import Loads
 from paramreduce_cli.excitation.objective import Excitation
 from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
@@ -49,6 +50,8 @@ class ExcitationTask:
 
     mechanism: Mechanism
     base: BaseParameters
+    base_values: FloatArray
+    """Of the base parameters, (r,)."""
     nominal_torque: FloatArray
     criterion: str
     constraints: tuple[Constraint, ...]
@@ -79,6 +82,9 @@ def excitation_of(task: ExcitationTask) -> Excitation:
         nominal_torque=task.nominal_torque,
         criterion=criteria[task.criterion],
         scaling=scalings[task.settings.scaling],
+        loads=Loads(
+            task.base_values, settings.limits.torque, settings.limits.power, task.nominal_torque
+        ),
     )
 
 

@@ -11,7 +11,7 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.expressions.compiled import BatchFunction
-from paramreduce_cli.expressions.vectors import cross, dot, subtract
+from paramreduce_cli.expressions.vectors import Vector, cross, dot, subtract
 from paramreduce_cli.multibody.kinematics import (
     JointMotion,
     direction_in_base,
@@ -20,6 +20,11 @@ from paramreduce_cli.multibody.kinematics import (
 )
 from paramreduce_cli.multibody.loops.projection import Projection
 from paramreduce_cli.records import DISTANCES, Constraint, FloatArray, Mechanism
+
+_SHARP = 40.0
+"""Exponent of smooth minima over spheres."""
+_NEAR = 0.1
+"""m: unit of distances from planes."""
 
 
 class Quantities:
@@ -109,6 +114,10 @@ def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.
         return dot(a, b)
     if constraint.kind == "singularity":
         return ca.SX(0)
+    if constraint.kind == "clearance":
+        return _nearest(joints, constraint)
+    if constraint.kind == "above-plane":
+        return _lowest(joints, constraint)
     start = point_in_base(joints, bodies[1], vectors[1])
     end = point_in_base(joints, bodies[0], vectors[0])
     gap = subtract(end, start)
@@ -119,10 +128,55 @@ def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.
     return dot(across, across)
 
 
+def _nearest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
+    """Smooth minimum over pairs of spheres of squared distances, one where they just keep the gap."""
+    (a, b), (points_a, radii_a, points_b, radii_b) = constraint.bodies, constraint.vectors
+    ends_a, ends_b = (
+        [point_in_base(joints, body, point) for point in points]
+        for body, points in ((a, points_a), (b, points_b))
+    )
+    shares = [
+        _squared(subtract(p, q)) / (r + s + constraint.lower) ** 2
+        for p, r in zip(ends_a, radii_a.tolist(), strict=True)
+        for q, s in zip(ends_b, radii_b.tolist(), strict=True)
+    ]
+    return _smooth_minimum(shares)
+
+
+def _lowest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
+    """Smooth minimum of what spheres of a body are above a plane beyond the gap, in units of :data:`_NEAR`."""
+    points, radii, (foot, normal) = constraint.vectors
+    heights = []
+    for point, radius in zip(points, radii.tolist(), strict=True):
+        centre = point_in_base(joints, constraint.bodies[0], point)
+        height = sum(
+            n * (c - f) for n, c, f in zip(normal.tolist(), centre, foot.tolist(), strict=True)
+        )
+        heights.append((height - radius - constraint.lower) / _NEAR)
+    return _smooth_minimum(heights)
+
+
+def _squared(vector: Vector) -> ca.SX:
+    return dot(vector, vector)
+
+
+def _smooth_minimum(values: list[ca.SX]) -> ca.SX:
+    """Never above the smallest value."""
+    if len(values) == 1:
+        return values[0]
+    least = ca.mmin(ca.vertcat(*values))
+    return least - ca.log(sum(ca.exp(_SHARP * (least - value)) for value in values)) / _SHARP
+
+
 def _natural(measure: ca.MX, constraint: Constraint) -> ca.MX:
     """The quantity in its unit."""
     if constraint.kind == "angle":
         return ca.acos(ca.fmin(ca.fmax(measure, -1), 1))
+    if constraint.kind == "clearance":
+        touching = constraint.vectors[1].max() + constraint.vectors[3].max()
+        return ca.sqrt(ca.fmax(measure, 0)) * (touching + constraint.lower) - touching
+    if constraint.kind == "above-plane":
+        return measure * _NEAR + constraint.lower
     return ca.sqrt(measure) if constraint.kind in DISTANCES else measure
 
 
@@ -136,6 +190,10 @@ def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
         under = 1 - measure / lower**2
     elif constraint.kind == "singularity":
         over, under = measure, 1 - measure / lower
+    elif constraint.kind == "clearance":
+        over, under = measure, 1 - measure
+    elif constraint.kind == "above-plane":
+        over, under = measure, -measure
     else:
         span = upper - lower if has_upper and has_lower else 1.0
         over, under = (measure - upper) / span, (lower - measure) / span

@@ -21,11 +21,16 @@ class Constraint:
     * ``distance``: two bodies and a point in the frame of each, m;
     * ``distance-from-axis``: a body and the body that carries the axis; a point in the frame of
       the first, a point and the direction of the axis in the frame of the second, m;
-    * ``singularity``: none; distance to singularity of the loops, 0 to 1.
+    * ``singularity``: none; distance to singularity of the loops, 0 to 1;
+    * ``clearance``: two bodies; centres (k, 3) and radii (k,) of spheres in the frame of each, m;
+    * ``above-plane``: a body and the base; centres and radii of spheres in its frame, a point and the
+      normal of a plane in the base frame, (2, 3), m.
     """
 
     name: str
-    kind: Literal["coordinate", "angle", "distance", "distance-from-axis", "singularity"]
+    kind: Literal[
+        "coordinate", "angle", "distance", "distance-from-axis", "singularity", "clearance", "above-plane",
+    ]  # fmt: skip
     bodies: tuple[int, ...]
     vectors: tuple[FloatArray, ...]
     lower: float
@@ -41,7 +46,11 @@ class JointLimits:
     upper: FloatArray
     velocity: FloatArray
     acceleration: FloatArray
-    """Infinite where there is none."""
+    """Infinite where there is none, as in the following."""
+    torque: FloatArray
+    """Of the model, with the values in the config, N m or N."""
+    power: FloatArray
+    """Torque times speed, W."""
 
     @property
     def middle(self) -> FloatArray:
@@ -69,6 +78,8 @@ class Trajectory:
     """Largest distance from the middle of the position range, (n_dof,), rad or m."""
     peak_velocity: FloatArray
     """(n_dof,), rad/s or m/s."""
+    peak_torque: FloatArray
+    """Of the model, with the values in the config, (n_dof,), N m or N."""
     reach: FloatArray
     """Largest share of half the position range, or of the velocity or acceleration limit, that the
     motion about its offset uses, (n_dof,)."""
@@ -91,6 +102,8 @@ class Trajectories:
     scaling: str
     use_full_range: bool
     """Whether every joint had to reach one of its limits."""
+    rest_to_rest: bool
+    """Whether they begin and end at rest, without acceleration."""
     source: str
     """The file they were brought in; empty where they were optimised."""
     limits: JointLimits

@@ -8,11 +8,13 @@ from paramreduce_cli.config.schema import TrajectoriesSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.optimiser import Settings, describe
 from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
+from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import (
     Coefficients,
     Constraint,
     FloatArray,
     JointLimits,
+    Mechanism,
     Model,
     Run,
     Trajectories,
@@ -44,6 +46,7 @@ def optimize_trajectories(
         criterion=wanted.criterion if coefficients is None else "brought",
         scaling=wanted.scaling,
         use_full_range=wanted.use_full_range,
+        rest_to_rest=wanted.rest_to_rest,
         source="" if wanted.file is None else wanted.file.name,
         limits=task.settings.limits,
         constraints=task.constraints,
@@ -58,12 +61,20 @@ def excitation_task(
     return ExcitationTask(
         mechanism=model.mechanism,
         base=model.base,
+        base_values=model.base_values,
         nominal_torque=model.nominal_torque,
         criterion=wanted.criterion,
-        constraints=tuple(entry.constraint(model.mechanism) for entry in wanted.constraints),
+        constraints=_constraints(wanted, model.mechanism),
         settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
+
+
+def _constraints(wanted: TrajectoriesSection, mechanism: Mechanism) -> tuple[Constraint, ...]:
+    given = [entry.constraint(mechanism) for entry in wanted.constraints]
+    if wanted.clearance is not None:
+        given += wanted.clearance.constraints(mechanism)
+    return tuple(given)
 
 
 def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonics: int) -> Settings:
@@ -74,6 +85,12 @@ def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonic
         points=max(wanted.points, 2 * harmonics + 1),
         limits=wanted.limits(model.mechanism.n_dof),
         mapping="gauge" if wanted.use_full_range else "ball",
+        rest_to_rest=wanted.rest_to_rest,
+        start_pose=(
+            None
+            if wanted.start_pose is None
+            else per_joint(wanted.start_pose, model.mechanism.n_dof)
+        ),
         starts=wanted.starts,
         polished=wanted.polished,
         max_iterations=wanted.max_iterations,

@@ -5,16 +5,12 @@ The arm is that of puma560_friction.yaml, 20 s at 100 Hz; each log has a motion 
 
 import sys
 import warnings
-from pathlib import Path
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-
-from simulated_logs import RATE, coloured, simulated
-
 from paramreduce_cli.identification.estimation import Rows
 from paramreduce_cli.identification.hints import hints, weighted_fit
+from tests.simulated_logs import RATE, coloured, simulated
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""

@@ -27,7 +27,9 @@ def parts():
 
 def basis_and_limits(mapping="gauge", acceleration=np.inf):
     basis = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 100))
-    limits = JointLimits(*(np.full(6, limit) for limit in (-1.2, 1.6, 1.45, acceleration)))
+    limits = JointLimits(
+        *(np.full(6, limit) for limit in (-1.2, 1.6, 1.45, acceleration, np.inf, np.inf))
+    )
     return basis, LimitMap(limits, basis, mapping), limits
 
 

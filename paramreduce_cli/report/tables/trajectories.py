@@ -17,7 +17,7 @@ def trajectories(data: ReportData) -> Table:
     variants = tuple(found.estimation[0].kappa_variants)
     header = (
         "trajectory", *(f"κ {name}" for name in variants), "κ at start",
-        "peak |z - middle|", "peak speed", "share of limits",
+        "peak |z - middle|", "peak speed", "peak torque", "share of limits",
         *(f"{c.name}" for c in found.constraints), "CPU s", "iterations", "status",
     )  # fmt: skip
     rows = [
@@ -38,6 +38,7 @@ def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
         f"{t.kappa_start:.3g}",
         spread(t.peak_position),
         spread(t.peak_velocity),
+        spread(t.peak_torque),
         spread(t.reach),
         *(f"{low:.3g} ... {high:.3g}" for low, high in t.extremes),
         f"{t.cpu_seconds:.2f}",

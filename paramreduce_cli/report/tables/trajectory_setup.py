@@ -32,6 +32,14 @@ def trajectory_setup(data: ReportData) -> Table:
     ]
     if np.isfinite(limits.acceleration).any():
         rows.append(("acceleration limits, rad/s² or m/s²", _each(limits.acceleration[:, None])))
+    for limit, what in (
+        (limits.torque, "torque limits, N m or N"),
+        (limits.power, "power limits, W"),
+    ):
+        if np.isfinite(limit).any():
+            rows.append((what, _each(limit[:, None])))
+    if t.rest_to_rest:
+        rows.append(("begin and end at rest, without acceleration", "yes"))
     for c in t.constraints:
         low = "" if np.isinf(c.lower) else f"{c.lower:.4g} ≤ "
         high = "" if np.isinf(c.upper) else f" ≤ {c.upper:.4g}"

@@ -1,0 +1,83 @@
+"""The command that writes an exciting trajectory for a controller."""
+
+from pathlib import Path
+
+import click
+
+from paramreduce_cli.artifacts.report_files import save_files
+from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
+from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.export.timed_motion import timed_motion
+from paramreduce_cli.export.trajectory_formats import trajectory_formats
+from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.pipeline import maker_of
+from paramreduce_cli.records import Model, Trajectories, Trajectory
+
+
+@click.command("export-trajectory")
+@CONFIG
+@RESULTS
+@SET
+@click.option(
+    "--format", "kind", type=click.Choice(sorted(trajectory_formats)), default="csv", show_default=True,
+    help="ros: a JointTrajectory message as YAML; urscript: for Universal Robots.",
+)  # fmt: skip
+@click.option(
+    "--which", default="estimation:1", show_default=True, metavar="SET:K",
+    help="Number K of the estimation or of the validation set.",
+)  # fmt: skip
+@click.option("--rate", type=click.FloatRange(1, 1e5), default=125.0, show_default=True,
+              help="Samples per second.")  # fmt: skip
+@click.option(
+    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    help="[default: RESULTS/export/trajectory-FORMAT]",
+)  # fmt: skip
+def export_trajectory(
+    config: Path,
+    results: Path | None,
+    overrides: tuple[str, ...],
+    kind: str,
+    which: str,
+    rate: float,
+    output: Path | None,
+) -> None:
+    """Write an exciting trajectory as a controller runs it.
+
+    With trajectories.start_pose in the config it begins and ends there, on ways that keep to half of the
+    limits.
+
+    Example: paramreduce export-trajectory configs/ur10.yaml --format urscript --rate 500
+    """
+    loaded = load_config(config, overrides)
+    store = Store(results or Path("results") / loaded.robot)
+    model, trajectories = (
+        load_file(store.path(record), record, loaded.robot, maker_of(record))[0]
+        for record in (Model, Trajectories)
+    )
+    pose = loaded.trajectories.start_pose
+    motion = timed_motion(
+        model.mechanism,
+        trajectories,
+        _chosen(trajectories, which),
+        rate=rate,
+        start_pose=None if pose is None else per_joint(pose, loaded.n_dof),
+        title=f"{loaded.robot} {which}",
+    )
+    files = trajectory_formats[kind](motion)
+    folder = output or store.folder / "export" / f"trajectory-{kind}"
+    save_files(folder, {name: text.encode() for name, text in files.items()})
+    rests = "" if trajectories.rest_to_rest or pose is not None else ", which begins in motion"
+    say(f"{which}{rests}, {motion.time[-1]:.4g} s: {', '.join(files)} in {folder}")
+
+
+def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
+    name, _, number = which.partition(":")
+    sets = {"estimation": trajectories.estimation, "validation": trajectories.validation}
+    found = sets.get(name, ())
+    if not number.isdecimal() or not 1 <= int(number) <= len(found):
+        there = " and ".join(f"{key}:1 ... {key}:{len(own)}" for key, own in sets.items())
+        raise ConfigError(f"--which {which}: there is {there}.")
+    return found[int(number) - 1]

@@ -1,0 +1,134 @@
+"""Distances that bodies must keep from each other and from planes, as a config gives them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import combinations
+from typing import Annotated
+
+import numpy as np
+from pydantic import Field
+
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.fields.numbers import Number, Whole
+from paramreduce_cli.fields.section import Name, Positive, Section, Triple
+from paramreduce_cli.records import BASE, Constraint, FloatArray, Mechanism
+from paramreduce_cli.robots.placement import Direction
+
+BASE_NAME = "base"
+_KEY = ("trajectories", "clearance")
+
+
+class CapsuleSection(Section):
+    """All that is within a radius of a line between two points of a body's frame."""
+
+    start: Triple = [0, 0, 0]
+    """One end, m."""
+    end: Triple
+    """The other, m."""
+    radius: Positive
+    """m"""
+
+
+class PlaneSection(Section):
+    """A plane that bodies stay above."""
+
+    name: Name
+    """Name for messages and tables."""
+    point: Triple = [0, 0, 0]
+    """A point of it in the base frame, m."""
+    normal: Direction = [0, 0, 1]
+    """Direction in which the bodies are, in the base frame."""
+
+
+class ClearanceSection(Section):
+    """Distances that bodies keep from each other and from planes; every body is a capsule from its own joint to the next one, unless it is given otherwise."""
+
+    radius: Positive = 0.06
+    """Of capsules that are not given, m."""
+    gap: Annotated[Number, Field(ge=0)] = 0.01
+    """Distance that is left between surfaces, m."""
+    capsules: dict[Name, list[CapsuleSection]] = {}
+    """By body, `base` for the base; an empty list for a body that is not looked at."""
+    apart: Annotated[Whole, Field(ge=2)] = 3
+    """Joints between two bodies from which on they are looked at; nearer ones cannot get apart."""
+    ignore: list[Annotated[list[Name], Field(min_length=2, max_length=2)]] = []
+    """Pairs of bodies that are not looked at."""
+    planes: list[PlaneSection] = []
+    """That bodies stay above; the base and those that the first joint carries are not looked at."""
+
+    def constraints(self, mechanism: Mechanism) -> Iterator[Constraint]:
+        """One for each pair of bodies, and for each body and plane.
+
+        Raises:
+            ConfigError: Bodies are named that there are not.
+        """
+        spheres = self._spheres(mechanism)
+        ignored = {frozenset(pair) for pair in self.ignore}
+        names = {BASE: BASE_NAME} | {k: body.name for k, body in enumerate(mechanism.bodies)}
+        for a, b in combinations(spheres, 2):
+            near = _joints_between(mechanism, a, b) < self.apart
+            if near or frozenset((names[a], names[b])) in ignored:
+                continue
+            (points_a, radii_a), (points_b, radii_b) = spheres[a], spheres[b]
+            yield Constraint(
+                name=f"{names[a]}-{names[b]}", kind="clearance", bodies=(a, b),
+                vectors=(points_a, radii_a, points_b, radii_b), lower=self.gap, upper=np.inf,
+            )  # fmt: skip
+        for plane in self.planes:
+            normal = np.array(plane.normal, dtype=float)
+            frame = np.vstack([plane.point, normal / np.linalg.norm(normal)])
+            for body, (points, radii) in spheres.items():
+                if _joints_between(mechanism, BASE, body) > 1:
+                    yield Constraint(
+                        name=f"{names[body]}-{plane.name}", kind="above-plane", bodies=(body, BASE),
+                        vectors=(points, radii, frame), lower=self.gap, upper=np.inf,
+                    )  # fmt: skip
+
+    def _spheres(self, mechanism: Mechanism) -> dict[int, tuple[FloatArray, FloatArray]]:
+        """Centres (k, 3) and radii (k,) of spheres that cover the capsules of each body."""
+        numbers = {body.name: k for k, body in enumerate(mechanism.bodies)} | {BASE_NAME: BASE}
+        named = [*self.capsules, *(name for pair in self.ignore for name in pair)]
+        for name in named:
+            if name not in numbers:
+                raise ConfigError(f"names the body {name}; there is {', '.join(numbers)}.", _KEY)
+        found = {}
+        for name, body in sorted(numbers.items(), key=lambda item: item[1]):
+            given = self.capsules.get(name)
+            capsules = self._usual(mechanism, body) if given is None else given
+            covers = [_covered(np.array([c.start, c.end], dtype=float), c.radius) for c in capsules]
+            if covers:
+                points, radii = zip(*covers, strict=True)
+                found[body] = (np.vstack(points), np.concatenate(radii))
+        return found
+
+    def _usual(self, mechanism: Mechanism, body: int) -> list[CapsuleSection]:
+        """From a body's joint to those that it carries."""
+        ends = [other.parent_to_joint[:3, 3] for other in mechanism.bodies if other.parent == body]
+        if not ends and body != BASE:
+            ends = [np.zeros(3)]
+        return [CapsuleSection(end=end.tolist(), radius=self.radius) for end in ends]
+
+
+def _covered(ends: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Spheres that cover a capsule: a radius apart, and so much larger that nothing shows between."""
+    length = float(np.linalg.norm(ends[1] - ends[0]))
+    count = int(np.ceil(length / radius)) + 1
+    half = length / max(1, count - 1) / 2
+    points = np.linspace(ends[0], ends[1], count)
+    return points, np.full(count, float(np.hypot(radius, half)))
+
+
+def _joints_between(mechanism: Mechanism, a: int, b: int) -> int:
+    """On the way through the tree from one body to another."""
+    way_a, way_b = (_to_base(mechanism, body) for body in (a, b))
+    common = len(set(way_a) & set(way_b))
+    return len(way_a) + len(way_b) - 2 * common
+
+
+def _to_base(mechanism: Mechanism, body: int) -> list[int]:
+    way = []
+    while body != BASE:
+        way.append(body)
+        body = mechanism.bodies[body].parent
+    return way

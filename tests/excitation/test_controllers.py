@@ -1,0 +1,247 @@
+"""Trajectories that a real controller can run: at rest at both ends, within torques and distances."""
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import yaml
+from conftest import ROOT, config_and_model, config_of, slope
+from oracles import capsules, pinocchio_model
+
+from paramreduce_cli.config.clearance import ClearanceSection
+from paramreduce_cli.config.concerns import explained
+from paramreduce_cli.errors import ConcernError, ConfigError, DataError
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.limits import LimitMap
+from paramreduce_cli.excitation.objective import FreeObjective, Level
+from paramreduce_cli.excitation.optimiser import optimise_trajectory
+from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.export.timed_motion import timed_motion
+from paramreduce_cli.export.trajectory_formats import trajectory_formats
+from paramreduce_cli.multibody.loops.follower import Follower
+from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.records import Run
+from paramreduce_cli.stages.optimize_trajectories import excitation_task, optimize_trajectories
+
+ASKED = [
+    "trajectories.rest_to_rest=true",
+    "trajectories.harmonics=4",
+    "trajectories.use_full_range=false",
+    "trajectories.torque_limits=[14, 4]",
+    "trajectories.power_limits=[10, 4]",
+    "trajectories.acceleration_limits=9",
+    "trajectories.position_limits=[[-2.6, -0.5], [-pi/2, pi/2]]",
+    "trajectories.start_pose=[-pi/2, 0]",
+]
+
+
+@pytest.fixture(scope="module")
+def made():
+    """The two-link arm, which hangs down."""
+    config, model = config_and_model("two_link", *ASKED)
+    return config, model, optimize_trajectories(config.trajectories, model, None, Run())
+
+
+def states(trajectories, trajectory, finer=10):
+    time = sample_times(trajectories.period, finer * trajectories.points)
+    harmonics = (trajectory.coefficients.shape[1] - 1) // 2
+    return fourier_basis(trajectories.period, harmonics, time).states(trajectory.coefficients)
+
+
+def test_all_is_kept_on_a_finer_grid(made):
+    _, model, trajectories = made
+    limits = trajectories.limits
+    for trajectory in (*trajectories.estimation, *trajectories.validation):
+        z, dz, ddz = states(trajectories, trajectory)
+        assert np.abs([dz[0], ddz[0]]).max() < 1e-10
+        tau = pinocchio_model.inverse_dynamics(model.mechanism, model.values, z, dz, ddz)
+        slack = 1 + 1e-9
+        assert np.all((z >= limits.lower - 1e-9) & (z <= limits.upper + 1e-9))
+        assert np.all(np.abs(dz) <= limits.velocity * slack)
+        assert np.all(np.abs(ddz) <= limits.acceleration * slack)
+        assert np.all(np.abs(tau) <= limits.torque * slack)
+        assert np.all(np.abs(tau * dz) <= limits.power * slack)
+        share = [np.abs(tau) / limits.torque, np.abs(tau * dz) / limits.power, np.abs(dz) / limits.velocity,
+                 np.abs(ddz) / limits.acceleration]  # fmt: skip
+        assert max(s.max() for s in share) > 0.7  # something is made use of
+        assert trajectory.peak_torque == pytest.approx(np.abs(tau).max(axis=0), rel=3e-2)
+
+
+def test_rest_costs_little(made):
+    _, model, trajectories = made
+    asked = [text for text in ASKED if "rest_to_rest" not in text]
+    moving, _ = config_and_model("two_link", *asked)
+    free = optimize_trajectories(moving.trajectories, model, None, Run())
+    kappa = [min(t.kappa for t in found.estimation) for found in (trajectories, free)]
+    assert kappa[0] < 1.5 * kappa[1]
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_gradients_of_loads_and_rest(seed):
+    config, model = config_and_model("two_link", *ASKED)
+    task = excitation_task(config.trajectories, model)
+    excitation = excitation_of(task)
+    basis = task.settings.basis()
+    limits = LimitMap(task.settings.limits, basis, "ball", rest_to_rest=True)
+    loose = dataclasses.replace(
+        excitation,
+        loads=dataclasses.replace(
+            excitation.loads, torque=np.full(2, 400.0), power=np.full(2, 900.0)
+        ),
+    )
+    follower = Follower(excitation.coordinates)
+    objective = FreeObjective(loose, basis, limits, Level(4, 30, 30, 0.3), follower, np.eye(2))
+    rng = np.random.default_rng(seed)
+    x = 0.5 * rng.normal(size=2 * limits.n_columns)
+    value, gradient = objective(x)
+    assert np.isfinite(value)
+    for direction in rng.normal(size=(4, x.size)):
+        found = slope(lambda x: objective(x)[0], [x], direction, step=1e-6)
+        assert found == pytest.approx(gradient @ direction, rel=1e-4, abs=1e-6)
+
+
+def test_limits_that_no_motion_keeps_are_said():
+    config, model = config_and_model(
+        "two_link", *[t for t in ASKED if "torque" not in t], "trajectories.torque_limits=[0.5, 0.1]",
+        "trajectories.start_pose=[-0.6, 0]",
+    )  # fmt: skip
+    task = excitation_task(config.trajectories, model)
+    excitation = excitation_of(task)
+    with pytest.raises(ConcernError, match="leave no motion") as error:
+        optimise_trajectory(excitation, task.settings, [0])
+    assert explained(error.value).key == ("trajectories", "torque_limits")
+
+
+@pytest.fixture(scope="module")
+def ur10():
+    return config_of("ur10").mechanism()
+
+
+def test_distances_are_never_overestimated(ur10):
+    """Against capsules by brute force; what spheres cover too much is little."""
+    mechanism = ur10
+    section = ClearanceSection(
+        radius=0.05, gap=0.01, planes=[{"name": "floor", "point": [0, 0, -0.4]}]
+    )
+    constraints = tuple(section.constraints(mechanism))
+    quantities = Quantities(mechanism, constraints)
+    rng = np.random.default_rng(0)
+    q = rng.uniform(-np.pi, np.pi, (60, 6))
+    values, rows = quantities.values(q), quantities.rows(q)
+    pairs = [c.bodies for c in constraints if c.kind == "clearance"]
+    assert pairs
+    seen = 0
+    for k, pose in enumerate(q):
+        truth = capsules.clearances(mechanism, pose, 0.05, pairs)
+        where = capsules.points(mechanism, pose)
+        for c, constraint in enumerate(constraints):
+            if constraint.kind == "clearance":
+                exact = truth[pairs.index(constraint.bodies)]
+            else:
+                exact = (where[constraint.bodies[0]][:, 2] + 0.4).min() - 0.05
+            near = -0.1 < exact < 0.1  # farther away smooth minima mean less
+            seen += near
+            if near:
+                assert values[k, c] <= exact + 1e-6
+                assert values[k, c] >= exact - 0.05
+            if rows[k, c] <= 0:
+                assert exact >= constraint.lower - 1e-6
+    assert seen > 20
+
+
+def test_bodies_that_are_near_anyway_or_ignored_are_not_looked_at(ur10):
+    mechanism = ur10
+    names = [body.name for body in mechanism.bodies]
+    found = {c.name for c in ClearanceSection().constraints(mechanism)}
+    assert f"{names[0]}-{names[1]}" not in found
+    assert f"base-{names[5]}" in found
+    less = ClearanceSection(ignore=[["base", names[5]]], capsules={names[4]: []})
+    left = {c.name for c in less.constraints(mechanism)}
+    assert f"base-{names[5]}" not in left
+    assert not any(names[4] in name for name in left)
+
+
+def test_bodies_of_a_clearance_must_be_there(ur10):
+    with pytest.raises(ConfigError, match="names the body hand; there is"):
+        list(ClearanceSection(ignore=[["base", "hand"]]).constraints(ur10))
+
+
+@pytest.fixture(scope="module")
+def motion(made):
+    _, model, trajectories = made
+    return timed_motion(
+        model.mechanism, trajectories, trajectories.estimation[0], rate=500.0,
+        start_pose=np.array([-np.pi / 2, 0.0]), title="two_link",
+    )  # fmt: skip
+
+
+def test_a_motion_begins_and_ends_where_the_machine_stands(motion, made):
+    limits = made[2].limits
+    for k in (0, -1):
+        assert motion.z[k] == pytest.approx([-np.pi / 2, 0], abs=1e-4)
+        assert motion.dz[k] == pytest.approx(0, abs=2e-3)
+    assert motion.lead > 0
+    assert np.all(np.abs(motion.dz) <= limits.velocity * (1 + 1e-6))
+    # Speeds are the slopes of the positions, accelerations those of the speeds, without a jump.
+    for values, slopes in ((motion.z, motion.dz), (motion.dz, motion.ddz)):
+        middle = (values[2:] - values[:-2]) / (2 / motion.rate)
+        assert np.abs(middle - slopes[1:-1]).max() < 0.02 * np.abs(slopes).max() + 1e-3
+    assert np.abs(np.diff(motion.ddz, axis=0)).max() < 0.1 * np.abs(motion.ddz).max()
+
+
+def test_without_a_pose_it_is_the_trajectory_alone(made):
+    _, model, trajectories = made
+    found = timed_motion(
+        model.mechanism,
+        trajectories,
+        trajectories.estimation[0],
+        rate=100.0,
+        start_pose=None,
+        title="x",
+    )
+    assert found.time[-1] == pytest.approx(trajectories.period, abs=0.01)
+    assert found.dz[0] == pytest.approx(0, abs=1e-12)
+
+
+def test_a_pose_that_cannot_be_reached_is_said(made):
+    _, model, trajectories = made
+    with pytest.raises(DataError, match="start_pose"):
+        timed_motion(
+            model.mechanism, trajectories, trajectories.estimation[0], rate=100.0,
+            start_pose=np.array([2.0, 0.0]), title="x",
+        )  # fmt: skip
+
+
+def test_formats_hold_the_same(motion):
+    table = np.genfromtxt(
+        trajectory_formats["csv"](motion)["trajectory.csv"].splitlines(), delimiter=",", names=True
+    )
+    assert table["q1"] == pytest.approx(motion.z[:, 0], abs=1e-7)
+    plain = json.loads(trajectory_formats["json"](motion)["trajectory.json"])
+    assert np.array(plain["velocities"]) == pytest.approx(motion.dz, abs=1e-8)
+    assert plain["joints"] == list(motion.names)
+    message = yaml.safe_load(trajectory_formats["ros"](motion)["joint_trajectory.yaml"])
+    assert message["joint_names"] == list(motion.names)
+    last = message["points"][-1]
+    assert last["positions"] == pytest.approx(motion.z[-1].tolist(), abs=1e-8)
+    stamp = last["time_from_start"]
+    assert stamp["sec"] + 1e-9 * stamp["nanosec"] == pytest.approx(motion.time[-1])
+    with pytest.raises(ConfigError, match="arms of 6 joints"):
+        trajectory_formats["urscript"](motion)
+    six = dataclasses.replace(motion, names=("j",) * 6, z=np.tile(motion.z, 3))
+    script = trajectory_formats["urscript"](six)["trajectory.script"]
+    assert script.count("servoj(") == motion.time.size - 1
+    assert "t=0.002000" in script
+
+
+def test_the_command(tmp_path, invoke):
+    config, results = ROOT / "configs" / "two_link.yaml", tmp_path / "r"
+    for stage in ("build-model", "optimize-trajectories"):
+        invoke(stage, config, "--results", results, settings=ASKED)
+    arguments = ("export-trajectory", config, "--results", results, "--format", "ros")
+    out = invoke(*arguments, settings=ASKED).out
+    assert "joint_trajectory.yaml" in out
+    assert "begins in motion" not in out
+    error = invoke(*arguments, "--which", "estimation:9", settings=ASKED, code=2).err
+    assert "there is estimation:1 ... estimation:2" in error
