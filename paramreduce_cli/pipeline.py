@@ -18,6 +18,7 @@ from paramreduce_cli.records import (
     MeasuredLog,
     RawLogs,
     Recordings,
+    Reduction,
     Report,
     Run,
     Samples,
@@ -70,8 +71,8 @@ class Stage:
     @property
     def needs_config(self) -> bool:
         """Whether it cannot run on brought samples alone."""
-        made = [entry for entry in self.artifacts if not entry.optional]
-        on_samples = [entry.type for entry in made] == [Samples]
+        made = {entry.type for entry in self.artifacts if not entry.optional}
+        on_samples = Samples in made and made <= {Samples, Reduction}
         return not on_samples or not all(has_default(entry.type) for entry in self.sections)
 
 

@@ -22,6 +22,7 @@ from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
+from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
 from paramreduce_cli.errors import ArtifactError, ConcernError
 from paramreduce_cli.pipeline import (
@@ -97,6 +98,7 @@ class Runner:
         jobs: Worker processes.
         progress: Told of long work.
         samples: A samples.h5 brought by the user instead of the folder's own.
+        settings: What is asked where there is no config.
         remark: Told of things the user should know.
         interrupted: Told that a stage has met Ctrl-C and ends early, but whole.
     """
@@ -106,6 +108,7 @@ class Runner:
     jobs: int = 1
     progress: Callable[[Progress], None] = lambda _: None
     samples: Path | None = None
+    settings: Settings | None = None
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
 
@@ -205,7 +208,7 @@ class Runner:
 
     def _argument(self, entry: StageInput, inputs: _Inputs) -> Any:
         if is_section(entry.type):
-            return section(self.config, entry.type)
+            return section(self.config or self.settings, entry.type)
         if entry.type is Provenance:
             return self._provenance()
         if entry.type is Coefficients:

@@ -11,6 +11,7 @@ from paramreduce_cli.cli.options import FORCE, JOBS, QUIET, RESULTS, SET, cores,
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, describe_stage
 from paramreduce_cli.records import Validation
 from paramreduce_cli.runner import Outcome, Runner
@@ -33,14 +34,21 @@ def stage_command(name: str) -> click.Command:
     ) -> int:
         if config is None and samples is None:
             raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
-        if config is None and overrides:
-            raise click.UsageError("--set changes keys of a CONFIG; give one.")
-        loaded = load_config(config, overrides) if config is not None else None
+        robot = config is not None and (samples is None or has_robot(config))
+        loaded = load_config(config, overrides) if config is not None and robot else None
+        settings = None if loaded is not None else load_settings(config, overrides)
         store = results_store(loaded, results)
         placed = placed_errors(config, overrides)
         with placed, store.locked(), progress_bars(quiet) as progress:
             runner = Runner(
-                loaded, store, jobs or cores(), progress, samples, remark, interruption.heeded
+                loaded,
+                store,
+                jobs or cores(),
+                progress,
+                samples,
+                settings,
+                remark,
+                interruption.heeded,
             )
             outcome = runner.run(stage, force=force, go_on=True)
         if not quiet:
@@ -54,7 +62,7 @@ def stage_command(name: str) -> click.Command:
         params.append(
             click.option(
                 "--samples", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-                help="A samples.h5 of your own; then no CONFIG is needed.",
+                help="A samples.h5 of your own; then CONFIG may be left out, or hold settings without a robot.",
             )
         )  # fmt: skip
     params.append(

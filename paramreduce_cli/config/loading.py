@@ -13,7 +13,7 @@ from pydantic import BaseModel, ValidationError
 from paramreduce_cli.config import reading
 from paramreduce_cli.config.checks import check
 from paramreduce_cli.config.reading import Document
-from paramreduce_cli.config.schema import Config
+from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.errors import ConfigError, Key, keyed
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.numbers import read_constants
@@ -52,6 +52,37 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
             lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]
         raise ConfigError("\n".join(lines))
     return _with_paths(config, path.parent)
+
+
+def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
+    """Read what is asked of samples without any robot.
+
+    Args:
+        path: A YAML without a description; None for defaults.
+        overrides: ``key.key=value`` texts that replace what the file says.
+
+    Raises:
+        ConfigError: As for :func:`load_config`.
+    """
+    document = reading.read_yaml("{}", "settings") if path is None else _read(path)
+    if not isinstance(document.data, dict):
+        raise ConfigError(f"{path}: settings are a mapping of {', '.join(Settings.model_fields)}.")
+    try:
+        for text in overrides:
+            reading.apply_override(document, text)
+        return Settings.model_validate(document.data, context={"constants": {}})
+    except ValidationError as error:
+        problems = _one_per_key([_describe(entry, document.data) for entry in error.errors()])
+        lines = [_line(document, problem) for problem in problems]
+        raise ConfigError("\n".join(dict.fromkeys(lines))) from error
+    except ValueError as error:
+        raise ConfigError(str(error)) from error
+
+
+def has_robot(path: Path) -> bool:
+    """Whether a YAML describes a robot, or holds settings alone; one that is no mapping is to be a robot's."""
+    data = _read(path).data
+    return not isinstance(data, dict) or not set(data) <= set(Settings.model_fields)
 
 
 @contextmanager

@@ -389,6 +389,17 @@ class SourceSection(Section):
     """Whether joints that follow others in the file move on their own."""
 
 
+class Settings(Section):
+    """What may be asked of samples without any robot."""
+
+    reduction: ReductionSection = ReductionSection()
+    """Selection of parameters."""
+    selected: SelectedSection = SelectedSection()
+    """The model to judge."""
+    validation: ValidationSection = ValidationSection()
+    """Judgement."""
+
+
 class Config(Robot):
     """A robot and everything that is done with it."""
 

@@ -15,7 +15,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from paramreduce_cli.config.schema import Config
+from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.errors import Key
 from paramreduce_cli.robots import Robot
 
@@ -46,13 +46,13 @@ def has_default(kind: type) -> bool:
     return kind is not Robot and not Config.model_fields[str(_keys()[kind][0])].is_required()
 
 
-def section(config: Config | None, kind: type) -> Any:
-    """A section of a config; its default without one."""
+def section(config: Config | Settings | None, kind: type) -> Any:
+    """A section of a config, or of settings; its default where there is none."""
     if kind is Robot:
         return config
     path = _keys()[kind]
     value: Any = config
-    if config is None:
+    if not hasattr(config, str(path[0])):
         value, path = Config.model_fields[str(path[0])].default, path[1:]
     for name in path:
         value = getattr(value, str(name))

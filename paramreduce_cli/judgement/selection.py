@@ -13,7 +13,13 @@ from paramreduce_cli.judgement.picking import (
     proven_necessary,
     smallest_within,
 )
-from paramreduce_cli.records import CrossValidation, HeuristicValidation, Model, Reduction, Selected
+from paramreduce_cli.records import (
+    CrossValidation,
+    FloatArray,
+    HeuristicValidation,
+    Reduction,
+    Selected,
+)
 from paramreduce_cli.reduction.models import reduced_model
 from paramreduce_cli.texts import share
 
@@ -22,7 +28,7 @@ _DEFAULT = {"torque_error": 0.01}
 
 def select(
     wanted: SelectedSection,
-    model: Model,
+    known: FloatArray | None,
     reduction: Reduction,
     results: Mapping[str, HeuristicValidation],
     cross_validation: Mapping[str, CrossValidation] | None,
@@ -31,6 +37,13 @@ def select(
 
     Where none keeps to them it is the nearest one, and says so. With cross-validation it is the
     smallest one that the estimation set cannot tell from the best.
+
+    Args:
+        wanted: What the config asks for.
+        known: Standard parameters, (n_standard,), where they are known.
+        reduction: The subsets.
+        results: What they are worth.
+        cross_validation: Where it chooses.
 
     Raises:
         ConfigError: There is no model of that size.
@@ -59,7 +72,7 @@ def select(
             reason = f"{heuristic} with n = {n}: {missed}."
         else:
             reason = _reason(wanted, tolerances, reduction, heuristic, n)
-    chosen = reduced_model(reduction, heuristic, row, model.values)
+    chosen = reduced_model(reduction, heuristic, row, known)
     return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
 
 

@@ -88,6 +88,8 @@ def _doubts(
 def _unsafe(
     section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
 ) -> BoolArray:
+    if not full:  # nothing is known but torques
+        return np.zeros(result.n.size, dtype=bool)
     smallest = result.mass_matrix_smallest_eigenvalue
     factor = section.condition_factor
     near = smallest <= max(0.0, full["mass_matrix_smallest_eigenvalue"] / factor)

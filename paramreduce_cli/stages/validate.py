@@ -1,7 +1,7 @@
 """validate: what every reduced model is worth, and whether the selected one is accepted."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def validate(
     counted: CountedDynamics,
     wanted: SelectedSection,
     search: ReductionSection,
-    model: Model,
+    model: Model | None,
     samples: Samples,
     reduction: Reduction,
     previous: Validation | None,
@@ -68,18 +68,26 @@ def validate(
 ) -> Validation:
     """Judge the reduced models on both sets.
 
+    Without a model, on samples that a user brings, torques alone are judged.
+
     What was measured before on the same models and samples is judged anew, not measured again.
 
     Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
     """
     known = previous if run.unchanged >= _MEASURED_ON else None
-    measured = known or _measured(model, samples, reduction, counted)
+    if known:
+        measured = _Measured(known.heuristics, known.full, known.nominal_acceleration)
+    elif model is None:
+        measured = _torques_alone(samples, reduction)
+    else:
+        measured = _measured(model, samples, reduction, counted)
     heuristics, full = measured.heuristics, measured.full
     crossed = None
     if wanted.cross_validation:
         crossed = known.cross_validation if known else None
         crossed = crossed or _cross_validation(search, wanted, model, samples, reduction, run)
-    selected = select(wanted, model, reduction, heuristics, crossed)
+    values = samples.values if model is None else model.values
+    selected = select(wanted, values, reduction, heuristics, crossed)
     chosen = (selected.heuristic, selected.n)
     if not judging.stability:
         repeated = None
@@ -106,8 +114,8 @@ def validate(
 class _Measured:
     """What all models are worth, whichever is selected and whatever is accepted."""
 
-    heuristics: dict[str, HeuristicValidation]
-    full: dict[str, float]
+    heuristics: Mapping[str, HeuristicValidation]
+    full: Mapping[str, float]
     nominal_acceleration: FloatArray
 
 
@@ -120,7 +128,7 @@ def _measured(
     nominal = samples.nominal_acceleration
     if nominal is None:
         raise DataError("samples.h5 holds no /nominal_acceleration; it is needed to validate.")
-    models = _Models(reduction, model)
+    models = _Models(reduction, model.values)
     _check_coordinates(model, samples)
 
     def errors_on(sample_set: SampleSet) -> tuple[NormErrors, AccelerationErrors]:
@@ -139,6 +147,31 @@ def _measured(
     return _Measured(heuristics, _full_model(model, counts, estimation[1], validation[1]), nominal)
 
 
+def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
+    """Errors of torques; what only a mechanism tells is not a number, operations are zero."""
+    if samples.validation is None:
+        raise DataError("samples.h5 holds no validation set, /validation/W and /validation/tau.")
+    models = _Models(reduction, samples.values)
+    estimation, validation = (
+        torque_errors(part.blocks(), models.values, reduction.nominal_torque)
+        for part in (samples.estimation, samples.validation)
+    )
+    n_dof = reduction.nominal_torque.size
+    unknown = np.full(models.values.shape[1], np.nan)
+    nothing = AccelerationErrors(unknown, np.tile(unknown[:, None], n_dof), unknown, unknown)
+    heuristics = {
+        name: _judged(
+            found.n,
+            np.zeros((found.n.size, len(COUNTS)), np.int64),
+            (estimation, nothing),
+            (validation, nothing),
+            models.rows[name],
+        )
+        for name, found in reduction.heuristics.items()
+    }
+    return _Measured(heuristics, {}, np.full(n_dof, np.nan))
+
+
 def _check_coordinates(model: Model, samples: Samples) -> None:
     n_q = model.mechanism.n_q
     for part in (samples.estimation, samples.validation):
@@ -150,15 +183,15 @@ def _check_coordinates(model: Model, samples: Samples) -> None:
 
 
 class _Models:
-    """Standard parameters of all reduced models, each different one once, and the full model last.
+    """Standard parameters of all reduced models, each different one once, and the full model last if it is known.
 
     Attributes:
         values: (n_standard, n_models)
         rows: Which models the subsets of each heuristic are.
     """
 
-    def __init__(self, reduction: Reduction, model: Model) -> None:
-        if reduction.columns.column.size != model.mechanism.n_parameters:
+    def __init__(self, reduction: Reduction, full: FloatArray | None) -> None:
+        if full is not None and reduction.columns.column.size != full.size:
             raise DataError(
                 "reduction.h5 has other parameters than model.h5; run `paramreduce run`."
             )
@@ -174,7 +207,7 @@ class _Models:
                     columns.append(column)
                 rows.append(number)
             self.rows[name] = np.array(rows, dtype=np.int64)
-        self.values: FloatArray = np.column_stack([*columns, model.values])
+        self.values: FloatArray = np.column_stack([*columns, *([] if full is None else [full])])
 
 
 def _judged(
@@ -220,7 +253,7 @@ def _full_model(
 def _cross_validation(
     search: ReductionSection,
     wanted: SelectedSection,
-    model: Model,
+    model: Model | None,
     samples: Samples,
     reduction: Reduction,
     run: Run,
@@ -269,7 +302,7 @@ def _cross_validation(
 
 def _stability(
     search: ReductionSection,
-    model: Model,
+    model: Model | None,
     samples: Samples,
     reduction: Reduction,
     selected: Selected,

@@ -33,6 +33,68 @@ def test_reduce_an_observation_matrix_without_any_config(invoke, brought, tmp_pa
 W, TAU = "estimation/W", "estimation/tau"
 
 
+SETTINGS = """
+reduction:
+  heuristics: [forward-selection, qr]
+selected:
+  cross_validation: true
+validation:
+  stability: false
+  accept: {torque_error_validation: 0.2}
+"""
+
+
+@pytest.fixture
+def noisy(tmp_path):
+    """Observation matrices of three trajectories, and one to validate on; torques with noise."""
+    rng = np.random.default_rng(1)
+    phi = np.array([5.0, 4.0, 3.0, 0, 0, 0, 0])
+    path = tmp_path / "noisy.h5"
+    with h5py.File(path, "w") as file:
+        for name, rows in (("estimation", 600), ("validation", 200)):
+            W = rng.normal(size=(rows, 7))
+            file[f"{name}/W"] = W
+            file[f"{name}/tau"] = (W @ phi + 0.5 * rng.normal(size=rows)).reshape(-1, 2)
+        file["estimation/trajectory"] = np.repeat([0, 1, 2], 100)
+    return path
+
+
+@pytest.mark.parametrize("as_file", [True, False])
+def test_settings_without_a_robot(as_file, invoke, noisy, tmp_path):
+    """The size is chosen, judged and told, with nothing but matrices."""
+    results = tmp_path / "r"
+    brought = ("--samples", noisy, "--results", results)
+    if as_file:
+        path = tmp_path / "settings.yaml"
+        path.write_text(SETTINGS)
+        invoke("reduce", path, *brought)
+        out = invoke("validate", path, *brought).out
+    else:
+        changes = ["reduction.heuristics=[forward-selection, qr]"]
+        invoke("reduce", *brought, settings=changes)
+        changes += ["selected.cross_validation=true", "validation.stability=false",
+                    "validation.accept.torque_error_validation=0.2"]  # fmt: skip
+        out = invoke("validate", *brought, settings=changes).out
+    assert "is accepted" in out
+    with h5py.File(results / "validation.h5") as file:
+        assert file["selected/n"][()] == 3
+        assert file["forward-selection/torque_error_validation"][2] == pytest.approx(0.07, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("setting", "said"),
+    [
+        ("reduction.heuristic=[qr]", "did you mean heuristics"),
+        ("trajectories.count=3", "trajectories"),
+        ("selected.n=99", "is 99"),
+    ],
+)
+def test_settings_that_cannot_be(setting, said, invoke, noisy, tmp_path):
+    brought = ("--samples", noisy, "--results", tmp_path / "r")
+    invoke("reduce", *brought, settings=["reduction.heuristics=[qr]"])
+    assert said in invoke("validate", *brought, settings=[setting], code=2).err
+
+
 @pytest.mark.parametrize(
     ("changes", "says"),
     [

@@ -60,7 +60,14 @@ def run(
         for stage in stages_to_run(loaded):
             with progress_bars(quiet) as progress:
                 runner = Runner(
-                    loaded, store, jobs or cores(), progress, None, remark, interruption.heeded
+                    loaded,
+                    store,
+                    jobs or cores(),
+                    progress,
+                    None,
+                    None,
+                    remark,
+                    interruption.heeded,
                 )
                 outcome = runner.run(stage, force=force)
             if not quiet:
