@@ -26,9 +26,12 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.reduction.noise import joint_noise, least_squares
+from paramreduce_cli.texts import share
 
 _MOST_SHOWN = 1500
 """Samples in figures."""
+_HARDLY = 0.3
+"""Share of the torques that is left where hardly anything was understood."""
 _ACROSS = 1e-6
 """Share of gravity below which an axis counts as level."""
 
@@ -51,6 +54,12 @@ def identify(
     full, full_fit = _estimate(identification, base_model(model), samples, deviation)
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
     suspected = hints(full_fit, model.mechanism.coordinate_names, _tilts(model, training, full_fit))
+    if full.train > _HARDLY:
+        suspected.insert(
+            0,
+            f"All base parameters together leave {share(full.train)} of the torques unexplained: is the log of this "
+            "robot, are its columns in this order, is friction modelled?",
+        )
     for text in suspected:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     time, measured = _shown(held_out)

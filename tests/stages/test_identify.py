@@ -163,3 +163,14 @@ def test_columns_are_guessed(tmp_path, invoke):
     assert "torque: tau{}" in out
     log = load_config(path).sampling.log
     assert (log.columns.position, log.columns.velocity) == ("q{}", "dq{}")
+
+
+def test_torques_of_another_machine_are_suspected(tmp_path, invoke):
+    log = two_link_log()
+    rng = np.random.default_rng(3)
+    for j in (1, 2):
+        log[f"tau{j}"] = 10 * np.sin(np.cumsum(rng.normal(size=log["t"].size)) / 60)
+    write_log(tmp_path / "log.csv", log)
+    settings = ["report.formats=[svg]", "identification.consistency=none"]
+    error = invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings).err
+    assert "of the torques unexplained: is the log of this robot" in error.replace("\n", " ")
