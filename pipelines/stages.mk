@@ -30,7 +30,7 @@ $(RESULTS)/%/reduction.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/
 $(RESULTS)/%/validation.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) validate $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-$(RESULTS)/%/identification.h5: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/validation.h5 | $(PARAMREDUCE_READY)
+$(RESULTS)/%/identification.h5: $(CONFIGS)/%.yaml $$(call with_log,$$*,$(RESULTS)/$$*/log.h5) $(RESULTS)/%/model.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/validation.h5 | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) identify $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
 $(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $(RESULTS)/%/model.h5 $$(call without_log,$$*,$(RESULTS)/$$*/trajectories.h5) $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/validation.h5 $$(call with_log,$$*,$(RESULTS)/$$*/log.h5) $$(call with_log,$$*,$(RESULTS)/$$*/identification.h5) | $(PARAMREDUCE_READY)

@@ -13,8 +13,12 @@ from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
 
 
-def read_csv(path: Path) -> tuple[list[str], FloatArray]:
+def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], FloatArray]:
     """Headings and numbers of a CSV, also gzipped, (n_rows, n_columns); held as numbers from the start.
+
+    Args:
+        path: The file.
+        leave_out_text: Whether columns that hold text in the first row are left out, and no error.
 
     Raises:
         DataError: It is no table of numbers under headings that differ.
@@ -34,18 +38,38 @@ def read_csv(path: Path) -> tuple[list[str], FloatArray]:
                 raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
             if not header:
                 raise DataError(f"{path}, line 1: the file is empty.")
+            kept = list(range(len(header)))
+            blank = None
             for row in rows:
-                if row and len(row) != len(header):
+                if not row:
+                    blank = blank or rows.line_num
+                    continue
+                if (
+                    blank is not None
+                ):  # at the end they do no harm; inside, lines would be miscounted
+                    raise DataError(f"{path}, line {blank}: is empty. Remove it.")
+                if leave_out_text and not numbers:
+                    kept = [k for k, cell in enumerate(row) if _is_number(cell)]
+                if len(row) != len(header):
                     raise DataError(
                         f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
                         "headings."
                     )
-                numbers.extend(_number(path, rows.line_num, cell) for cell in row)
+                numbers.extend(_number(path, rows.line_num, row[k]) for k in kept)
     except FileNotFoundError as error:
         raise ArtifactError(f"{path}: there is no such file.") from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
-    return header, np.frombuffer(numbers, dtype=float).reshape(-1, len(header))
+    names = [header[k] for k in kept]
+    return names, np.frombuffer(numbers, dtype=float).reshape(-1, len(names))
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _number(path: Path, line: int, cell: str) -> float:

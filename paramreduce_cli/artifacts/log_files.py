@@ -39,7 +39,7 @@ def load_log(path: Path) -> RawLog:
             return _from_arrays(path, ((name, reader.array(name)) for name in numeric))
     if path.suffix == ".npz":
         return _npz(path)
-    header, table = read_csv(path)
+    header, table = read_csv(path, leave_out_text=True)
     columns = {name: np.ascontiguousarray(table[:, k]) for k, name in enumerate(header)}
     return RawLog(str(path), columns, first_line=2)
 
@@ -53,11 +53,20 @@ def _npz(path: Path) -> RawLog:
     check_is_file(path)
     try:
         with np.load(path, allow_pickle=False) as arrays:
-            return _from_arrays(path, ((name, arrays[name]) for name in arrays.files))
+            return _from_arrays(path, _readable(arrays))
     except FileNotFoundError as error:
         raise ArtifactError(f"{path}: there is no such file.") from error
-    except (OSError, EOFError, ValueError, zipfile.BadZipFile, zlib.error) as error:
+    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise ArtifactError(f"{path}: cannot be read as NPZ ({error}).") from error
+
+
+def _readable(arrays: Any) -> Iterator[tuple[str, np.ndarray]]:
+    """Arrays of a file but those of Python objects."""
+    for name in arrays.files:
+        try:
+            yield name, arrays[name]
+        except ValueError:  # objects, which are not read from files of others
+            continue
 
 
 def _from_arrays(path: Path, arrays: Iterator[tuple[str, np.ndarray]]) -> RawLog:
@@ -65,8 +74,8 @@ def _from_arrays(path: Path, arrays: Iterator[tuple[str, np.ndarray]]) -> RawLog
     for name, array in arrays:
         if array.dtype.kind not in "fiub" or array.ndim not in (1, 2):
             continue
-        if array.ndim == 1:
-            columns[name] = array.astype(float)
+        if array.ndim == 1 or array.shape[1] == 1:
+            columns[name] = array.astype(float).ravel()
         else:
             columns |= {f"{name}{k + 1}": array[:, k].astype(float) for k in range(array.shape[1])}
     if not columns:

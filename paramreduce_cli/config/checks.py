@@ -8,6 +8,7 @@ import numpy as np
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key, ParamreduceWarning
 from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
@@ -242,6 +243,11 @@ def _limits(config: Config) -> Iterator[Problem]:
             f"{t.points} points cannot hold {t.harmonics} harmonics within their limits; use at "
             f"least {2 * t.harmonics + 1}, better {20 * t.harmonics}",
         )
+    if t.rest_to_rest and t.harmonics < 2:
+        yield (
+            ("trajectories", "harmonics"),
+            "is 1, but motions from rest to rest need 2 or more, better 4",
+        )
     if t.polished > t.starts:
         yield ("trajectories", "polished"), f"is {t.polished}, but there are {t.starts} starts"
 
@@ -251,6 +257,16 @@ def _unmeasured(config: Config) -> Iterator[Problem]:
     for k, name in enumerate(config.unmeasured):
         if name not in names:
             yield ("unmeasured", k), unknown("independent coordinate", name, names)
+    for key in ("torque_limits", "power_limits"):
+        given = getattr(config.trajectories, key) or [np.inf]
+        if len(given) in (1, len(names)):
+            limits = dict(zip(names, per_joint(given, len(names)), strict=True))
+            for name in set(config.unmeasured) & set(names):
+                if np.isfinite(limits[name]):
+                    yield (
+                        ("trajectories", key),
+                        f"limits {name}, whose torque is unmeasured; write inf for it",
+                    )
     if not config.measured().any():
         yield ("unmeasured",), "leaves no torque to explain; leave out what is measured"
 

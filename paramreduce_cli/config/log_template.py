@@ -1,5 +1,6 @@
 """The part of a config that is for logs, with a guess of what is where in them."""
 
+import itertools
 import json
 import re
 from collections.abc import Iterable, Sequence
@@ -13,10 +14,12 @@ _WORDS = {
     "velocity": ("dq", "qd", "qdot", "v", "vel", "velocity", "velocities", "dz", "actual_qd", "omega"),
     "acceleration": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "ddz"),
     "torque": (
-        "tau", "torque", "torques", "effort", "efforts", "taum", "current", "actual_current", "i", "moment",
+        "tau", "torque", "torques", "effort", "efforts", "moment", "taum", "actual_current", "current", "i",
     ),
 }  # fmt: skip
 _TIMES = ("t", "time", "timestamp", "stamp", "time_s", "seconds")
+_WANTED_ONLY = ("command", "desired", "target", "ref", "setpoint")
+"""Parts of names of what was asked of the machine, not measured."""
 _NEEDED = ("position", "torque")
 
 
@@ -45,20 +48,31 @@ def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, st
             f"no columns for {' and '.join(missing)} of {len(joints)} joints by any usual name among "
             f"{', '.join(names[:30])}. Write sampling.log.columns by hand."
         )
-    return {"time": times[0], **found}
+    return {"time": _time_of(times, found["position"]), **found}
+
+
+def _time_of(times: Sequence[str], positions: str | list[str]) -> str:
+    """The time that stands with the positions: of the same topic or group."""
+    name = positions if isinstance(positions, str) else positions[0]
+    return max(times, key=lambda time: _alike(time, name))
+
+
+def _alike(one: str, other: str) -> int:
+    """Characters with which both begin."""
+    pairs = zip(one, other, strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
 def _plain(name: str) -> str:
     return name.strip().strip("/").lower()
 
 
-def _numbered(names: Sequence[str], words: Iterable[str], n: int) -> str | list[str] | None:
+def _numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
     """A pattern where joints count from 1, a list where from 0; None if there are none."""
     known = set(names)
     stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
-    for stem in sorted(stems):
-        word = _plain(re.split(r"[/.]", stem.rstrip("_./"))[-1])
-        if word not in words and not any(word.endswith(f"_{w}") for w in words if len(w) > 2):
+    for stem in sorted(stems, key=lambda stem: (_rank(stem, words), stem)):
+        if _rank(stem, words) == _UNLIKE:
             continue
         for form in (f"{stem}{NUMBER}", f"{stem}[{NUMBER}]"):
             if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
@@ -67,6 +81,18 @@ def _numbered(names: Sequence[str], words: Iterable[str], n: int) -> str | list[
             if all(name in known for name in listed):
                 return listed
     return None
+
+
+_UNLIKE = 1000
+
+
+def _rank(stem: str, words: Sequence[str]) -> int:
+    """How likely a stem is one of the words: the earlier the word, the likelier; what was asked for comes last."""
+    word = _plain(re.split(r"[/.]", stem.rstrip("_./"))[-1])
+    for k, known in enumerate(words):
+        if word == known or (len(known) > 2 and word.endswith(f"_{known}")):
+            return k + len(words) * any(part in word for part in _WANTED_ONLY)
+    return _UNLIKE
 
 
 def _by_joint(

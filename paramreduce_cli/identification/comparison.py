@@ -11,6 +11,11 @@ _SURE = 2.0
 
 def compared(full: Estimate, reduced: Estimate) -> str:
     """One sentence on held-out data, one on the parts left out in turn."""
+    if len(full.names) == len(reduced.names):
+        return (
+            f"The reduced model has as many parameters as the full one, {len(full.names)}: "
+            f"{share(full.held_out)} held out."
+        )
     better = reduced.held_out < full.held_out
     n, m = len(reduced.names), len(full.names)
     text = (
@@ -19,12 +24,11 @@ def compared(full: Estimate, reduced: Estimate) -> str:
     )
     if full.folds.size < 2 or full.folds.size != reduced.folds.size:
         return text
+    # The subset was chosen on all parts, so that this flatters it a little; values are fitted without each.
     difference = reduced.folds - full.folds
     mean = float(difference.mean())
     error = float(difference.std(ddof=1) / np.sqrt(difference.size))
     apart = f"{100 * mean:+.2g} ± {100 * error:.2g} % over {difference.size} parts left out in turn"
     if abs(mean) <= _SURE * error:
         return f"{text} The training data cannot tell them apart ({apart})."
-    return (
-        f"{text} The training data agree that it is {'better' if mean < 0 else 'worse'} ({apart})."
-    )
+    return f"{text} On the training data, values fitted without each part, it is {'better' if mean < 0 else 'worse'} ({apart})."

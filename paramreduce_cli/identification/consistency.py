@@ -18,12 +18,14 @@ from paramreduce_cli.robots.inertia import pseudo_inertia
 
 _MARGIN = 1e-3
 """Smallest eigenvalue of a pseudo-inertia matrix in units of the body's size."""
+_NOT_FOUND = (
+    "no physically consistent parameters were found; set identification.consistency to none, or to the other "
+    "distance, if they are not needed"
+)
 _UNKNOWN_MASS = 1.0
 """kg, where nothing is known."""
 _UNKNOWN_RADIUS = 0.1
 """m, likewise."""
-_FREE = 1e6
-"""Deviation of parameters of which nothing is known beforehand, times their own unit."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +48,22 @@ class Physical:
     known: FloatArray
 
 
-def physical_parameters(mechanism: Mechanism, known: FloatArray) -> Physical:
+def physical_parameters(mechanism: Mechanism, known: FloatArray, factor: FloatArray) -> Physical:
     """What of a mechanism's parameters must be physical.
 
     Args:
         mechanism: The robot.
         known: Values that are known beforehand, zero where nothing is, (n_parameters,).
+        factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
     """
     columns = np.array([[r.columns[kind] for kind in INERTIAL] for r in mechanism.rigid])
     names = tuple(mechanism.parameters[row[0]].owner for row in columns)
     drives = {k: p.kind for k, p in enumerate(mechanism.parameters) if p.kind in DRIVE}
     positive = [k for k, kind in drives.items() if kind is not Kind.OFFSET]
-    sizes = np.full(known.size, _FREE)
+    # What drives have is left to the data, in units in which it explains all there is.
+    lengths = np.linalg.norm(factor[:, :-1], axis=0)
+    lengths[lengths == 0] = 1.0
+    sizes = np.linalg.norm(factor[:, -1]) / lengths
     for row in columns:
         sizes[row] = _body_sizes(known[row])
     return Physical(names, columns, np.array(positive, dtype=np.int64), sizes, known)
@@ -139,9 +145,9 @@ def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatAr
             warnings.simplefilter("ignore", UserWarning)  # accuracy is seen from eigenvalues
             problem.solve(solver=cp.CLARABEL)
     except cp.SolverError as error:
-        raise DataError(f"no physically consistent parameters were found ({error}).") from error
+        raise DataError(_NOT_FOUND) from error
     if x.value is None:
-        raise DataError(f"no physically consistent parameters were found ({problem.status}).")
+        raise DataError(_NOT_FOUND)
     found = physical.known + physical.sizes * x.value
     found[physical.positive] = np.maximum(found[physical.positive], 0.0)
     result: FloatArray = found

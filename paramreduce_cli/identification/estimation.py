@@ -67,18 +67,21 @@ def rows_of(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Row
         n_samples: How many there are.
     """
     share = min(1.0, _MOST_SAMPLES / n_samples)
-    parts: dict[int, list[tuple[FloatArray, ...]]] = {}
+    parts: dict[tuple[int, int], list[tuple[FloatArray, ...]]] = {}
     step = 0.0
     wanted = taken = 0.0
+    interruptions = 0
     for block in blocks:
         wanted += share * block.time.size
         if taken + 0.5 * block.time.size <= wanted or share == 1.0:
             taken += block.time.size
             X = (block.W @ columns).reshape(*block.tau.shape, -1)
-            # Blocks left out part what is uninterrupted.
-            key = block.trajectory if share == 1.0 else len(parts)
+            key = (block.trajectory, interruptions)
             parts.setdefault(key, []).append((X, block.tau, block.dz, block.ddz))
-            step = step or float(np.median(np.diff(block.time)))
+            if step == 0.0 and block.time.size > 1:
+                step = float(np.median(np.diff(block.time)))
+        else:
+            interruptions += 1  # what is left out parts what is uninterrupted
     joined = [tuple(map(np.concatenate, zip(*part, strict=True))) for part in parts.values()]
     X, tau, dz, ddz = zip(*joined, strict=True)
     return Rows(X, tau, dz, ddz, step, sum(t.shape[0] for t in tau) / n_samples)

@@ -58,6 +58,8 @@ def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
 
 
 def _continued(x: FloatArray, k: int) -> FloatArray:
+    if x.shape[0] == 1:
+        return np.repeat(x, 2 * k + 1, axis=0)
     while k > 0:  # in steps where the filter is longer than the signal
         step = min(k, x.shape[0] - 1)
         x = np.vstack([2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]])

@@ -55,6 +55,8 @@ def hints(
     names: Sequence[str],
     tilts: Sequence[tuple[FloatArray, ...]] = (),
     gravity: float = 9.81,
+    delay: float = 0.0,
+    sliding: Sequence[bool] = (),
 ) -> list[str]:
     """Sentences on what the residuals suggest, the strongest first.
 
@@ -64,13 +66,16 @@ def hints(
         tilts: Torques that gravity of one unit along each horizontal axis would cause, (n_samples, n_dof)
             for each part of the rows.
         gravity: m/s^2
+        delay: That was taken back already, s.
+        sliding: Whether coordinates are lengths; none if left out.
     """
     mistaken = list(_mistaken_columns(fitted, names))
     if mistaken:
         return mistaken
     found: list[str] = []
     tried: set[int] = set()
-    suspects = list(_suspects(fitted, names, tilts, gravity))
+    slides = list(sliding) or [False] * len(names)
+    suspects = list(_suspects(fitted, names, tilts, gravity, delay, slides))
     while len(found) < _MOST:
         judged = [
             (*_judged(fitted, suspect), k) for k, suspect in enumerate(suspects) if k not in tried
@@ -143,7 +148,12 @@ def _alone(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
 
 
 def _suspects(
-    fitted: LinearFit, names: Sequence[str], tilts: Sequence[tuple[FloatArray, ...]], gravity: float
+    fitted: LinearFit,
+    names: Sequence[str],
+    tilts: Sequence[tuple[FloatArray, ...]],
+    gravity: float,
+    delay: float,
+    sliding: Sequence[bool],
 ) -> Iterator[_Suspect]:
     rows = fitted.rows
     fastest = np.max([np.abs(v).max(axis=0) for v in rows.dz], axis=0)
@@ -152,21 +162,30 @@ def _suspects(
     for j, name in enumerate(names):
         if not np.isfinite(fitted.deviation[j]):
             continue
+        force = "N" if sliding[j] else "N m"
         signs = [np.sign(v) for v in rows.dz]
         smooth = [np.tanh(v / (_SMOOTH * fastest)) for v in rows.dz]
         constant = [np.ones_like(v) for v in rows.dz]
         yield _Suspect(
-            j, _alone(signs, j), _missing(name, "the sign of its speed", "N m", "coulomb")
+            j, _alone(signs, j), _missing(name, "the sign of its speed", force, "coulomb")
         )
         yield _Suspect(j, _alone(smooth, j), _smoother(name, _SMOOTH * fastest[j]))
-        yield _Suspect(j, _alone(rows.dz, j), _missing(name, "its speed", "N m s/rad", "viscous"))
         yield _Suspect(
-            j, _alone(rows.ddz, j), _missing(name, "its acceleration", "kg m^2", "inertia")
+            j,
+            _alone(rows.dz, j),
+            _missing(name, "its speed", "N s/m" if sliding[j] else "N m s/rad", "viscous"),
         )
-        yield _Suspect(j, _alone(constant, j), _missing(name, "a constant", "N m", "offset"))
+        yield _Suspect(
+            j,
+            _alone(rows.ddz, j),
+            _missing(name, "its acceleration", "kg" if sliding[j] else "kg m^2", "inertia"),
+        )
+        yield _Suspect(j, _alone(constant, j), _missing(name, "a constant", force, "offset"))
         yield _Suspect(j, _alone(model, j), _scaled(name))
-    slopes = tuple(np.gradient(t, rows.step, axis=0) for t in model)
-    yield _Suspect(None, slopes, _delayed(rows.step))
+    slopes = tuple(
+        np.gradient(t, rows.step, axis=0) if len(t) > 1 else np.zeros_like(t) for t in model
+    )
+    yield _Suspect(None, slopes, _delayed(rows.step, delay))
     for axis, signal in zip("xy", tilts, strict=False):
         yield _Suspect(None, signal, _tilted(axis, gravity))
 
@@ -203,14 +222,14 @@ def _scaled(name: str) -> Callable[[float, float], str | None]:
     return said
 
 
-def _delayed(step: float) -> Callable[[float, float], str | None]:
+def _delayed(step: float, known: float) -> Callable[[float, float], str | None]:
     def said(coefficient: float, share: float) -> str | None:
         if abs(coefficient) < _DELAY * step:
             return None
         later = "later" if coefficient < 0 else "earlier"
         return (
             f"Torques come {abs(coefficient) * 1e3:.3g} ms {later} than positions; try "
-            f"sampling.log.delay: {-coefficient:.3g}."
+            f"sampling.log.delay: {known - coefficient:.3g}."
         )
 
     return said
@@ -252,7 +271,9 @@ def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
     usual, plain = list(range(n_dof)), np.ones(n_dof)
     before = left(usual, plain)
     found: list[tuple[float, str]] = []
-    for j, name in enumerate(names):
+    seen = np.flatnonzero(np.isfinite(scale)).tolist()
+    for j in seen:
+        name = names[j]
         signs = plain.copy()
         signs[j] = -1
         found.append(
@@ -262,7 +283,7 @@ def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
                 "wrong? See sampling.log.torque_signs.",
             )
         )
-    for i, j in combinations(range(n_dof), 2):
+    for i, j in combinations(seen, 2):
         owner = usual.copy()
         owner[i], owner[j] = j, i
         found.append(
@@ -272,6 +293,6 @@ def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
                 "are their columns swapped?",
             )
         )
-    after, text = min(found)
+    after, text = min(found, default=(before, ""))
     if after < _MUCH_BETTER * before:
         yield text

@@ -32,8 +32,11 @@ _SMALL = 0.02
 """Share of a signal's own deviation that its noise is taken for at least."""
 _TO_SIGMA = 1.4826
 """Median absolute deviation to standard deviation of normal noise."""
-_STILL = 0.01
-"""Share of a joint's largest speed below which it stands still."""
+_STILL = 2e-3
+"""Share of a joint's range within which it stands still."""
+_ROUNDING = 1e-9
+_SHORTEST = 20
+"""Samples of a piece that a border makes."""
 _PER_TORQUE_CUTOFF = 40
 """Samples per period of the torque cut-off in which the observation matrix is filtered."""
 _PER_STATE_CUTOFF = 6
@@ -52,6 +55,9 @@ _SAME_RATE = 0.01
 class _Cutoffs:
     state: float
     torque: float
+
+
+_TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut off less."
 
 
 def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> MeasuredLog:
@@ -74,24 +80,24 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
             f"{logs.held_out[0].source}: is recorded at {other_rate:.6g} Hz, {logs.training[0].source} at "
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
-    every = [piece for _, pieces in (*training, *held_out) for piece in pieces]
-    longest = max((p for _, pieces in training for p in pieces), key=lambda p: p.time.size)
+    if held_out:
+        learned_from = [_moving(pieces, wanted) for pieces in training]
+        tested_on = [_moving(pieces, wanted) for pieces in held_out]
+    else:
+        halves = [_split(_moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
+        learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
+    _check_left(learned_from, logs, wanted)
+    longest = max((p.signals for part in learned_from for p in part), key=lambda p: p.time.size)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
     thin = _thinning(wanted, cutoffs, rate)
-    ready = {id(piece): _ready(piece, rate, cutoffs, thin) for piece in every}
+
+    def ready(parts: list[list[_Piece]], folds: int) -> MeasuredMotions:
+        """Nothing of one part is in the other: they are low-passed apart."""
+        return _motions([_ready(p, rate, cutoffs, thin) for part in parts for p in part], folds)
+
     steps.append(_said_of_states(longest, thin, rate / thin))
-    if held_out:
-        parts = [_used(pieces, ready, wanted, rate / thin) for _, pieces in training]
-        others = [_used(pieces, ready, wanted, rate / thin) for _, pieces in held_out]
-    else:
-        halves = [
-            _split(_used(pieces, ready, wanted, rate / thin), 1 - wanted.held_out)
-            for _, pieces in training
-        ]
-        parts, others = [first for first, _ in halves], [second for _, second in halves]
-    learned = _motions([piece for part in parts for piece in part], wanted.folds)
-    tested = _motions([piece for part in others for piece in part], 1)
+    learned, tested = ready(learned_from, wanted.folds), ready(tested_on, 1)
     _check_enough(learned, tested)
     steps.append(_said_of_split(learned, tested, wanted, rate / thin))
     noise = _noise(learned, cutoffs, rate / thin)
@@ -104,18 +110,28 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
         state_cutoff=cutoffs.state,
         torque_cutoff=cutoffs.torque,
         output_rate=_output_rate(wanted, cutoffs, rate / thin),
+        delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
-        shown=_shown(longest, ready[id(longest)], rate),
+        shown=_shown(
+            longest, _ready(_Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals, rate
+        ),
         spectra=spectra,
         steps=tuple(steps),
-        doubts=tuple(dict.fromkeys(text for p in every for text in doubts(p, rate, names))),
+        doubts=tuple(
+            dict.fromkeys(
+                text
+                for pieces in (*training, *held_out)
+                for piece in pieces
+                for text in doubts(piece, rate, names)
+            )
+        ),
     )
 
 
 def _read(
     logs: Sequence[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
-) -> tuple[list[tuple[RawLog, list[Signals]]], float]:
+) -> tuple[list[list[Signals]], float]:
     found = []
     rates: list[float] = []
     for log in logs:
@@ -141,7 +157,7 @@ def _read(
                 "logs of one rate."
             )
         rates.append(rate)
-        found.append((log, pieces))
+        found.append(pieces)
     return found, rates[0] if rates else 0.0
 
 
@@ -242,68 +258,89 @@ def _output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
     return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
 
 
-def _ready(piece: Signals, rate: float, cutoffs: _Cutoffs, thin: int) -> Signals:
-    """Low-passed, differentiated, thinned."""
-    taps = filters.low_pass(cutoffs.state, rate)
-    z = filters.filtered(piece.z, taps)
-    dz = filters.derivative(z, rate) if piece.dz is None else filters.filtered(piece.dz, taps)
-    ddz = filters.derivative(dz, rate) if piece.ddz is None else filters.filtered(piece.ddz, taps)
-    tau = piece.tau
-    if thin > 1 and np.isfinite(cutoffs.torque):
-        tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
-    return Signals(piece.time, z, dz, ddz, tau).part(slice(None, None, thin))
-
-
 @dataclass(frozen=True)
 class _Piece:
-    """A stretch of a motion and which of its samples are used."""
+    """A stretch of a motion, and between which times its samples are used."""
 
     signals: Signals
-    used: slice
+    first: float
+    last: float
+
+    def part(self, rows: slice) -> "_Piece":
+        """Some of its samples."""
+        return _Piece(self.signals.part(rows), self.first, self.last)
+
+    @property
+    def used(self) -> slice:
+        """Its samples that are used."""
+        time = self.signals.time
+        start, stop = np.searchsorted(time, [self.first - _ROUNDING, self.last + _ROUNDING])
+        return slice(int(start), int(max(start, stop)))
 
 
-def _used(
-    pieces: list[Signals], ready: dict[int, Signals], wanted: LogSection, rate: float
-) -> list[_Piece]:
-    """Without what is cut off at the start and the end of a file."""
-    made = [ready[id(piece)] for piece in pieces]
-    first, last = made[0].time[0] + wanted.trim[0], made[-1].time[-1] - wanted.trim[1]
+def _moving(pieces: list[Signals], wanted: LogSection) -> list[_Piece]:
+    """Without what is cut off at the start and the end of a file, which still serves filters."""
+    first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
     if wanted.standstill == "cut":
-        speeds = np.concatenate([m.dz for m in made if m.dz is not None])
-        times = np.concatenate([m.time for m in made])
-        moving = np.flatnonzero(
-            (np.abs(speeds) > _STILL * np.abs(speeds).max(axis=0, initial=1e-12)).any(axis=1)
-        )
-        if moving.size:
-            first, last = max(first, times[moving[0]]), min(last, times[moving[-1]])
-    found = []
-    for m in made:
-        start, stop = np.searchsorted(m.time, [first - 1e-9, last + 1e-9])
-        if stop > start:
-            found.append(_Piece(m, slice(int(start), int(stop))))
-    return found
+        z = np.concatenate([piece.z for piece in pieces])
+        time = np.concatenate([piece.time for piece in pieces])
+        still = _STILL * np.maximum(np.ptp(z, axis=0), 1e-12)
+        gone = np.flatnonzero((np.abs(z - z[0]) > still).any(axis=1))
+        back = np.flatnonzero((np.abs(z - z[-1]) > still).any(axis=1))
+        if gone.size:
+            first, last = max(first, time[gone[0]]), min(last, time[back[-1]])
+    return [_Piece(piece, first, last) for piece in pieces]
 
 
 def _split(pieces: list[_Piece], share: float) -> tuple[list[_Piece], list[_Piece]]:
-    """A first share of the used samples, and the rest; no sample serves filters of both."""
+    """A first share of the used samples, and the rest; pieces that are too short are left out."""
     left = int(share * sum(p.used.stop - p.used.start for p in pieces))
     first, second = [], []
     for piece in pieces:
         size = piece.used.stop - piece.used.start
-        cut = piece.used.start + min(left, size)
-        left -= min(left, size)
-        if cut > piece.used.start:
-            first.append(_Piece(piece.signals.part(slice(cut)), slice(piece.used.start, cut)))
-        if cut < piece.used.stop:
-            rest = slice(cut, None) if cut > piece.used.start else slice(None)
-            start = 0 if cut > piece.used.start else piece.used.start
-            stop = start + piece.used.stop - cut
-            second.append(_Piece(piece.signals.part(rest), slice(start, stop)))
-    return first, second
+        if left >= size:
+            first.append(piece)
+        elif left <= 0:
+            second.append(piece)
+        else:
+            border = piece.used.start + left
+            first.append(piece.part(slice(border)))
+            second.append(piece.part(slice(border, None)))
+        left -= size
+    return (
+        [p for p in first if p.signals.time.size >= _SHORTEST],
+        [p for p in second if p.signals.time.size >= _SHORTEST],
+    )
+
+
+def _check_left(parts: list[list[_Piece]], logs: RawLogs, wanted: LogSection) -> None:
+    for part, log in zip(parts, logs.training, strict=True):
+        if sum(p.used.stop - p.used.start for p in part) < _FEWEST_USED:
+            raise DataError(
+                f"{log.source}: hardly any samples are left to learn from after sampling.log.trim "
+                f"{wanted.trim} and standstill. Bring a longer log, or cut off less."
+            )
+
+
+def _ready(piece: _Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> _Piece:
+    """Low-passed, differentiated, thinned."""
+    s = piece.signals
+    taps = filters.low_pass(cutoffs.state, rate)
+    z = filters.filtered(s.z, taps)
+    dz = filters.derivative(z, rate) if s.dz is None else filters.filtered(s.dz, taps)
+    ddz = filters.derivative(dz, rate) if s.ddz is None else filters.filtered(s.ddz, taps)
+    tau = s.tau
+    if thin > 1 and np.isfinite(cutoffs.torque):
+        tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
+    made = Signals(s.time, z, dz, ddz, tau).part(slice(None, None, thin))
+    return _Piece(made, piece.first, piece.last)
 
 
 def _motions(pieces: list[_Piece], folds: int) -> MeasuredMotions:
     """One after the other, folds parts in time of equal size."""
+    pieces = [piece for piece in pieces if piece.used.stop > piece.used.start]
+    if not pieces:
+        raise DataError(_TOO_SHORT.format("held out"))
     total = sum(p.used.stop - p.used.start for p in pieces)
     fold_of: list[IntArray] = []
     before = 0
@@ -324,9 +361,7 @@ def _motions(pieces: list[_Piece], folds: int) -> MeasuredMotions:
 def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:
     for what, motions in (("to learn from", learned), ("held out", tested)):
         if np.count_nonzero(motions.fold != UNUSED) < _FEWEST_USED:
-            raise DataError(
-                f"the log leaves hardly any samples {what}. Bring a longer one, or cut off less."
-            )
+            raise DataError(_TOO_SHORT.format(what))
 
 
 def _said_of_states(piece: Signals, thin: int, rate: float) -> str:

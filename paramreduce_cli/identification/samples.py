@@ -41,6 +41,13 @@ class LoggedSet:
         self._every = round(self.log.rate / self.log.output_rate)
         self._first = np.searchsorted(self.motions.piece, np.unique(self.motions.piece))
 
+        present = [
+            self.motions.fold[self._rows(k)][self._outputs(k)] for k in range(self._first.size)
+        ]
+        # Folds of which the low-pass leaves nothing are none.
+        numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *present]))
+        self._folds = {int(fold): k for k, fold in enumerate(numbers)}
+
     @property
     def n_samples(self) -> int:
         """How many samples it yields in all."""
@@ -92,7 +99,7 @@ class LoggedSet:
             ready = waiting[waiting + k < end]
             waiting = waiting[ready.size :]
             for number in np.unique(fold[ready]).tolist():
-                yield self._made(held, first, ready[fold[ready] == number], number)
+                yield self._made(held, first, ready[fold[ready] == number], self._folds[number])
             needed = int(waiting[0]) - k if waiting.size else end
             while held and first + held[0].time.size <= needed:
                 first += held.pop(0).time.size

@@ -63,13 +63,17 @@ def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
     """
     columns, units = wanted.columns, wanted.units
     time = _column(log, columns.time) * TIMES[units.time]
-    position = _matrix(log, columns.position, names, "position") * ANGLES[units.position]
-    tau = _matrix(log, columns.torque, names, "torque") * TORQUES[units.torque]
+    position = (
+        _matrix(log, columns.position, names, "position", columns.time) * ANGLES[units.position]
+    )
+    tau = _matrix(log, columns.torque, names, "torque", columns.time) * TORQUES[units.torque]
     dz = ddz = None
     if columns.velocity is not None:
-        dz = _matrix(log, columns.velocity, names, "velocity") * SPEEDS[units.velocity]
+        dz = (
+            _matrix(log, columns.velocity, names, "velocity", columns.time) * SPEEDS[units.velocity]
+        )
     if columns.acceleration is not None:
-        ddz = _matrix(log, columns.acceleration, names, "acceleration")
+        ddz = _matrix(log, columns.acceleration, names, "acceleration", columns.time)
         ddz = ddz * ACCELERATIONS[units.acceleration]
     _check_time(log, columns.time, time)
     return _of_joints(Signals(time, position, dz, ddz, tau), wanted, len(names))
@@ -105,7 +109,7 @@ def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:
     return per_joint(values, n_dof)
 
 
-def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str) -> FloatArray:
+def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str, times: str) -> FloatArray:
     n_dof = len(joints)
     if isinstance(names, str):
         if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:
@@ -124,7 +128,15 @@ def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str) -> Float
         raise ConfigError(
             f"names {len(listed)} columns for {n_dof} joints.", ("sampling", "log", "columns", key)
         )
-    return np.column_stack([_column(log, name) for name in listed])
+    found = [_column(log, name) for name in listed]
+    reference = log.columns.get(times)
+    for name, column in zip(listed, found, strict=True):
+        if reference is not None and column.size != reference.size:
+            raise DataError(
+                f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; bring "
+                "signals that were recorded together."
+            )
+    return np.column_stack(found)
 
 
 def _column(log: RawLog, name: str) -> FloatArray:
@@ -144,12 +156,6 @@ def _column(log: RawLog, name: str) -> FloatArray:
         )
     if column.size < _FEWEST:
         raise DataError(f"{log.source}: {column.size} rows are too few; bring {_FEWEST} or more.")
-    sizes = {values.size for values in log.columns.values()}
-    if len(sizes) > 1 and column.size != next(iter(log.columns.values())).size:
-        raise DataError(
-            f"{log.source}: column {name} has {column.size} rows and others have not; bring signals "
-            "that were recorded together."
-        )
     return column
 
 

@@ -15,6 +15,7 @@ from paramreduce_cli.records import FloatArray
 
 _ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16)
 """Of autoregressive models, among which Akaike's criterion chooses."""
+_NOTHING = 1e-300
 _HALVINGS = 6
 _DEFINITE = 1e-9
 _SETTLING = 1000
@@ -47,8 +48,11 @@ class ColouredNoise:
 def autocovariance_of(segments: Sequence[FloatArray]) -> FloatArray:
     """Autocovariances of a joint's residuals over all segments, (n_lags,)."""
     n = sum(r.size for r in segments)
-    most = max(0, min(_ORDERS[-1], min(r.size for r in segments) // 4))
-    sums = [sum(float(r[lag:] @ r[: r.size - lag]) for r in segments) for lag in range(most + 1)]
+    most = max(0, min(_ORDERS[-1], max(r.size for r in segments) // 4))
+    sums = [
+        sum(float(r[lag:] @ r[: r.size - lag]) for r in segments if r.size > lag)
+        for lag in range(most + 1)
+    ]
     return np.array(sums) / n
 
 
@@ -74,16 +78,18 @@ def coloured_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
         autocovariance: (n_lags,)
         n: Samples that it is of.
     """
+    if not autocovariance[0] > 0:
+        return ColouredNoise(np.zeros(0), _NOTHING)
     most = autocovariance.size - 1
     best: tuple[float, ColouredNoise] | None = None
     for order in (k for k in _ORDERS if k <= most):
         coefficients = np.zeros(0)
-        if order and autocovariance[0] > 0:
+        if order:
             coefficients = linalg.solve_toeplitz(
                 autocovariance[:order], autocovariance[1 : order + 1]
             )
         variance = float(autocovariance[0] - coefficients @ autocovariance[1 : order + 1])
-        variance = max(variance, 1e-12 * float(autocovariance[0]), 1e-300)
+        variance = max(variance, 1e-12 * float(autocovariance[0]), _NOTHING)
         criterion = n * np.log(variance) + 2 * order
         if best is None or criterion < best[0]:
             best = (criterion, ColouredNoise(coefficients, variance))

@@ -93,6 +93,8 @@ class MeasuredLog:
     """Of the low-pass on torques and observation matrix alike, Hz; infinite where there is none."""
     output_rate: float
     """Samples per second that are taken of what passes that, Hz."""
+    delay: float
+    """By which torques were recorded later, which was taken back, s."""
     noise: FloatArray
     """Standard deviation of the torques above the torque cut-off, or above what the motion
     contains where there is none, (n_dof,): no model explains it."""

@@ -18,6 +18,7 @@ from paramreduce_cli.records import (
     Estimate,
     FloatArray,
     Identification,
+    MeasuredLog,
     Model,
     ReducedModel,
     Samples,
@@ -37,7 +38,11 @@ _ACROSS = 1e-6
 
 
 def identify(
-    identification: IdentificationSection, model: Model, samples: Samples, validation: Validation
+    identification: IdentificationSection,
+    log: MeasuredLog | None,
+    model: Model,
+    samples: Samples,
+    validation: Validation,
 ) -> Identification:
     """Identify base parameters and those of the selected model, with standard deviations.
 
@@ -53,7 +58,14 @@ def identify(
         deviation = joint_noise(factors, scale, n_samples)
     full, full_fit = _estimate(identification, base_model(model), samples, deviation)
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
-    suspected = hints(full_fit, model.mechanism.coordinate_names, _tilts(model, training, full_fit))
+    mechanism = model.mechanism
+    suspected = hints(
+        full_fit,
+        mechanism.coordinate_names,
+        _tilts(model, training, full_fit),
+        delay=0.0 if log is None else log.delay,
+        sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
+    )
     if full.train > _HARDLY:
         suspected.insert(
             0,
@@ -166,13 +178,15 @@ def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[F
     ):
         return []
     found = []
+    without = Dynamics(replace(mechanism, gravity=np.zeros(3)))
     for axis in np.eye(3)[:2]:
         tilted = Dynamics(replace(mechanism, gravity=axis))
         parts: dict[int, list[FloatArray]] = {}
         for block in training.blocks():
             still = np.zeros_like(block.q)
             K = tilted.regressor(block.q, still, still)
-            parts.setdefault(block.trajectory, []).append(K @ model.values)
+            weightless = without.regressor(block.q, still, still)
+            parts.setdefault(block.trajectory, []).append((K - weightless) @ model.values)
         found.append(tuple(np.concatenate(part) for part in parts.values()))
     return found
 
@@ -185,9 +199,14 @@ def _consistency(
     held_out = samples.validation
     assert held_out is not None
     factor = combined_factor(samples.estimation.factors(), deviation)
-    known = physics.physical_parameters(model.mechanism, model.values)
+    known = physics.physical_parameters(model.mechanism, model.values, factor)
     try:
         standard = physics.consistent(factor, known, wanted.consistency)
+    except DataError as error:
+        warnings.warn(
+            f"{str(error).rstrip('.')}; going on without", ParamreduceWarning, stacklevel=2
+        )
+        return None
     except ImportError:
         warnings.warn(
             "physical consistency is not looked at, as cvxpy is not installed; "

@@ -84,8 +84,10 @@ def validate(
     heuristics, full = measured.heuristics, measured.full
     crossed = None
     if wanted.cross_validation:
+        methods = _crossed_methods(wanted, reduction)
         crossed = known.cross_validation if known else None
-        crossed = crossed or _cross_validation(search, wanted, model, samples, reduction, run)
+        if crossed is None or set(crossed) != set(methods):
+            crossed = _cross_validation(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
     selected = select(wanted, values, reduction, heuristics, crossed)
     chosen = (selected.heuristic, selected.n)
@@ -250,9 +252,28 @@ def _full_model(
     return result
 
 
+def _crossed_methods(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:
+    """Heuristics that cross-validation looks at, by the name that they were run under.
+
+    Raises:
+        ConfigError: None selects by torque.
+    """
+    methods = {name: SelectionMethod.parse(name) for name in reduction.heuristics}
+    found = {
+        name: method.heuristic
+        for name, method in methods.items()
+        if method.by_torque and wanted.heuristic in (None, name)
+    }
+    if not found:
+        raise ConfigError(
+            "needs a heuristic that selects by torque.", ("selected", "cross_validation")
+        )
+    return found
+
+
 def _cross_validation(
     search: ReductionSection,
-    wanted: SelectedSection,
+    methods: Mapping[str, str],
     model: Model | None,
     samples: Samples,
     reduction: Reduction,
@@ -277,25 +298,22 @@ def _cross_validation(
     ]
     problem = selection_problem(reduction.factor, model, grouped)
     quick = dataclasses.replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
-    methods = {name: SelectionMethod.parse(name) for name in reduction.heuristics}
-    if wanted.heuristic is not None:
-        methods = {name: m for name, m in methods.items() if name == wanted.heuristic}
     found = {}
-    for name, method in methods.items():
-        if not method.by_torque:
-            continue
+    for name, heuristic in methods.items():
 
-        def select(
-            other: SelectionProblem, heuristic: str = method.heuristic
-        ) -> Sequence[IntArray]:
+        def select(other: SelectionProblem, heuristic: str = heuristic) -> Sequence[IntArray]:
             task = SelectionTask(TorqueObjective(other), reduction.rank, effort=quick)
             sizes = set(reduction.heuristics[heuristic].n.tolist())
             return [s for s in run_heuristic(heuristic, task).subsets if s.size in sizes]
 
-        found[name] = cross_validated(problem, folds, select)
+        result = cross_validated(problem, folds, select)
+        if result.n.size:
+            found[name] = result
     if not found:
         raise ConfigError(
-            "needs a heuristic that selects by torque.", ("selected", "cross_validation")
+            "finds no size of subset that comes up with every part left out; ask for more parameters in "
+            "reduction.stop, or for smaller groups.",
+            ("selected", "cross_validation"),
         )
     return found
 

@@ -235,6 +235,24 @@ def test_formats_hold_the_same(motion):
     assert "t=0.002000" in script
 
 
+@pytest.mark.parametrize(
+    ("settings", "said"),
+    [
+        (["trajectories.rest_to_rest=true", "trajectories.harmonics=1"], "need 2 or more"),
+        (
+            ["unmeasured=[z_fore]", "trajectories.torque_limits=[9, 9]"],
+            "whose torque is unmeasured",
+        ),
+        (["trajectories.start_pose=[1, 2, 3]"], "start_pose has 3 values"),
+    ],
+)
+def test_what_cannot_be_asked(settings, said, tmp_path, invoke):
+    config = ROOT / "configs" / "two_link.yaml"
+    assert (
+        said in invoke("build-model", config, "--results", tmp_path, settings=settings, code=2).err
+    )
+
+
 def test_the_command(tmp_path, invoke):
     config, results = ROOT / "configs" / "two_link.yaml", tmp_path / "r"
     for stage in ("build-model", "optimize-trajectories"):
@@ -245,3 +263,8 @@ def test_the_command(tmp_path, invoke):
     assert "begins in motion" not in out
     error = invoke(*arguments, "--which", "estimation:9", settings=ASKED, code=2).err
     assert "there is estimation:1 ... estimation:2" in error
+    others = [text for text in ASKED if "power" not in text]
+    assert (
+        "was made with another trajectories section"
+        in invoke(*arguments, settings=others, code=2).err
+    )

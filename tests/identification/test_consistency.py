@@ -29,7 +29,7 @@ def problem(robot="two_link", noise=0.0, known=1.0, seed=0):
     size = max(noise, 1e-3) * np.std(tau)
     tau = tau + noise * np.std(tau) * rng.normal(size=tau.size)
     factor = np.linalg.qr(np.column_stack([W, tau]) / size, mode="r")
-    return factor, physical_parameters(mechanism, known * truth), truth, W
+    return factor, physical_parameters(mechanism, known * truth, factor), truth, W
 
 
 @pytest.mark.parametrize("distance", ["euclidean", "entropic"])
@@ -74,5 +74,5 @@ def test_no_entropic_distance_to_what_cannot_exist():
 def test_nothing_known_is_no_obstacle():
     config = load_config(TWO_LINK)
     factor, _, _, _ = problem(noise=0.05)
-    physical = physical_parameters(config.mechanism(), np.zeros(20))
+    physical = physical_parameters(config.mechanism(), np.zeros(20), factor)
     assert np.all(smallest_eigenvalues(physical, consistent(factor, physical, "euclidean")) > 0)

@@ -6,6 +6,7 @@ import pytest
 from simulated_logs import two_link_log, write_log
 
 from paramreduce_cli.artifacts.log_files import load_log
+from paramreduce_cli.config.log_template import guessed_columns
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
 from paramreduce_cli.identification.signals import evened, signals
@@ -185,3 +186,62 @@ def test_gaps_part_a_log():
     pieces, _, said = evened(signals(log, section(), NAMES))
     assert [piece.time.size for piece in pieces] == [150, 160]
     assert "1 gaps in time, the longest of 0.405 s" in said[0]
+
+
+def test_signals_of_different_length_are_named():
+    log = RawLog("x", {**LOG, "tau2": LOG["tau2"][:-3]}, None)
+    with pytest.raises(DataError, match="column tau2 has 397 rows, t has 400"):
+        signals(log, section(), NAMES)
+    unused = RawLog("x", {"calibration": np.ones(3), **LOG}, None)
+    assert signals(unused, section(), NAMES).time.size == 400
+
+
+def test_text_and_objects_that_nobody_asks_for(tmp_path):
+    rows = (tmp_path / "log.csv", tmp_path / "log.npz")
+    lines = ["t,mode,q1", *(f"{k},AUTO,{k / 2}" for k in range(60)), ""]
+    rows[0].write_text("\n".join(lines))
+    np.savez(
+        rows[1], t=np.arange(60.0)[:, None], who=np.array([{}], dtype=object), q=np.ones((60, 2))
+    )
+    assert set(load_log(rows[0]).columns) == {"t", "q1"}
+    assert set(load_log(rows[1]).columns) == {"t", "q1", "q2"}
+    np.save(tmp_path / "plain.npy", np.ones(3))
+    (tmp_path / "plain.npy").rename(tmp_path / "plain.npz")
+    with pytest.raises(ArtifactError, match=r"plain\.npz"):
+        load_log(tmp_path / "plain.npz")
+
+
+def test_empty_lines_inside_are_refused(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1\n1,2\n\n3,4\n")
+    with pytest.raises(DataError, match=r"log\.csv, line 3: is empty"):
+        load_log(path)
+
+
+def columns_of(*stems):
+    return [f"{stem}{j}" for stem in stems for j in (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        (["t", *columns_of("q", "tau")], ("t", "q{}", "tau{}")),
+        (["time", *columns_of("current", "q", "tau")], ("time", "q{}", "tau{}")),
+        (["t", *columns_of("commanded_position", "measured_position", "desired_torque", "torque")],
+         ("t", "measured_position{}", "torque{}")),
+        (["/clock/time", "/js/time", *columns_of("/js/position/", "/js/effort/")],
+         ("/js/time", "/js/position/{}", "/js/effort/{}")),
+        (["timestamp", "actual_q_0", "actual_q_1", "actual_current_0", "actual_current_1"],
+         ("timestamp", ["actual_q_0", "actual_q_1"], ["actual_current_0", "actual_current_1"])),
+        (["t", "upper/pos", "fore/pos", "upper/tau", "fore/tau"],
+         ("t", ["upper/pos", "fore/pos"], ["upper/tau", "fore/tau"])),
+    ],
+)  # fmt: skip
+def test_guesses(names, expected):
+    found = guessed_columns(names, NAMES)
+    assert (found["time"], found["position"], found["torque"]) == expected
+
+
+def test_nothing_to_guess():
+    with pytest.raises(ConfigError, match="no columns for torque of 2 joints"):
+        guessed_columns(["t", "q1", "q2"], NAMES)

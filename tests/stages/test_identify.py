@@ -174,3 +174,40 @@ def test_torques_of_another_machine_are_suspected(tmp_path, invoke):
     settings = ["report.formats=[svg]", "identification.consistency=none"]
     error = invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings).err
     assert "of the torques unexplained: is the log of this robot" in error.replace("\n", " ")
+
+
+def test_another_heuristic_is_cross_validated_anew(measured_copy, invoke):
+    folder = measured_copy / "results"
+    for heuristic in ("essential", "forward-selection"):
+        settings = [f"selected.heuristic={heuristic}"]
+        invoke("validate", measured_copy / "arm.yaml", "--results", folder, settings=settings)
+        found = load_file(Store(folder).path(Validation), Validation, "two_link", "validate")[0]
+        assert list(found.cross_validation) == [heuristic] == [found.selected.heuristic]
+
+
+def test_a_joint_whose_torque_is_not_measured(tmp_path, invoke):
+    """It makes no hints, and all else is identified."""
+    log = two_link_log()
+    del log["tau2"]
+    write_log(tmp_path / "log.csv", log)
+    extra = "unmeasured: [z_fore]\n"
+    path = log_config(tmp_path, extra)
+    text = path.read_text().replace("nominal_torque: [20, 5]", "nominal_torque: [20, 5]")
+    path.write_text(text)
+    settings = ["report.formats=[svg]", "sampling.log.columns.torque=[tau1, tau1]"]
+    error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
+    assert "exchanged" not in error
+    assert "torque_signs" not in error
+
+
+def test_folds_of_which_nothing_is_left_are_none(tmp_path, invoke):
+    log = two_link_log(seconds=20)
+    gone = (log["t"] > 3) & (log["t"] < 8) & (np.sin(40 * log["t"]) > 0.9)
+    write_log(tmp_path / "log.csv", {key: values[~gone] for key, values in log.items()})
+    settings = ["report.formats=[svg]", "sampling.log.folds=12", "identification.consistency=none"]
+    invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings)
+    found = load_file(
+        Store(tmp_path / "r").path(Identification), Identification, "two_link", "identify"
+    )[0]
+    assert 2 <= found.full.folds.size < 12
+    assert found.full.folds.min() > 1e-3

@@ -6,17 +6,16 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.report_files import save_files
-from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
-from paramreduce_cli.config import Config, load_config
-from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.config import load_config
 from paramreduce_cli.export.choice import BASE, CONSISTENT, FULL, IDENTIFIED, chosen_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
-from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import (
     FloatArray,
     Identification,
@@ -26,7 +25,6 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import closest_standard
-from paramreduce_cli.runner import Runner
 
 
 @click.command()
@@ -82,7 +80,7 @@ def export(
         records.append(Identification)
     elif text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
-    loading = {record: _loaded(loaded, store, record) for record in records}
+    loading = {record: up_to_date(loaded, store, record) for record in records}
     chosen, title = chosen_model(
         text,
         loading[Model],
@@ -119,11 +117,3 @@ def _standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) 
         consistent: FloatArray = loading[Identification].consistency.standard
         return consistent
     return closest_standard(loading[Model], chosen)
-
-
-def _loaded(config: Config, store: Store, record: type) -> Any:
-    """A record that fits the config: what goes onto a controller had better be up to date."""
-    found = load_file(store.path(record), record, config.robot, maker_of(record))[0]
-    for remark in Runner(config, store, jobs=1).remarks_on(record):
-        raise ArtifactError(f"{remark}.")
-    return found

@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import save_files
-from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import load_config
@@ -13,7 +14,6 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.export.timed_motion import timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
 from paramreduce_cli.fields.section import per_joint
-from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.records import Model, Trajectories, Trajectory
 
 
@@ -53,10 +53,7 @@ def export_trajectory(
     """
     loaded = load_config(config, overrides)
     store = Store(results or Path("results") / loaded.robot)
-    model, trajectories = (
-        load_file(store.path(record), record, loaded.robot, maker_of(record))[0]
-        for record in (Model, Trajectories)
-    )
+    model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
     motion = timed_motion(
         model.mechanism,
