@@ -113,6 +113,8 @@ def try_damage(results, count, seed=0):
     found = {}
     for record in RECORDS:
         path = store.path(record)
+        if not path.exists():  # only runs on a log make them
+            continue
         content, expected = path.read_bytes(), read(store, record)
         found[path.name] = Counter()
         for _ in range(count):
