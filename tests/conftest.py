@@ -167,7 +167,7 @@ def measured_results(tmp_path_factory):
     """A finished run of the small case on a log; look, do not touch."""
     folder = tmp_path_factory.mktemp("measured")
     write_log(folder / "log.csv", two_link_log())
-    config = load_config(log_config(folder))
+    config = load_config(log_config(folder), [ONE_FORMAT])
     for stage in stages_to_run(config):
         Runner(config, Store(folder / "results")).run(stage)
     return folder

@@ -18,6 +18,7 @@ QUICK = [
     "reduction.heuristics=[forward-selection]",
     "selected.heuristic=forward-selection",
     "validation.stability=false",
+    "reduction.stop.parameters=24",
 ]
 
 

@@ -45,7 +45,7 @@ def test_the_covariance_of_scores_by_brute_force():
 def test_intervals_hold_the_truth(pole):
     """Of few logs; `make benchmark` does it with two hundred."""
     hits = []
-    for seed in range(12):
+    for seed in range(8):
         log = simulated(seed)
         tau = log.tau + coloured(log.tau.shape, 0.05 * np.std(log.tau, axis=0), pole, seed)
         found = fitted(log, tau)
