@@ -4,12 +4,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy import ndimage
 
 from paramreduce_cli.config.logs import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.doubts import doubts
+from paramreduce_cli.identification.outliers import without_outliers
+from paramreduce_cli.identification.pieces import Piece, moving, split
 from paramreduce_cli.identification.signals import Signals, evened, signals
 from paramreduce_cli.records import (
     FloatArray,
@@ -24,19 +25,6 @@ from paramreduce_cli.records import (
 
 UNUSED = -1
 """Fold of samples that only serve filters."""
-_WINDOW = 7
-"""Neighbours that tell an outlier."""
-_FAR = 12.0
-"""Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
-_SMALL = 0.02
-"""Share of a signal's own deviation that its noise is taken for at least."""
-_TO_SIGMA = 1.4826
-"""Median absolute deviation to standard deviation of normal noise."""
-_STILL = 2e-3
-"""Share of a joint's range within which it stands still."""
-_ROUNDING = 1e-9
-_SHORTEST = 20
-"""Samples of a piece that a border makes."""
 _PER_TORQUE_CUTOFF = 40
 """Samples per period of the torque cut-off in which the observation matrix is filtered."""
 _PER_STATE_CUTOFF = 6
@@ -81,10 +69,10 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
     if held_out:
-        learned_from = [_moving(pieces, wanted) for pieces in training]
-        tested_on = [_moving(pieces, wanted) for pieces in held_out]
+        learned_from = [moving(pieces, wanted) for pieces in training]
+        tested_on = [moving(pieces, wanted) for pieces in held_out]
     else:
-        halves = [_split(_moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
+        halves = [split(moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
         learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
     _check_left(learned_from, logs, wanted)
     longest = max((p.signals for part in learned_from for p in part), key=lambda p: p.time.size)
@@ -92,14 +80,14 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
     thin = _thinning(wanted, cutoffs, rate)
 
-    def ready(parts: list[list[_Piece]], folds: int) -> MeasuredMotions:
+    def ready(parts: list[list[Piece]], folds: int) -> MeasuredMotions:
         """Nothing of one part is in the other: they are low-passed apart."""
         return _motions([_ready(p, rate, cutoffs, thin) for part in parts for p in part], folds)
 
     steps.append(_said_of_states(longest, thin, rate / thin))
     learned, tested = ready(learned_from, wanted.folds), ready(tested_on, 1)
     _check_enough(learned, tested)
-    steps.append(_said_of_split(learned, tested, wanted, rate / thin))
+    steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
     noise = _noise(learned, cutoffs, rate / thin)
     used = learned.tau[learned.fold != UNUSED]
     return MeasuredLog(
@@ -114,7 +102,7 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
         shown=_shown(
-            longest, _ready(_Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals, rate
+            longest, _ready(Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals, rate
         ),
         spectra=spectra,
         steps=tuple(steps),
@@ -146,7 +134,7 @@ def _read(
         steps.append(f"{log.source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         if wanted.outliers == "replace":
-            pieces, count = _without_outliers(pieces)
+            pieces, count = without_outliers(pieces)
             if count:
                 steps.append(
                     f"{count} outliers are replaced by what lies between their neighbours."
@@ -165,36 +153,6 @@ def _undelayed(found: Signals, delay: float) -> Signals:
     """Torques at the times at which they acted."""
     tau = np.column_stack([np.interp(found.time + delay, found.time, t) for t in found.tau.T])
     return replace(found, tau=tau)
-
-
-def _without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
-    """Single samples far from the median of their neighbours, interpolated [Hampel1974]."""
-    count = 0
-    cleaned = []
-    for piece in pieces:
-        changed = {}
-        for key in ("z", "tau"):
-            values = getattr(piece, key).copy()
-            for column in values.T:
-                away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
-                # In smooth signals every peak is far from its neighbours, but never by much.
-                sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
-                far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
-                if far.any():
-                    count += int(far.sum())
-                    good = np.flatnonzero(~far)
-                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
-            changed[key] = values
-        cleaned.append(replace(piece, **changed))
-    return cleaned, count
-
-
-def _alone(column: FloatArray, least: float) -> np.ndarray:
-    """Samples that stick out from both neighbours to one side; a step's samples do not."""
-    before = np.diff(column, prepend=column[:1])
-    after = -np.diff(column, append=column[-1:])
-    found: np.ndarray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
-    return found
 
 
 def _speeds(piece: Signals, rate: float) -> FloatArray:
@@ -258,62 +216,7 @@ def _output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
     return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
 
 
-@dataclass(frozen=True)
-class _Piece:
-    """A stretch of a motion, and between which times its samples are used."""
-
-    signals: Signals
-    first: float
-    last: float
-
-    def part(self, rows: slice) -> "_Piece":
-        """Some of its samples."""
-        return _Piece(self.signals.part(rows), self.first, self.last)
-
-    @property
-    def used(self) -> slice:
-        """Its samples that are used."""
-        time = self.signals.time
-        start, stop = np.searchsorted(time, [self.first - _ROUNDING, self.last + _ROUNDING])
-        return slice(int(start), int(max(start, stop)))
-
-
-def _moving(pieces: list[Signals], wanted: LogSection) -> list[_Piece]:
-    """Without what is cut off at the start and the end of a file, which still serves filters."""
-    first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
-    if wanted.standstill == "cut":
-        z = np.concatenate([piece.z for piece in pieces])
-        time = np.concatenate([piece.time for piece in pieces])
-        still = _STILL * np.maximum(np.ptp(z, axis=0), 1e-12)
-        gone = np.flatnonzero((np.abs(z - z[0]) > still).any(axis=1))
-        back = np.flatnonzero((np.abs(z - z[-1]) > still).any(axis=1))
-        if gone.size:
-            first, last = max(first, time[gone[0]]), min(last, time[back[-1]])
-    return [_Piece(piece, first, last) for piece in pieces]
-
-
-def _split(pieces: list[_Piece], share: float) -> tuple[list[_Piece], list[_Piece]]:
-    """A first share of the used samples, and the rest; pieces that are too short are left out."""
-    left = int(share * sum(p.used.stop - p.used.start for p in pieces))
-    first, second = [], []
-    for piece in pieces:
-        size = piece.used.stop - piece.used.start
-        if left >= size:
-            first.append(piece)
-        elif left <= 0:
-            second.append(piece)
-        else:
-            border = piece.used.start + left
-            first.append(piece.part(slice(border)))
-            second.append(piece.part(slice(border, None)))
-        left -= size
-    return (
-        [p for p in first if p.signals.time.size >= _SHORTEST],
-        [p for p in second if p.signals.time.size >= _SHORTEST],
-    )
-
-
-def _check_left(parts: list[list[_Piece]], logs: RawLogs, wanted: LogSection) -> None:
+def _check_left(parts: list[list[Piece]], logs: RawLogs, wanted: LogSection) -> None:
     for part, log in zip(parts, logs.training, strict=True):
         if sum(p.used.stop - p.used.start for p in part) < _FEWEST_USED:
             raise DataError(
@@ -322,7 +225,7 @@ def _check_left(parts: list[list[_Piece]], logs: RawLogs, wanted: LogSection) ->
             )
 
 
-def _ready(piece: _Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> _Piece:
+def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
     """Low-passed, differentiated, thinned."""
     s = piece.signals
     taps = filters.low_pass(cutoffs.state, rate)
@@ -333,10 +236,10 @@ def _ready(piece: _Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> _Piece:
     if thin > 1 and np.isfinite(cutoffs.torque):
         tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
     made = Signals(s.time, z, dz, ddz, tau).part(slice(None, None, thin))
-    return _Piece(made, piece.first, piece.last)
+    return Piece(made, piece.first, piece.last)
 
 
-def _motions(pieces: list[_Piece], folds: int) -> MeasuredMotions:
+def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
     """One after the other, folds parts in time of equal size."""
     pieces = [piece for piece in pieces if piece.used.stop > piece.used.start]
     if not pieces:
@@ -374,7 +277,7 @@ def _said_of_states(piece: Signals, thin: int, rate: float) -> str:
     return f"{text}{kept}, {rate:.5g} Hz."
 
 
-def _said_of_split(
+def _said_ofsplit(
     learned: MeasuredMotions, tested: MeasuredMotions, wanted: LogSection, rate: float
 ) -> str:
     one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))

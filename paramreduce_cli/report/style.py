@@ -46,6 +46,8 @@ FUNCTIONS = (("inverse", "d", "-"), ("direct", "[M | δ]", "--"))
 FLOOR = 1e-7
 """Where errors are cut off below: what is less is round-off."""
 HIGHEST_ERROR = 1e3
+_LEAST_MEASURED = 1e-3
+"""Where errors of measured torques are cut off below."""
 
 FORMATS: dict[str, dict] = {
     "pdf": {"metadata": {"CreationDate": None}},
@@ -126,7 +128,9 @@ def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
                 result.n, values, line, color=colour, label=name if line == "-" else None,
                 marker=marker if line == "-" else None, markersize=3,
             )  # fmt: skip
-    axes.set_ylim(bottom=FLOOR, top=min(axes.get_ylim()[1], HIGHEST_ERROR))
+    # Measured torques are never explained to round-off.
+    bottom = FLOOR if data.identification is None else _LEAST_MEASURED
+    axes.set_ylim(bottom=bottom, top=min(axes.get_ylim()[1], HIGHEST_ERROR))
     axes.axvline(data.reduction.rank, color="#57606a", linewidth=0.8, linestyle=":")
     axes.annotate(
         f" r = {data.reduction.rank}", (data.reduction.rank, 1.0),

@@ -32,8 +32,8 @@ def cross_validation(data: ReportData) -> Figure | None:
     if data.log is not None:
         floor = 100 * data.log.noise_share
         axes.annotate(
-            f"noise above the band of the model: {floor:.2g} % of the torques as recorded", (0.98, 0.97),
-            xycoords="axes fraction", ha="right", va="top", fontsize=8, color="#57606a",
+            f"noise above the band of the model: {floor:.2g} % of the torques as recorded", (0.98, 0.03),
+            xycoords="axes fraction", ha="right", va="bottom", fontsize=8, color="#57606a",
         )  # fmt: skip
     best = 100 * float(own.mean.min())
     axes.set_ylim(0, _OVER_BEST * best)

@@ -1,0 +1,52 @@
+"""Single samples far from their neighbours."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy import ndimage
+
+from paramreduce_cli.identification.signals import Signals
+from paramreduce_cli.records import FloatArray
+
+_WINDOW = 7
+"""Neighbours that tell an outlier."""
+_FAR = 12.0
+"""Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
+_SMALL = 0.02
+"""Share of a signal's own deviation that its noise is taken for at least."""
+_TO_SIGMA = 1.4826
+"""Median absolute deviation to standard deviation of normal noise."""
+
+
+def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
+    """Single samples far from the median of their neighbours, interpolated [Hampel1974].
+
+    Returns:
+        The motions, and how many samples were replaced.
+    """
+    count = 0
+    cleaned = []
+    for piece in pieces:
+        changed = {}
+        for key in ("z", "tau"):
+            values = getattr(piece, key).copy()
+            for column in values.T:
+                away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
+                # In smooth signals every peak is far from its neighbours, but never by much.
+                sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
+                far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
+                if far.any():
+                    count += int(far.sum())
+                    good = np.flatnonzero(~far)
+                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
+            changed[key] = values
+        cleaned.append(replace(piece, **changed))
+    return cleaned, count
+
+
+def _alone(column: FloatArray, least: float) -> np.ndarray:
+    """Samples that stick out from both neighbours to one side; a step's samples do not."""
+    before = np.diff(column, prepend=column[:1])
+    after = -np.diff(column, append=column[-1:])
+    found: np.ndarray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
+    return found

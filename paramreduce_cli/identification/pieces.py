@@ -1,0 +1,69 @@
+"""Stretches of motions, and which of their samples are used: to learn from, or held out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.identification.signals import Signals
+
+_STILL = 2e-3
+"""Share of a joint's range within which it stands still."""
+_ROUNDING = 1e-9
+_SHORTEST = 20
+"""Samples of a piece that a border makes."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A stretch of a motion, and between which times its samples are used."""
+
+    signals: Signals
+    first: float
+    last: float
+
+    def part(self, rows: slice) -> "Piece":
+        """Some of its samples."""
+        return Piece(self.signals.part(rows), self.first, self.last)
+
+    @property
+    def used(self) -> slice:
+        """Its samples that are used."""
+        time = self.signals.time
+        start, stop = np.searchsorted(time, [self.first - _ROUNDING, self.last + _ROUNDING])
+        return slice(int(start), int(max(start, stop)))
+
+
+def moving(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
+    """Without what is cut off at the start and the end of a file, which still serves filters."""
+    first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
+    if wanted.standstill == "cut":
+        z = np.concatenate([piece.z for piece in pieces])
+        time = np.concatenate([piece.time for piece in pieces])
+        still = _STILL * np.maximum(np.ptp(z, axis=0), 1e-12)
+        gone = np.flatnonzero((np.abs(z - z[0]) > still).any(axis=1))
+        back = np.flatnonzero((np.abs(z - z[-1]) > still).any(axis=1))
+        if gone.size:
+            first, last = max(first, time[gone[0]]), min(last, time[back[-1]])
+    return [Piece(piece, first, last) for piece in pieces]
+
+
+def split(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
+    """A first share of the used samples, and the rest; pieces that are too short are left out."""
+    left = int(share * sum(p.used.stop - p.used.start for p in pieces))
+    first, second = [], []
+    for piece in pieces:
+        size = piece.used.stop - piece.used.start
+        if left >= size:
+            first.append(piece)
+        elif left <= 0:
+            second.append(piece)
+        else:
+            border = piece.used.start + left
+            first.append(piece.part(slice(border)))
+            second.append(piece.part(slice(border, None)))
+        left -= size
+    return (
+        [p for p in first if p.signals.time.size >= _SHORTEST],
+        [p for p in second if p.signals.time.size >= _SHORTEST],
+    )
