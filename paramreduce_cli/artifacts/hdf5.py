@@ -27,6 +27,8 @@ SCHEMA = 9
 
 _CHUNK = 16384
 """Numbers in a chunk of a dataset that grows: 128 KiB."""
+_WRITTEN_AT_ONCE = 4 * _CHUNK
+"""Numbers of rows that wait to be written together: a call of HDF5 takes long for a few."""
 _CHUNK_CACHE = 1 << 20
 """Bytes that HDF5 keeps of each dataset; all are read and written in order."""
 _FORMAT = ("v110", "v110")
@@ -71,6 +73,7 @@ class Writer:
         self._group = group
         self._check = check
         self._hash = hashlib.sha256()
+        self._flushes: list[Callable[[], None]] = []
 
     @property
     def digest(self) -> str:
@@ -135,13 +138,29 @@ class Writer:
             fletcher32=True,
         )  # fmt: skip
 
-        def append(block: np.ndarray) -> None:
-            start = data.shape[0]
-            data.resize(start + block.shape[0], axis=0)
-            data[start:] = block
-            self._note(name, np.ascontiguousarray(block).tobytes())
+        waiting: list[np.ndarray] = []
 
+        def flush() -> None:
+            if waiting:
+                start = data.shape[0]
+                data.resize(start + sum(map(len, waiting)), axis=0)
+                data[start:] = np.concatenate(waiting)
+                waiting.clear()
+
+        def append(block: np.ndarray) -> None:
+            self._note(name, np.ascontiguousarray(block).tobytes())
+            waiting.append(np.array(block, dtype=float))
+            if sum(array.size for array in waiting) >= _WRITTEN_AT_ONCE:
+                flush()
+
+        self._flushes.append(flush)
         return append
+
+    def finish(self) -> None:
+        """Write what waits for more rows."""
+        for flush in self._flushes:
+            flush()
+        self._check()
 
     def _note(self, name: str, content: bytes) -> None:
         self._check()
@@ -168,6 +187,7 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
         with h5py.File(disk, "w", libver=_FORMAT, rdcc_nbytes=_CHUNK_CACHE) as file:
             writer = Writer(file, disk.check)
             fill(writer)
+            writer.finish()
             seconds = stamp.seconds + time.perf_counter() - started
             done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
             for name, value in _attributes(done).items():

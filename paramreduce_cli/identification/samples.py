@@ -96,8 +96,8 @@ class LoggedSet:
         for block in blocks:
             held.append(block)
             end += block.time.size
-            ready = waiting[waiting + k < end]
-            waiting = waiting[ready.size :]
+            count = int(np.searchsorted(waiting, end - k))
+            ready, waiting = waiting[:count], waiting[count:]
             for number in np.unique(fold[ready]).tolist():
                 yield self._made(held, first, ready[fold[ready] == number], self._folds[number])
             needed = int(waiting[0]) - k if waiting.size else end
