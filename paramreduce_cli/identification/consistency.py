@@ -36,8 +36,8 @@ class Physical:
         names: Of bodies and payloads.
         columns: Of each, its parameters in the order of ``INERTIAL``, (n_bodies, 10).
         positive: Parameters that must not be negative.
-        sizes: How far each parameter may be from what is known, (n_parameters,): as much as it is
-            for a body of its mass and size.
+        sizes: How far each parameter may be from what is known, (n_parameters,): as much as it is for a
+            body of its mass and size; for those of drives, the value that alone would make all torques.
         known: (n_parameters,)
     """
 

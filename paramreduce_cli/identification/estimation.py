@@ -16,6 +16,7 @@ from paramreduce_cli.identification.uncertainty import (
     score_covariance,
 )
 from paramreduce_cli.multibody.observation import append_rows
+from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import Block, FloatArray, Residuals
 
 _MOST_SAMPLES = 40_000
@@ -116,9 +117,7 @@ def robust_fit(
             weight = np.sqrt(np.minimum(1.0, _TUNING / np.maximum(size, 1e-12))) / deviation
             stacked = np.concatenate([X, tau[..., None]], axis=2) * weight[..., None]
             factor = append_rows(factor, stacked.reshape(-1, start.size + 1))
-        found = np.asarray(
-            np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0], dtype=float
-        )
+        found = least_squares(factor)
         change = np.linalg.norm(factor[:, :-1] @ (found - parameters))
         parameters = found
         if change <= _SETTLED * np.linalg.norm(factor[:, -1]):
@@ -225,3 +224,15 @@ class LinearFit:
             * unknown,
             white=np.array(white) * unknown,
         )
+
+
+def weighted_fit(rows: Rows, deviation: FloatArray) -> LinearFit:
+    """Weighted least squares on some rows.
+
+    Args:
+        rows: Of a model.
+        deviation: That torques of each joint are divided by, (n_dof,); infinite where not measured.
+    """
+    X = np.concatenate([(x / deviation[:, None]).reshape(-1, x.shape[2]) for x in rows.X])
+    y = np.concatenate([(t / deviation).ravel() for t in rows.tau])
+    return LinearFit(rows, least_squares(np.column_stack([X, y])), deviation)

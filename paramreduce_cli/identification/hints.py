@@ -12,8 +12,9 @@ from itertools import combinations
 
 import numpy as np
 
-from paramreduce_cli.identification.estimation import LinearFit, Rows
+from paramreduce_cli.identification.estimation import LinearFit, weighted_fit
 from paramreduce_cli.identification.uncertainty import score_covariance
+from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import FloatArray
 
 _SURE = 5.0
@@ -125,16 +126,6 @@ def _with(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
         np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True)
     )
     return weighted_fit(replace(rows, X=X), fitted.deviation)
-
-
-def weighted_fit(rows: Rows, deviation: FloatArray) -> LinearFit:
-    """Weighted least squares on some rows."""
-    X = np.concatenate([(x / deviation[:, None]).reshape(-1, x.shape[2]) for x in rows.X])
-    y = np.concatenate([(t / deviation).ravel() for t in rows.tau])
-    lengths = np.linalg.norm(X, axis=0)
-    lengths[lengths == 0] = 1.0
-    parameters = np.linalg.lstsq(X / lengths, y, rcond=1e-9)[0] / lengths
-    return LinearFit(rows, parameters, deviation)
 
 
 def _alone(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
@@ -263,9 +254,7 @@ def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
     def left(owner: Sequence[int], signs: FloatArray) -> float:
         A = np.concatenate([f[:, :p] for f in factors])
         y = np.concatenate([f[:, p + owner[j]] * signs[j] for j, f in enumerate(factors)])
-        lengths = np.linalg.norm(A, axis=0)
-        lengths[lengths == 0] = 1.0
-        solution = np.linalg.lstsq(A / lengths, y, rcond=1e-9)[0] / lengths
+        solution = least_squares(np.column_stack([A, y]))
         return float(np.sum((y - A @ solution) ** 2))
 
     usual, plain = list(range(n_dof)), np.ones(n_dof)

@@ -74,3 +74,13 @@ def independent_columns(W: FloatArray, wanted: IntArray, dependent: float = DEPE
     """
     rest = Orthogonaliser(unit_columns(W[:, wanted])[0], dependent=dependent)
     return [int(column) for j, column in enumerate(wanted) if rest.take(j)]
+
+
+def least_squares(factor: FloatArray) -> FloatArray:
+    """The parameters of smallest norm that fit best, (n,), from rows or a factor of [W | chi], (k, n + 1).
+
+    Columns are scaled to unit length first, so that units play no part.
+    """
+    X, lengths = unit_columns(factor[:, :-1])
+    solution: FloatArray = np.linalg.lstsq(X, factor[:, -1], rcond=DEPENDENT)[0] / lengths
+    return solution

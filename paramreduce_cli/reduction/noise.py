@@ -3,23 +3,11 @@
 import numpy as np
 
 from paramreduce_cli.multibody.observation import combined_factor
-from paramreduce_cli.multibody.orthogonal import DEPENDENT
+from paramreduce_cli.multibody.orthogonal import DEPENDENT, least_squares
 from paramreduce_cli.records import FloatArray
 
 _ROUNDS = 5
 """Of fits weighted by the noise that the one before has left; it hardly changes after three."""
-
-
-def least_squares(factor: FloatArray) -> FloatArray:
-    """The parameters of smallest norm that fit best, (n,), from a factor of [W | chi], (k, n + 1).
-
-    Columns are scaled to unit length first, so that units play no part.
-    """
-    W, chi = factor[:, :-1], factor[:, -1]
-    lengths = np.linalg.norm(W, axis=0)
-    lengths[lengths == 0] = 1.0
-    solution: FloatArray = np.linalg.lstsq(W / lengths, chi, rcond=DEPENDENT)[0] / lengths
-    return solution
 
 
 def residual_deviation(factors: FloatArray, parameters: FloatArray, n_samples: int) -> FloatArray:

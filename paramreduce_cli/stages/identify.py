@@ -13,7 +13,9 @@ from paramreduce_cli.identification.estimation import LinearFit, robust_fit, row
 from paramreduce_cli.identification.hints import hints
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
+from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import (
+    Block,
     Consistency,
     Estimate,
     FloatArray,
@@ -26,7 +28,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model
-from paramreduce_cli.reduction.noise import joint_noise, least_squares
+from paramreduce_cli.reduction.noise import joint_noise
 from paramreduce_cli.texts import share
 
 _MOST_SHOWN = 1500
@@ -63,6 +65,7 @@ def identify(
         full_fit,
         mechanism.coordinate_names,
         _tilts(model, training, full_fit),
+        gravity=float(np.linalg.norm(mechanism.gravity)),
         delay=0.0 if log is None else log.delay,
         sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
     )
@@ -74,7 +77,7 @@ def identify(
         )
     for text in suspected:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
-    time, measured = _shown(held_out)
+    shown = _shown(held_out)
     return Identification(
         estimator=identification.estimator,
         torque_deviation=deviation,
@@ -85,10 +88,10 @@ def identify(
         consistency=_consistency(identification, model, samples, deviation),
         hints=tuple(suspected),
         comparison=compared(full, reduced),
-        shown_time=time,
-        shown_measured=measured,
-        shown_full=_predicted(held_out, full.standard),
-        shown_reduced=_predicted(held_out, reduced.standard),
+        shown_time=np.concatenate([block.time for block in shown]),
+        shown_measured=np.concatenate([block.tau for block in shown]),
+        shown_full=_predicted(shown, full.standard),
+        shown_reduced=_predicted(shown, reduced.standard),
     )
 
 
@@ -229,23 +232,15 @@ def _consistency(
     )
 
 
-def _shown(part: SampleSet) -> tuple[FloatArray, FloatArray]:
-    """Times and measured torques of the first samples."""
-    times, torques, count = [], [], 0
+def _shown(part: SampleSet) -> list[Block]:
+    """The first samples, for figures."""
+    found: list[Block] = []
     for block in part.blocks():
-        if count >= _MOST_SHOWN or block.trajectory != 0:
+        if block.trajectory != 0 or sum(b.time.size for b in found) >= _MOST_SHOWN:
             break
-        times.append(block.time)
-        torques.append(block.tau)
-        count += block.time.size
-    return np.concatenate(times), np.concatenate(torques)
+        found.append(block)
+    return found
 
 
-def _predicted(part: SampleSet, standard: FloatArray) -> FloatArray:
-    torques, count = [], 0
-    for block in part.blocks():
-        if count >= _MOST_SHOWN or block.trajectory != 0:
-            break
-        torques.append((block.W @ standard).reshape(block.tau.shape))
-        count += block.time.size
-    return np.concatenate(torques)
+def _predicted(blocks: list[Block], standard: FloatArray) -> FloatArray:
+    return np.concatenate([(b.W @ standard).reshape(b.tau.shape) for b in blocks])

@@ -8,8 +8,8 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.identification.estimation import Rows
-from paramreduce_cli.identification.hints import hints, weighted_fit
+from paramreduce_cli.identification.estimation import Rows, weighted_fit
+from paramreduce_cli.identification.hints import hints
 from tests.simulated_logs import RATE, coloured, simulated
 
 _NOISE = 0.03

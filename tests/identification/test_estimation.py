@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from simulated_logs import RATE, coloured, simulated
 
-from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit
-from paramreduce_cli.identification.hints import hints, weighted_fit
+from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit, weighted_fit
+from paramreduce_cli.identification.hints import hints
 from paramreduce_cli.identification.uncertainty import ColouredNoise, score_covariance
 
 

@@ -192,8 +192,6 @@ def test_a_joint_whose_torque_is_not_measured(tmp_path, invoke):
     write_log(tmp_path / "log.csv", log)
     extra = "unmeasured: [z_fore]\n"
     path = log_config(tmp_path, extra)
-    text = path.read_text().replace("nominal_torque: [20, 5]", "nominal_torque: [20, 5]")
-    path.write_text(text)
     settings = ["report.formats=[svg]", "sampling.log.columns.torque=[tau1, tau1]"]
     error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
     assert "exchanged" not in error
