@@ -91,6 +91,7 @@ reference: $(REFERENCES)
 	  cp results/$$robot/report/summary.json results/reference/$$robot.json; \
 	done
 
+benchmark robots identification controllers: export PYTHONPATH := tests
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks

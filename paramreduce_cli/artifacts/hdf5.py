@@ -139,18 +139,24 @@ class Writer:
         )  # fmt: skip
 
         waiting: list[np.ndarray] = []
+        enough = max(1, _WRITTEN_AT_ONCE // max(1, columns or 1))
+        count = 0
 
         def flush() -> None:
+            nonlocal count
             if waiting:
                 start = data.shape[0]
-                data.resize(start + sum(map(len, waiting)), axis=0)
+                data.resize(start + count, axis=0)
                 data[start:] = np.concatenate(waiting)
                 waiting.clear()
+                count = 0
 
         def append(block: np.ndarray) -> None:
             self._note(name, np.ascontiguousarray(block).tobytes())
+            nonlocal count
             waiting.append(np.array(block, dtype=float))
-            if sum(array.size for array in waiting) >= _WRITTEN_AT_ONCE:
+            count += len(block)
+            if count >= enough:
                 flush()
 
         self._flushes.append(flush)

@@ -1,16 +1,31 @@
-"""samples.h5, the project's own or one that a user brings: written and read block by block."""
+"""samples.h5, the project's own or one that a user brings: written and read block by block.
+
+A large observation matrix is not kept where the model next to the file gives it back: it is sooner
+computed than read.
+"""
 
 import itertools
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.hdf5 import Reader, Writer, reading
+from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
 from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
-from paramreduce_cli.records import LAST, Block, FloatArray, Samples, SampleSet
+from paramreduce_cli.records import LAST, Block, FloatArray, Model, Samples, SampleSet
+
+_MOST_KEPT = 1 << 27
+"""Numbers of an observation matrix that are kept though they can be computed again: 1 GiB."""
+_LEFT_OUT = "W_left_out"
+"""Dataset with the shape of an observation matrix that is not kept."""
+_MODEL = "model.h5"
+
+States = Callable[[int, int], list[FloatArray]]
 
 
 def save_samples(writer: Writer, samples: Samples) -> None:
@@ -40,7 +55,11 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
             appenders = {key: writer.rows(f"{name}/{key}", n_dof) for key in _STATES}
             appenders["time"] = writer.rows(f"{name}/time", None)
             appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
-            appenders["W"] = writer.rows(f"{name}/W", block.W.shape[1])
+            size = sample_set.n_samples * n_dof, block.W.shape[1]
+            if sample_set.recomputable and size[0] * size[1] > _MOST_KEPT:
+                writer.dataset(f"{name}/{_LEFT_OUT}", size)
+            else:
+                appenders["W"] = writer.rows(f"{name}/W", block.W.shape[1])
             n_q = block.q.shape[1]
             if n_q != n_dof:  # loops: the independent coordinates are not all there is
                 appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
@@ -67,18 +86,9 @@ class StoredSet:
     def __init__(self, path: Path, name: str, n_parameters: int, *, own: bool) -> None:
         self._path, self._name, self._own = path, name, own
         with reading(path) as reader:
-            W, tau = reader.rows(f"{name}/W"), reader.rows(f"{name}/tau")
-            if W.ndim != 2 or tau.ndim != 2 or W.shape[0] != tau.shape[0] * tau.shape[1]:
-                raise ArtifactError(
-                    f"{path}: /{name}/W has shape {W.shape} and /{name}/tau {tau.shape}; W needs "
-                    "one row per sample and joint, (n_samples * n_dof, n_parameters)."
-                )
-            if 0 in W.shape:
-                raise ArtifactError(f"{path}: /{name}/W is empty.")
-            if W.shape[1] != n_parameters:
-                raise ArtifactError(
-                    f"{path}: /{name}/W has {W.shape[1]} columns for {n_parameters} parameters."
-                )
+            tau = reader.rows(f"{name}/tau")
+            self.recomputable = own and f"{name}/{_LEFT_OUT}" in reader
+            self._check_matrix(_matrix_shape(reader, name), tau.shape, n_parameters)
             self.n_samples, self.n_dof = tau.shape
             present = [key for key in ("z", "dz", "ddz") if f"{name}/{key}" in reader]
             self._has_states = len(present) == 3
@@ -95,36 +105,73 @@ class StoredSet:
             for key in ("time", "trajectory"):
                 self._column(reader, key)
 
+    def _check_matrix(self, W: tuple[int, ...], tau: tuple[int, ...], n_parameters: int) -> None:
+        place = f"{self._path}: /{self._name}/"
+        if len(W) != 2 or len(tau) != 2 or W[0] != tau[0] * tau[1]:
+            raise ArtifactError(
+                f"{place}W has shape {W} and /{self._name}/tau {tau}; W needs one row per sample and "
+                "joint, (n_samples * n_dof, n_parameters)."
+            )
+        if 0 in W:
+            raise ArtifactError(f"{place}W is empty.")
+        if W[1] != n_parameters:
+            raise ArtifactError(f"{place}W has {W[1]} columns for {n_parameters} parameters.")
+
+    @cached_property
+    def _dynamics(self) -> Dynamics:
+        """Of the model that the samples were computed with.
+
+        Raises:
+            ArtifactError: It is not next to the file.
+        """
+        path = self._path.with_name(_MODEL)
+        own = read_stamp(self._path)
+        with reading(
+            path, f"The observation matrix of {self._path} is computed from it."
+        ) as reader:
+            stamp = read_stamp(path)
+            if own is None or stamp is None or own.inputs.get(_MODEL) != stamp.digest:
+                raise ArtifactError(
+                    f"{path}: is not the model that {self._path} was computed with. Rebuild both with "
+                    "`paramreduce run`."
+                )
+            return Dynamics(layouts.load(reader, Model).mechanism)
+
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         with reading(self._path) as reader:
             base = self._name
-            W, tau = reader.rows(f"{base}/W"), reader.rows(f"{base}/tau")
+            tau = reader.rows(f"{base}/tau")
+            W = None if self.recomputable else reader.rows(f"{base}/W")
             owner = self._column(reader, "trajectory")
             time = self._column(reader, "time")
+            states_of = self._states(reader, _STATES[:3])
+            generalised_of = self._states(reader, _GENERALISED if self._has_generalised else ())
             for start, stop in _slices(owner, BLOCK_SAMPLES):
                 tau_block = tau[start:stop].astype(float)
-                W_block = W[start * self.n_dof : stop * self.n_dof].astype(float)
+                states = states_of(start, stop)
+                whole = generalised_of(start, stop) if self._has_generalised else states
+                if W is None:
+                    K = self._dynamics.regressor(*whole)
+                    W_block = K.reshape(-1, K.shape[2])
+                else:
+                    W_block = W[start * self.n_dof : stop * self.n_dof].astype(float)
                 if not (np.isfinite(tau_block).all() and np.isfinite(W_block).all()):
                     raise ArtifactError(
                         f"{self._path}: /{base} holds numbers that are not finite between samples "
                         f"{start} and {stop}. Remove those samples."
                     )
-                states = self._states(reader, start, stop, _STATES[:3])
-                whole = states
-                if self._has_generalised:
-                    whole = self._states(reader, start, stop, _GENERALISED)
                 (z, dz, ddz), (q, dq, ddq) = states, whole
                 yield Block(
                     int(owner[start]), time[start:stop], z, dz, ddz, tau_block, q, dq, ddq, W_block
                 )
 
-    def _states(
-        self, reader: Reader, start: int, stop: int, keys: tuple[str, ...]
-    ) -> list[FloatArray]:
+    def _states(self, reader: Reader, keys: tuple[str, ...]) -> States:
+        """Gives states of a range of samples; not numbers where the file has none."""
         if not self._has_states:
-            return [np.full((stop - start, self.n_dof), np.nan)] * 3
-        return [reader.rows(f"{self._name}/{key}")[start:stop] for key in keys]
+            return lambda start, stop: [np.full((stop - start, self.n_dof), np.nan)] * 3
+        rows = [reader.rows(f"{self._name}/{key}") for key in keys]
+        return lambda start, stop: [data[start:stop] for data in rows]
 
     def _column(self, reader: Reader, key: str) -> FloatArray:
         name = f"{self._name}/{key}"
@@ -157,10 +204,11 @@ def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
 
 def load_samples(reader: Reader) -> Samples:
     """samples.h5, the project's own or one that a user brings."""
-    W = reader.rows("estimation/W")
-    if W.ndim != 2:
+    own = reader.attribute("stage") == "sample"
+    W = _matrix_shape(reader, "estimation")
+    if len(W) != 2:
         raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
-    n = W.shape[1]
+    n = W[1]
     if "parameters/names" in reader:
         names = reader.texts("parameters/names")
         if len(names) != n or len(set(names)) != n:
@@ -170,9 +218,10 @@ def load_samples(reader: Reader) -> Samples:
             )
     else:
         names = tuple(f"p{k + 1}" for k in range(n))
-    own = reader.attribute("stage") == "sample"
     sets = [
-        StoredSet(reader.path, name, n, own=own) if f"{name}/W" in reader else None
+        StoredSet(reader.path, name, n, own=own)
+        if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader
+        else None
         for name in ("estimation", "validation")
     ]
     estimation, validation = sets
@@ -187,6 +236,13 @@ def load_samples(reader: Reader) -> Samples:
         estimation=estimation,
         validation=validation,
     )
+
+
+def _matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:
+    """Of an observation matrix, be it kept or not."""
+    if f"{name}/{_LEFT_OUT}" in reader:
+        return tuple(reader.array(f"{name}/{_LEFT_OUT}", 1).tolist())
+    return tuple(reader.rows(f"{name}/W").shape)
 
 
 def _optional(reader: Reader, name: str, size: int) -> FloatArray | None:

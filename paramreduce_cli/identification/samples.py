@@ -53,6 +53,11 @@ class LoggedSet:
         """How many samples it yields in all."""
         return sum(self._outputs(k).size for k in range(self._first.size))
 
+    @property
+    def recomputable(self) -> bool:
+        """Not what passed a low-pass."""
+        return self._taps.size == 1
+
     def _rows(self, piece: int) -> slice:
         ends = [*self._first.tolist(), self.motions.time.size]
         return slice(ends[piece], ends[piece + 1])
@@ -75,7 +80,23 @@ class LoggedSet:
         for piece, blocks in groupby(observed.blocks(), attrgetter("trajectory")):
             yield from self._low_passed(piece, blocks)
 
+    def states(self) -> Iterator[StateBlock]:
+        """Yield states and low-passed torques of the samples alone."""
+        m = self.motions
+        k = self._taps.size // 2
+        for piece in range(self._first.size):
+            outputs = self._outputs(piece)
+            first = self._rows(piece).start
+            for start in range(0, outputs.size, BLOCK_SAMPLES):
+                some = outputs[start : start + BLOCK_SAMPLES]
+                needed = slice(int(some[0]) - k, int(some[-1]) + k + 1)
+                rows = m.tau[first + needed.start : first + needed.stop]
+                tau = filters.thinned_low_pass(rows, needed.start, self._taps, some)
+                at = first + some
+                yield StateBlock(piece, m.time[at], m.z[at], m.dz[at], m.ddz[at], tau)
+
     def _state_blocks(self) -> Iterator[StateBlock]:
+        """States of all samples, also those that only serve the low-pass, and torques as measured."""
         m = self.motions
         for piece in range(self._first.size):
             rows = self._rows(piece)

@@ -18,6 +18,8 @@ from paramreduce_cli.records import Block, FloatArray
 
 BLOCK_SAMPLES = 150
 """Samples evaluated at a time: small enough for the cache, large enough for the loops."""
+_FACTORISED_AT_ONCE = 600
+"""Samples: the factor found so far is worked into again each time."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +49,7 @@ class ObservedSet:
     """Standard parameters, for torques that were not measured."""
     source: str
     """What the states are, for messages."""
+    recomputable = True
 
     @cached_property
     def _coordinates(self) -> Coordinates:
@@ -98,18 +101,35 @@ class FactorAccumulator:
 
     def __init__(self) -> None:
         self._factors: list[list[FloatArray]] = []
+        self._waiting: list[Block] = []
 
     def add(self, block: Block) -> None:
         """Take the rows of one block in."""
-        n_dof, n = block.tau.shape[1], block.W.shape[1]
-        while len(self._factors) <= block.trajectory:
+        if self._waiting and self._waiting[0].trajectory != block.trajectory:
+            self._factorise()
+        self._waiting.append(block)
+        if sum(waiting.time.size for waiting in self._waiting) >= _FACTORISED_AT_ONCE:
+            self._factorise()
+
+    def _factorise(self) -> None:
+        first = self._waiting[0]
+        n_dof, n = first.tau.shape[1], first.W.shape[1]
+        while len(self._factors) <= first.trajectory:
             self._factors.append([np.zeros((0, n + 1))] * n_dof)
-        rows = np.dstack([block.W.reshape(-1, n_dof, n), block.tau])
-        factors = self._factors[block.trajectory]
-        factors[:] = [append_rows(factor, rows[:, j]) for j, factor in enumerate(factors)]
+        factors = self._factors[first.trajectory]
+        W = [block.W.reshape(-1, n_dof, n) for block in self._waiting]
+        for j, factor in enumerate(factors):
+            new = [
+                np.column_stack([w[:, j], b.tau[:, j]])
+                for w, b in zip(W, self._waiting, strict=True)
+            ]
+            factors[j] = append_rows(factor, np.vstack(new))
+        self._waiting = []
 
     def result(self) -> FloatArray:
         """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows."""
+        if self._waiting:
+            self._factorise()
         return np.array([[_square(factor) for factor in factors] for factors in self._factors])
 
 

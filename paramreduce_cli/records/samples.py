@@ -54,6 +54,10 @@ class SampleSet(Protocol):
     def n_samples(self) -> int:
         """Samples over all trajectories."""
 
+    @property
+    def recomputable(self) -> bool:
+        """Whether each sample's state and the model give its rows of the observation matrix back."""
+
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
 

@@ -1,5 +1,6 @@
 """sample: states, torques and observation matrices of both sets."""
 
+import itertools
 import warnings
 import zlib
 from collections.abc import Iterator
@@ -30,9 +31,10 @@ from paramreduce_cli.records import (
     Recording,
     Recordings,
     Samples,
-    SampleSet,
     Trajectories,
 )
+
+ComputedSet = ObservedSet | LoggedSet
 
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
@@ -51,7 +53,7 @@ def sample(
     """
     dynamics = Dynamics(model.mechanism)
 
-    def observed(name: str, recording: Recording | None, points: int | None) -> SampleSet:
+    def observed(name: str, recording: Recording | None, points: int | None) -> ComputedSet:
         if sampling.log is not None:
             return _logged(model, dynamics, log, name)
         if sampling.simulation is not None:
@@ -259,22 +261,28 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
         )
 
 
-def _nominal_torque(model: Model, estimation: SampleSet) -> FloatArray:
+def _torques(computed: ComputedSet) -> Iterator[FloatArray]:
+    """Those of the states where they were measured; else observation matrices are needed too."""
+    if all(block.tau is not None for block in itertools.islice(computed.states(), 1)):
+        return (block.tau for block in computed.states() if block.tau is not None)
+    return (block.tau for block in computed.blocks())
+
+
+def _nominal_torque(model: Model, estimation: ComputedSet) -> FloatArray:
     if model.nominal_torque_given:
         return model.nominal_torque
-    deviation = standard_deviation(block.tau for block in estimation.blocks())
+    deviation = standard_deviation(_torques(estimation))
     deviation[np.isinf(model.nominal_torque)] = np.inf
     return _scale(deviation, model, "nominal_torque", "torque")
 
 
 def _nominal_acceleration(
-    sampling: SamplingSection, model: Model, estimation: SampleSet
+    sampling: SamplingSection, model: Model, estimation: ComputedSet
 ) -> FloatArray:
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
         return per_joint(given, model.mechanism.n_dof)
-    states = estimation.states() if isinstance(estimation, ObservedSet) else estimation.blocks()
-    deviation = standard_deviation(block.ddz for block in states)
+    deviation = standard_deviation(block.ddz for block in estimation.states())
     return _scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
 
 

@@ -10,13 +10,15 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from conftest import TWO_LINK
+from conftest import ONE_FORMAT, TWO_LINK, config_of
 
+from paramreduce_cli.artifacts import sample_files
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
 from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import (
     Identification,
     MeasuredLog,
@@ -27,6 +29,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
+from paramreduce_cli.runner import Runner
 
 VERSIONS = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
 STAMP = Stamp(SCHEMA, "arm", "build-model", VERSIONS, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)
@@ -172,6 +175,27 @@ def test_a_file_without_one_of_its_datasets_is_refused(record, dataset, two_link
         del file[dataset]
     with pytest.raises(ArtifactError, match=dataset):
         load_file(path, record, "two_link", "")
+
+
+def test_a_large_observation_matrix_is_computed_again(two_link_copy, monkeypatch):
+    store = Store(two_link_copy)
+    (sample,) = (stage for stage in pipeline() if stage.name == "sample")
+    kept, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    expected = [block.W for block in kept.validation.blocks()]
+    monkeypatch.setattr(sample_files, "_MOST_KEPT", 0)
+    Runner(config_of("two_link", ONE_FORMAT), store).run(sample, force=True)
+
+    with h5py.File(store.path(Samples)) as file:
+        assert "W" not in file["validation"]
+    found, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    for block, W in zip(found.validation.blocks(), expected, strict=True):
+        np.testing.assert_array_equal(block.W, W)
+
+    with h5py.File(store.path(Model), "a") as file:
+        file.attrs["digest"] = "another"
+    changed, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    with pytest.raises(ArtifactError, match=r"is not the model that .* was computed with"):
+        next(changed.validation.blocks())
 
 
 def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
