@@ -22,6 +22,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
+    TermReduction,
     Trajectories,
 )
 from paramreduce_cli.stages import stages
@@ -146,5 +147,6 @@ def stages_to_run(config: Config) -> list[Stage]:
         Trajectories: recorded,
         MeasuredLog: not logged,
         Identification: not measured_torques(config),
+        TermReduction: config.terms is None,
     }
     return [s for s in pipeline() if not idle.get(s.output, False)]

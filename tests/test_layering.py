@@ -18,6 +18,7 @@ LAYERS = [
     {"pipeline"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},
+    {"terms"},
     {"excitation", "identification", "reduction", "lean"},
     {"multibody"},
     {"expressions"},

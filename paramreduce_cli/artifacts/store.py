@@ -30,6 +30,7 @@ from paramreduce_cli.records import (
     Reduction,
     Report,
     Samples,
+    TermReduction,
     Trajectories,
     Validation,
 )
@@ -55,6 +56,7 @@ LAYOUTS: dict[type, Layout] = {
             (Reduction, "reduction.h5"),
             (Validation, "validation.h5"),
             (Identification, "identification.h5"),
+            (TermReduction, "terms.h5"),
         )
     },
 }

@@ -12,6 +12,7 @@ from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.constraints import ConstraintSection
 from paramreduce_cli.config.identification import IdentificationSection
 from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.fields.names import OneMethod, OneOf
 from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import (
@@ -419,5 +420,7 @@ class Config(Robot):
     """Judgement."""
     identification: IdentificationSection = IdentificationSection()
     """Values from measured torques."""
+    terms: TermsSection | None = None
+    """Functions whose terms are reduced too."""
     report: ReportSection = ReportSection()
     """Report."""

@@ -5,28 +5,40 @@ from collections.abc import Mapping
 import numpy as np
 
 from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.checking import TOLERANCE, refuse_if_off
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.records import FloatArray, Mechanism, ReducedModel
+from paramreduce_cli.records import FloatArray, Mechanism, ReducedModel, TermModel
 
 _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
 
 
 def random_cases(
-    mechanism: Mechanism, model: ReducedModel, count: int, rng: np.random.Generator
+    mechanism: Mechanism,
+    model: ReducedModel,
+    count: int,
+    rng: np.random.Generator,
+    simplified: TermModel | None = None,
 ) -> dict[str, FloatArray]:
     """Random states with the results of plain recursion, by the names of the functions' arrays.
+
+    Where terms were left out, results are those of the simplified program, which plain recursion does
+    not know; states are inside the ranges that it holds in.
 
     Args:
         mechanism: Of the robot.
         model: The reduced model.
         count: Number of states.
         rng: Where they come from.
+        simplified: A function with terms left out.
     """
     q, dq, ddq = random_states(mechanism, count, rng)
+    if simplified is not None and mechanism.loops is None:
+        lower, upper = simplified.lower[:, None], simplified.upper[:, None]
+        q, dq, ddq = rng.uniform(lower, upper, (3, count, mechanism.n_dof))
     plain = Dynamics(mechanism, once=True)
     phi = model.standard
     expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
@@ -43,7 +55,7 @@ def random_cases(
         "K": K @ expansion,
     }
     if mechanism.loops is None:
-        return result
+        return result | _simplified(simplified, result, np.eye(mechanism.n_q)[None])
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)
     R = Coordinates(mechanism, once=True).tangent(q)[:, dependent]
     b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
@@ -51,7 +63,41 @@ def random_cases(
     guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
     z = {name: result[name][:, independent] for name in ("q", "dq", "ddq")}
     loops = {"z": z["q"], "dz": z["dq"], "ddz": z["ddq"], "guess": guess, "R": R, "b": b}
-    return result | loops
+    tangent = np.zeros((count, mechanism.n_q, mechanism.n_dof))
+    tangent[:, dependent] = R
+    tangent[:, independent] = np.eye(mechanism.n_dof)
+    return result | loops | _simplified(simplified, result | loops, tangent)
+
+
+def _simplified(
+    simplified: TermModel | None, stored: Mapping[str, FloatArray], tangent: FloatArray
+) -> dict[str, FloatArray]:
+    """Results of a function with terms left out, projected on the independent coordinates."""
+    if simplified is None:
+        return {}
+    count = len(stored["q"])
+    inputs = [np.broadcast_to(value, count) for value in simplified.values]
+    for name in ("q", "dq", "ddq", *(("R", "b") if simplified.projected else ())):
+        inputs += list(stored[name].reshape(count, -1).T)
+    given = Program.of_stored(simplified.program).evaluated(inputs)
+    outputs = np.column_stack([np.broadcast_to(value, count) for value in given])
+    n = tangent.shape[2] if simplified.projected else tangent.shape[1]
+    across = np.broadcast_to(
+        np.eye(n) if simplified.projected else tangent, (count, n, tangent.shape[2])
+    )
+    if outputs.shape[1] == n:
+        return {"tau": np.einsum("kij,ki->kj", across, outputs)}
+    rows, columns = np.tril_indices(n)
+    M = np.zeros((count, n, n))
+    M[:, rows, columns] = M[:, columns, rows] = outputs[:, :-n]
+    delta = outputs[:, -n:]
+    if "b" in stored and not simplified.projected:
+        drift = stored["ddq"] - np.einsum("kij,kj->ki", across, stored["ddz"])
+        delta = delta + np.einsum("kij,kj->ki", M, drift)
+    return {
+        "M": np.einsum("kia,kij,kjb->kab", across, M, across),
+        "delta": np.einsum("kij,ki->kj", across, delta),
+    }
 
 
 def check(

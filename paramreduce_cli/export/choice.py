@@ -9,6 +9,8 @@ from paramreduce_cli.records import (
     ModelChoice,
     ReducedModel,
     Reduction,
+    TermModel,
+    TermReduction,
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
@@ -17,6 +19,8 @@ from paramreduce_cli.texts import EXACT, share
 FULL, BASE = "full", "base"
 IDENTIFIED, CONSISTENT = "identified", "consistent"
 """From measured torques: all base parameters, and standard parameters that a machine can have."""
+TERMS = "terms"
+"""One function with terms left out."""
 
 
 def chosen_model(
@@ -79,3 +83,28 @@ def _identified(
         )
     worth = f"physically consistent parameters, {share(consistency.held_out)} held out"
     return full_model(replace(model, values=consistency.standard)), worth
+
+
+def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:
+    """A function with terms left out: its parameters, itself and its title.
+
+    Args:
+        found: What was simplified.
+        name: ``inverse`` or ``direct``.
+
+    Raises:
+        ConfigError: It was not simplified.
+    """
+    term = found.functions.get(name)
+    if term is None:
+        raise ConfigError(
+            f"--model {TERMS}: terms.h5 has no {name} dynamics; name it under terms.functions and run "
+            "`paramreduce reduce-terms`."
+        )
+    errors = [term.torque_error_estimation, term.torque_error_validation]
+    known = " / ".join(share(error) for error in errors if error == error)
+    title = (
+        f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
+        f"torque error {known} (estimation / validation)"
+    )
+    return ReducedModel(term.names, term.values, term.position, term.names), term, title

@@ -12,7 +12,7 @@ from paramreduce_cli.export.exported import ExportedModel, ParameterValue
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
-from paramreduce_cli.records import Model, ReducedModel
+from paramreduce_cli.records import Mechanism, Model, ReducedModel, TermModel
 
 _CASES = 16
 """States in the self-test."""
@@ -49,6 +49,7 @@ def export(
     constant: bool = False,
     single: bool = False,
     origin: str = "",
+    simplified: TermModel | None = None,
 ) -> dict[str, bytes]:
     """Files of a model in some language.
 
@@ -61,17 +62,19 @@ def export(
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
         origin: Of the model, for the comment that opens every file.
+        simplified: The function that is asked for with terms left out, whose parameters are those of
+            the model.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
     """
     mechanism = model.mechanism
-    functions = exported_functions(model, chosen, what, constant=constant)
+    functions = exported_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
     if mechanism.loops is not None:
         closures = tuple(LeanFunctions(model, chosen, constant=constant).closures())
     rng = np.random.default_rng(0)
-    checked = random_cases(mechanism, chosen, _CHECKED, rng)
+    checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
     check(functions, checked)
     if closures:
         check_closures(closures, checked)
@@ -81,7 +84,7 @@ def export(
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
-    stored = random_cases(mechanism, chosen, _CASES, rng)
+    stored = random_cases(mechanism, chosen, _CASES, rng, simplified)
     exported = ExportedModel(
         robot=mechanism.robot,
         heading=(
@@ -92,6 +95,7 @@ def export(
                 if model.unmeasured
                 else []
             ),
+            *([] if simplified is None else _validity(mechanism, simplified)),
             "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
             f"Made by paramreduce {__version__} ({origin}).",
         ),
@@ -110,6 +114,25 @@ def export(
     return files
 
 
+def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
+    """Where a function with terms left out holds, line by line."""
+    lines = ["TERMS WERE LEFT OUT: it holds inside the ranges that it was fitted in, which are"]
+    names = mechanism.coordinate_names
+    for j, name in enumerate(names):
+        spans = (
+            f"{symbol} {simplified.lower[k, j]:.4g} to {simplified.upper[k, j]:.4g}"
+            for k, symbol in enumerate(("position", "velocity", "acceleration"))
+        )
+        lines.append(f"  {name}: {', '.join(spans)}")
+    largest = ", ".join(f"{value:.3g}" for value in simplified.largest_difference)
+    where = "both sets"
+    if np.isfinite(simplified.random_torque_error):
+        error = f"{100 * simplified.random_torque_error:.3g} %"
+        where = f"random states inside, where the torque error is {error}"
+    lines.append(f"Largest differences of torques by joint, N m or N: {largest}, on {where}.")
+    return lines
+
+
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
     """Values with units: those of the first standard parameter that has each."""
     first = [int(np.flatnonzero(chosen.position == k)[0]) for k in range(chosen.n)]
@@ -122,7 +145,12 @@ def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValu
 
 
 def exported_functions(
-    model: Model, chosen: ReducedModel, what: Exported, *, constant: bool = False
+    model: Model,
+    chosen: ReducedModel,
+    what: Exported,
+    *,
+    constant: bool = False,
+    simplified: TermModel | None = None,
 ) -> tuple[Function, ...]:
     """Functions of a model.
 
@@ -131,6 +159,7 @@ def exported_functions(
         chosen: The model.
         what: Which functions.
         constant: Whether the values of the parameters are part of them.
+        simplified: The one function with terms left out.
     """
-    lean = LeanFunctions(model, chosen, constant=constant)
+    lean = LeanFunctions(model, chosen, constant=constant, simplified=simplified)
     return tuple(getattr(lean, name)() for name in _FUNCTIONS[what])

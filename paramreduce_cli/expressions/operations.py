@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.expressions.graph import ZERO, Graph, Node
-from paramreduce_cli.records import FloatArray
+from paramreduce_cli.records import NO_OPERAND, FloatArray, StoredProgram
 
 _UNARY = {
     ca.OP_SIN: "sin",
@@ -106,6 +106,27 @@ class Program:
             for node in (graph.nodes[k] for k in reached)
         )
         return cls(nodes, moved(outputs))
+
+    @classmethod
+    def of_stored(cls, stored: StoredProgram) -> Program:
+        """A program from arrays."""
+        nodes = tuple(
+            Node(operation, tuple(pair[pair >= 0].tolist()), float(number))
+            for operation, pair, number in zip(
+                stored.operations, stored.operands, stored.numbers, strict=True
+            )
+        )
+        return cls(nodes, tuple(stored.outputs.tolist()))
+
+    def stored(self) -> StoredProgram:
+        """As arrays."""
+        padded = [[*node.operands, NO_OPERAND, NO_OPERAND][:2] for node in self.nodes]
+        return StoredProgram(
+            operations=tuple(node.operation for node in self.nodes),
+            operands=np.array(padded, dtype=np.int64).reshape(-1, 2),
+            numbers=np.array([node.number for node in self.nodes], dtype=float),
+            outputs=np.array(self.outputs, dtype=np.int64),
+        )
 
     @property
     def operations(self) -> set[str]:

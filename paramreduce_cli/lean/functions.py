@@ -3,14 +3,16 @@
 from collections.abc import Callable
 
 import casadi as ca
+import numpy as np
 
 from paramreduce_cli.expressions.factoring import least
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.multibody.loops.closures import closure_equations
-from paramreduce_cli.records import Model, ReducedModel
+from paramreduce_cli.records import Model, ReducedModel, TermModel
 
 
 class LeanFunctions:
@@ -20,10 +22,19 @@ class LeanFunctions:
         model: Of the robot.
         reduced: Which parameters are kept, and their values.
         constant: Whether the values are part of the functions.
+        simplified: One of the functions with terms left out, whose parameters ``reduced`` are.
     """
 
-    def __init__(self, model: Model, reduced: ReducedModel, *, constant: bool = False) -> None:
+    def __init__(
+        self,
+        model: Model,
+        reduced: ReducedModel,
+        *,
+        constant: bool = False,
+        simplified: TermModel | None = None,
+    ) -> None:
         mechanism = model.mechanism
+        self._simplified = simplified
         self._mechanism = mechanism
         self._models = LeanModels(mechanism, model.formulations, independent=True)
         self._reduced = reduced.restricted(model.affecting)
@@ -47,7 +58,7 @@ class LeanFunctions:
         """Torques of a motion."""
         tau = Argument("tau", (self._mechanism.n_dof,), "torques or forces, N m or N")
         text = "Torques of the independent coordinates for a motion."
-        graph, outputs = self._model(self._models.inverse)
+        graph, outputs = self._model(self._models.inverse, projected_inverse)
         return self._function("inverse_dynamics", text, (tau,), graph, outputs)
 
     def direct(self) -> Function:
@@ -56,7 +67,7 @@ class LeanFunctions:
         M = Argument("M", (z, z), "mass matrix")
         delta = Argument("delta", (z,), "torques without acceleration, N m or N")
         text = "Mass matrix and bias: tau = M ddz + delta."
-        graph, outputs = self._model(self._models.direct)
+        graph, outputs = self._model(self._models.direct, projected_direct)
         lower, bias = outputs[:-z], outputs[-z:]
         rows = range(z)
         full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
@@ -82,8 +93,14 @@ class LeanFunctions:
         text = "Torques as a linear map of the parameters: tau = K phi."
         return self._function("regressor", text, (K,), *least(graph, outputs))
 
-    def _model(self, model: Callable[..., Program]) -> tuple[Graph, list[int]]:
+    def _model(
+        self, model: Callable[..., Program], project: Callable[..., list[int]]
+    ) -> tuple[Graph, list[int]]:
         """Outputs of a lean model, its parameters numbered as those that are kept."""
+        if self._simplified is not None:
+            program = self._without_terms(self._simplified, project)
+        else:
+            program = model(self._reduced, constant=self._constant)
         start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
         graph = Graph()
 
@@ -91,7 +108,25 @@ class LeanFunctions:
             kept = position - start + n if position >= start else int(place[position])
             return graph.input(kept)
 
-        return graph, model(self._reduced, constant=self._constant).rebuilt(graph, substitute)
+        return graph, program.rebuilt(graph, substitute)
+
+    def _without_terms(self, simplified: TermModel, project: Callable[..., list[int]]) -> Program:
+        """A simplified program with inputs as those of lean models, of the independent coordinates."""
+        start, n = self._models.n_parameters, simplified.values.size
+        first = [int(np.flatnonzero(simplified.position == k)[0]) for k in range(n)]
+        graph = Graph()
+
+        def substitute(position: int) -> int:
+            if position >= n:
+                return graph.input(position - n + start)
+            if self._constant:
+                return graph.constant(float(simplified.values[position]))
+            return graph.input(first[position])
+
+        outputs = Program.of_stored(simplified.program).rebuilt(graph, substitute)
+        if self._mechanism.loops is not None and not simplified.projected:
+            outputs = project(self._mechanism, graph, outputs)
+        return Program.of_graph(*least(graph, outputs))
 
     def _function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]

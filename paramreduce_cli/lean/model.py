@@ -111,36 +111,56 @@ class LeanModels:
         """
         return self._leanest(self._direct, model, constant)
 
-    def estimate(self, kept: IntArray) -> int:
-        """Operations of the inverse dynamics, nearly: quick enough to compare thousands of subsets.
+    def estimate(self, kept: IntArray, *, direct: bool = False) -> int:
+        """Operations, nearly: quick enough to compare thousands of subsets.
 
         Args:
             kept: Indices of the parameters that are not zero.
+            direct: Whether those of the direct dynamics are meant, not of the inverse.
         """
-        return min(self._inverse.estimates(self._dropped(kept)))
+        variants = self._direct if direct else self._inverse
+        return min(variants.estimates(self._dropped(kept)))
 
     def _dropped(self, kept: IntArray) -> BoolArray:
         zero = np.ones(self.n_parameters, dtype=np.bool_)
         zero[kept] = False
         return zero
 
+    def several(self, model: ReducedModel, most: int, *, direct: bool) -> list[Program]:
+        """The inverse or the direct dynamics in the formulations that take the fewest operations.
+
+        Args:
+            model: Which parameters are kept, and which have one value.
+            most: How many formulations are wanted.
+            direct: Which of the two.
+
+        Returns:
+            Different programs, the leanest first.
+        """
+        variants = self._direct if direct else self._inverse
+        made = [self._rearranged(program, model, constant=False) for program in variants.programs]
+        made.sort(key=lambda program: program.n_operations)
+        return list(dict.fromkeys(made))[:most]
+
     def _leanest(self, variants: _Variants, model: ReducedModel, constant: bool) -> Program:
-        """The formulation with the fewest operations, its sums and products rearranged."""
+        """The formulation with the fewest operations."""
+        promising = variants.promising(self._dropped(model.kept))
+        candidates = [self._rearranged(program, model, constant) for program in promising]
+        return min(candidates, key=lambda program: program.n_operations)
+
+    def _rearranged(self, program: Program, model: ReducedModel, constant: bool) -> Program:
+        """A formulation for a model, its sums and products rearranged."""
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())
-        candidates = []
-        for program in variants.promising(self._dropped(model.kept)):
-            graph = Graph()
+        graph = Graph()
 
-            def substitute(position: int, graph: Graph = graph) -> int:
-                if position >= self.n_parameters:
-                    return graph.input(position)
-                if position not in kept:
-                    return ZERO
-                if constant:
-                    return graph.constant(float(values[position]))
-                return graph.input(ties.get(position, position))
+        def substitute(position: int) -> int:
+            if position >= self.n_parameters:
+                return graph.input(position)
+            if position not in kept:
+                return ZERO
+            if constant:
+                return graph.constant(float(values[position]))
+            return graph.input(ties.get(position, position))
 
-            outputs = program.rebuilt(graph, substitute)
-            candidates.append(Program.of_graph(*least(graph, outputs)))
-        return min(candidates, key=lambda program: program.n_operations)
+        return Program.of_graph(*least(graph, program.rebuilt(graph, substitute)))

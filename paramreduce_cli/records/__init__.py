@@ -54,6 +54,13 @@ from paramreduce_cli.records.reduction import (
 )
 from paramreduce_cli.records.run import Progress, Provenance, Report, Run
 from paramreduce_cli.records.samples import Block, Recording, Recordings, Samples, SampleSet
+from paramreduce_cli.records.terms import (
+    NO_OPERAND,
+    StoredProgram,
+    TermFront,
+    TermModel,
+    TermReduction,
+)
 from paramreduce_cli.records.tracking import Paths, Tracking
 from paramreduce_cli.records.trajectories import (
     DISTANCES,

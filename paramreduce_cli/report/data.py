@@ -13,6 +13,7 @@ from paramreduce_cli.records import (
     Model,
     ReducedModel,
     Reduction,
+    TermReduction,
     Tracking,
     Trajectories,
     Validation,
@@ -55,6 +56,8 @@ class ReportData:
     """Where there is one."""
     identification: Identification | None
     """Where torques were measured."""
+    terms: TermReduction | None
+    """Where terms were left out."""
 
 
 def first_motion(

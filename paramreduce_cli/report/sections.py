@@ -44,6 +44,12 @@ class PageSection(Enum):
         "{{ 'With loops, d and [M, δ] are those of the open tree; exported functions, which also "
         "project, say their own count.' if loops }}",
     )
+    TERMS = (
+        "Without small terms",
+        "Addends of the lean functions were left out too, and the parameters that remain fitted again; each "
+        "function has values of its own. Such a function holds where it was fitted: inside the ranges of the "
+        "estimation set. <code>paramreduce export --model terms --what idm</code> (or <code>ddm</code>) writes it.",
+    )
     TRACKING = (
         "What it is for",
         "The arm follows the full model; the controller evaluates exported code, whose torques are held "

@@ -15,6 +15,9 @@ from paramreduce_cli.records import (
     Provenance,
     Reduction,
     Subsets,
+    TermFront,
+    TermModel,
+    TermReduction,
     Trajectories,
     Trajectory,
     Validation,
@@ -27,6 +30,7 @@ def summary_of(
     reduction: Reduction,
     validation: Validation,
     identification: Identification | None,
+    terms: TermReduction | None,
     provenance: Provenance,
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite ones become None."""
@@ -55,6 +59,7 @@ def summary_of(
         "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
         "identification": _identification(identification),
+        "terms": _terms(terms),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,
@@ -154,6 +159,40 @@ def _identification(found: Identification | None) -> dict[str, Any] | None:
         "consistent": physical,
         "comparison": found.comparison,
         "hints": list(found.hints),
+    }
+
+
+def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
+    """Functions with terms left out; empty where that was not asked for."""
+    return [
+        {
+            "function": name,
+            "heuristic": one.heuristic,
+            "n_start": one.n_start,
+            "operations": one.operations,
+            "operations_start": one.operations_start,
+            **_errors(one),
+            "random_torque_error": one.random_torque_error,
+            "largest_difference": one.largest_difference,
+            "smallest_eigenvalue": one.smallest_eigenvalue,
+            "parameters": dict(zip(one.names, one.values, strict=True)),
+            "pareto": [
+                {"operations": count, **_errors(one.front, k)}
+                for k, count in enumerate(one.front.operations)
+            ],
+        }
+        for name, one in (found.functions.items() if found is not None else ())
+    ]
+
+
+def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]:
+    return {
+        f"{what}_error": {
+            part: value if row is None else value[row]
+            for part in ("estimation", "validation")
+            for value in [getattr(of, f"{what}_error_{part}")]
+        }
+        for what in ("torque", "acceleration")
     }
 
 

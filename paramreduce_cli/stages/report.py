@@ -17,6 +17,7 @@ from paramreduce_cli.records import (
     Report,
     Samples,
     Selected,
+    TermReduction,
     Tracking,
     Trajectories,
     Validation,
@@ -42,6 +43,7 @@ def report(
     validation: Validation,
     log: MeasuredLog | None,
     identification: Identification | None,
+    terms: TermReduction | None,
     provenance: Provenance,
 ) -> Report:
     """Draw the figures, set the tables and write the page and summary.json."""
@@ -64,8 +66,11 @@ def report(
         tracking=_tracking(section, model, selected, motion),
         log=log,
         identification=identification,
+        terms=terms,
     )
-    summary = summary_of(model, trajectories, reduction, validation, identification, provenance)
+    summary = summary_of(
+        model, trajectories, reduction, validation, identification, terms, provenance
+    )
     files: dict[str, bytes] = {}
     images = {}
     formats = [str(name) for name in section.formats]

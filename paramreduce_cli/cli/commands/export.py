@@ -11,7 +11,15 @@ from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import load_config
-from paramreduce_cli.export.choice import BASE, CONSISTENT, FULL, IDENTIFIED, chosen_model
+from paramreduce_cli.export.choice import (
+    BASE,
+    CONSISTENT,
+    FULL,
+    IDENTIFIED,
+    TERMS,
+    chosen_model,
+    simplified_model,
+)
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.writing import Exported
@@ -22,9 +30,13 @@ from paramreduce_cli.records import (
     Model,
     ReducedModel,
     Reduction,
+    TermReduction,
     Validation,
 )
 from paramreduce_cli.reduction.models import closest_standard
+
+_FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
+"""What one function alone is called."""
 
 
 @click.command()
@@ -43,7 +55,7 @@ from paramreduce_cli.reduction.models import closest_standard
     "--model",
     "text",
     metavar="HEURISTIC:N",
-    help="Or full, or base; with a log also identified, or consistent.  [default: the selected one]",
+    help="Or full, or base; with a log also identified, or consistent; terms, for one function with terms left out.  [default: the selected one]",
 )
 @click.option("--constants", is_flag=True, help="Put the parameters' values into the code.")
 @click.option("--single", is_flag=True, help="Single precision, in C.")
@@ -75,19 +87,29 @@ def export(
         raise click.UsageError("--single goes with --format c.")
     if kind in FORMATS and (what != Exported.BOTH or constants):
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
+    if text == TERMS and what not in _FUNCTIONS:
+        raise click.UsageError(
+            f"--model {TERMS}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."
+        )
     records: list[type] = [Model]
-    if text in (IDENTIFIED, CONSISTENT):
+    if text == TERMS:
+        records.append(TermReduction)
+    elif text in (IDENTIFIED, CONSISTENT):
         records.append(Identification)
     elif text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
     loading = {record: up_to_date(loaded, store, record) for record in records}
-    chosen, title = chosen_model(
-        text,
-        loading[Model],
-        loading.get(Reduction),
-        loading.get(Validation),
-        loading.get(Identification),
-    )
+    simplified = None
+    if text == TERMS:
+        chosen, simplified, title = simplified_model(loading[TermReduction], _FUNCTIONS[what])
+    else:
+        chosen, title = chosen_model(
+            text,
+            loading[Model],
+            loading.get(Reduction),
+            loading.get(Validation),
+            loading.get(Identification),
+        )
     stamp = store.stamp(records[-1])
     folder = output or store.folder / "export" / kind
     if kind in FORMATS:
@@ -101,6 +123,7 @@ def export(
             what=Exported(what),
             constant=constants,
             single=single,
+            simplified=simplified,
             origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
         )
     save_files(folder, files)

@@ -120,6 +120,12 @@ def _say_summary(summary: dict[str, Any]) -> None:
     found = summary["identification"]
     table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
     out.print(table, width=max(out.width, _TABLE_WIDTH))
+    for one in summary["terms"]:
+        name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
+        errors = [share(error) for error in one["torque_error"].values() if error is not None]
+        say(
+            f"Without small terms: {name} in {one['operations']} operations, ε_τ {' / '.join(errors)}"
+        )
     if found is not None:
         say(found["comparison"])
         if found["consistent"] is not None:

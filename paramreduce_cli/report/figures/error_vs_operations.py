@@ -28,7 +28,7 @@ def error_vs_operations(data: ReportData) -> Figure:
                 getattr(r, f"operations_{key}"), visible(r.torque_error_estimation), strict=True
             )
         ]
-        stairs = np.array(_staircase(front))
+        stairs = np.array(staircase(front))
         if stairs.size:
             one.step(*stairs.T, where="post", color="#30363d", linewidth=1.2, label="best known")
         one.set_xlabel(f"operations of {label}")
@@ -37,7 +37,7 @@ def error_vs_operations(data: ReportData) -> Figure:
     return drawn
 
 
-def _staircase(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
+def staircase(points: list[tuple[float, float]]) -> list[tuple[float, float]]:
     """Of points (cost, error) those that no cheaper one beats, by cost."""
     best, kept = np.inf, []
     for cost, error in sorted(points):

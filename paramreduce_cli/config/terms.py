@@ -1,0 +1,26 @@
+"""What a config says of leaving terms out."""
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from paramreduce_cli.fields.numbers import Number, Whole
+from paramreduce_cli.fields.section import Section
+
+
+class TermsSection(Section):
+    """How far functions are simplified by leaving out terms, besides parameters."""
+
+    functions: Annotated[list[Literal["inverse", "direct"]], Field(min_length=1)] = [
+        "inverse",
+        "direct",
+    ]
+    """Each is simplified by itself, and gets values of its own."""
+    torque_error: Annotated[Number, Field(gt=0, lt=1)] = 0.01
+    """Allowed on the estimation set, and on the validation set where its torques are not held out."""
+    acceleration_error: Annotated[Number, Field(gt=0)] | None = None
+    """The same of accelerations, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
+    rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 40
+    """How often terms are put back and others left out instead."""
+    seed: Annotated[Whole, Field(ge=0)] = 0
+    """Of what is put back."""

@@ -1,0 +1,91 @@
+"""Reduced models whose terms are reduced too."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from paramreduce_cli.records.arrays import FloatArray, IntArray
+
+NO_OPERAND = -1
+"""Where an operation has fewer than two operands."""
+
+
+@dataclass(frozen=True)
+class StoredProgram:
+    """A straight-line program: nodes, each made of those before it."""
+
+    operations: tuple[str, ...]
+    """``constant``, ``input``, ``+``, ``*`` or the name of a function, (n_nodes,)."""
+    operands: IntArray
+    """Twice the number of the node that is meant, plus one if it is negated, (n_nodes, 2)."""
+    numbers: FloatArray
+    """Of a constant, its size; of an input, its position, (n_nodes,)."""
+    outputs: IntArray
+    """Like operands, (n_outputs,)."""
+
+
+@dataclass(frozen=True)
+class TermFront:
+    """Models of one function that no other one of as few operations beats; one row each."""
+
+    operations: IntArray
+    torque_error_estimation: FloatArray
+    torque_error_validation: FloatArray
+    acceleration_error_estimation: FloatArray
+    """Not numbers for the inverse dynamics."""
+    acceleration_error_validation: FloatArray
+
+
+@dataclass(frozen=True)
+class TermModel:
+    """A function of the dynamics of which terms were left out, and what that does."""
+
+    heuristic: str
+    """Whose subset it started from."""
+    n_start: int
+    """Parameters of that subset."""
+    names: tuple[str, ...]
+    """Of the parameters that are left, (n,)."""
+    values: FloatArray
+    """(n,), SI; of use to this function alone."""
+    position: IntArray
+    """Position of each standard parameter's value, -1 for none, (n_standard,)."""
+    program: StoredProgram
+    """Its inputs are the parameters, q, dq and ddq, and for functions of independent coordinates the
+    dependent rows of R, row by row, and b. The inverse dynamics gives torques, the direct dynamics the
+    lower triangle of M, row by row, then delta."""
+    projected: bool
+    """Whether it is of the independent coordinates of loops; else of all coordinates of the tree."""
+    operations: int
+    """Sums, products and function calls that it takes."""
+    operations_start: int
+    """The same with all terms of the subset."""
+    torque_error_estimation: float
+    torque_error_validation: float
+    acceleration_error_estimation: float
+    """Not a number for the inverse dynamics, like all that is of accelerations."""
+    acceleration_error_validation: float
+    random_torque_error: float
+    """On random states inside the ranges; not a number where the torques are not known there."""
+    largest_difference: FloatArray
+    """Largest difference of each joint's torque on those states, else on both sets, N m (N), (n_dof,)."""
+    smallest_eigenvalue: float
+    """Of all mass matrices looked at, kg m^2 (kg)."""
+    random_states: int
+    """How many random states mass matrices were looked at on."""
+    lower: FloatArray
+    """Smallest z, dz and ddz of the estimation set, (3, n_dof): the model holds within."""
+    upper: FloatArray
+    """The largest."""
+    front: TermFront
+
+
+@dataclass(frozen=True)
+class TermReduction:
+    """Functions whose terms were reduced within a budget."""
+
+    torque_budget: float
+    """Torque error allowed on both sets."""
+    acceleration_budget: float
+    """The same of accelerations, for the direct dynamics; infinite where none was given."""
+    functions: Mapping[str, TermModel]
+    """``inverse`` and ``direct``."""

@@ -1,0 +1,49 @@
+"""What leaving out terms saves."""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.figures.error_vs_operations import staircase
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import FUNCTIONS, WIDE, legend_beside, visible
+
+
+@placed(PageSection.TERMS, 0)
+def terms(data: ReportData) -> Figure | None:
+    """Torque error against operations: the best models of fewer parameters, and the same with terms left out on the way to the budget. Filled: estimation set; hollow: validation set."""
+    if data.terms is None:
+        return None
+    drawn = Figure(figsize=WIDE)
+    axes = drawn.subplots(1, 2, sharey=True)
+    for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
+        found = [
+            (float(cost), float(error))
+            for result in data.validation.heuristics.values()
+            for cost, error in zip(
+                getattr(result, f"operations_{key}"),
+                visible(result.torque_error_estimation),
+                strict=True,
+            )
+        ]
+        stairs = np.array(staircase(found))
+        if stairs.size:
+            one.step(*stairs.T, where="post", color="#8b949e", label="parameters left out")
+        one.set_xlabel(f"operations of {label}")
+        term = data.terms.functions.get(key)
+        if term is None:
+            continue
+        front = term.front
+        one.semilogy(
+            front.operations, visible(front.torque_error_estimation),
+            color="#0969da", marker="o", markersize=3, linewidth=1.0, label="terms left out too",
+        )  # fmt: skip
+        one.semilogy(
+            front.operations, visible(front.torque_error_validation),
+            color="#0969da", marker="o", markersize=4, markerfacecolor="none", linestyle="none",
+        )  # fmt: skip
+        one.axhline(data.terms.torque_budget, color="#cf222e", linewidth=0.8, label="budget")
+    axes[0].set_yscale("log")
+    axes[0].set_ylabel(r"$\varepsilon_\tau$")
+    legend_beside(axes[1])
+    return drawn

@@ -1,0 +1,42 @@
+"""Functions with terms left out."""
+
+import numpy as np
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import FUNCTIONS
+from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts import share
+
+
+@placed(PageSection.TERMS, 1)
+def terms(data: ReportData) -> Table:
+    """Errors on the estimation (E) and the validation set (V) and on random states inside the ranges, the largest difference of a joint's torque there, N m (N), and the smallest eigenvalue of all mass matrices."""
+    header = (
+        "function", "n", "operations", "before", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "ε_τ random",
+        "largest", "smallest eigenvalue",
+    )  # fmt: skip
+    rows = []
+    labels = {key: label for key, label, _ in FUNCTIONS}
+    for name, one in (data.terms.functions if data.terms is not None else {}).items():
+        worst = int(np.argmax(one.largest_difference / data.reduction.nominal_torque))
+        joint = data.model.mechanism.coordinate_names[worst]
+        errors = (
+            one.torque_error_estimation, one.torque_error_validation,
+            one.acceleration_error_estimation, one.acceleration_error_validation,
+            one.random_torque_error,
+        )  # fmt: skip
+        shown = ("-" if np.isnan(error) else share(error) for error in errors)
+        eigenvalue = one.smallest_eigenvalue
+        rows.append(
+            (
+                labels[name],
+                str(one.values.size),
+                str(one.operations),
+                f"{one.operations_start}, {one.heuristic} with {one.n_start}",
+                *shown,
+                f"{one.largest_difference[worst]:.3g}, {joint}",
+                "-" if np.isnan(eigenvalue) else f"{eigenvalue:.3g}",
+            )
+        )
+    return Table("Functions with terms left out", header, tuple(rows))

@@ -1,0 +1,143 @@
+"""reduce-terms: functions of reduced models with terms left out."""
+
+import numpy as np
+
+from paramreduce_cli.config.schema import SamplingSection
+from paramreduce_cli.config.terms import TermsSection
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.records import (
+    CountedDynamics,
+    Model,
+    Progress,
+    Reduction,
+    Run,
+    Samples,
+    TermFront,
+    TermModel,
+    TermReduction,
+)
+from paramreduce_cli.terms.fitting import Budget
+from paramreduce_cli.terms.judging import Judge
+from paramreduce_cli.terms.simplify import Simplified, simplified
+from paramreduce_cli.terms.starts import starts_within
+
+_SEARCHED, _WATCHED = 300, 200
+"""Samples of the estimation and the validation set that are looked at while terms are left out."""
+_FITTED = 1000
+"""Samples of the estimation set to which the parameters of what is left are fitted."""
+_ANY = 1e6
+"""Error of accelerations that is allowed where none is named: mass matrices are positive definite then,
+and that is all."""
+
+
+def reduce_terms(
+    section: TermsSection | None,
+    sampling: SamplingSection,
+    counted: CountedDynamics,
+    model: Model,
+    samples: Samples,
+    reduction: Reduction,
+    run: Run,
+) -> TermReduction:
+    """Leave terms out of the functions of reduced models, and fit what is left.
+
+    Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
+    within the budget on the validation set too, measured ones are held out.
+    """
+    if section is None:
+        raise ConfigError("is missing: it says which errors are allowed.", ("terms",))
+    measured = sampling.log is not None or (
+        sampling.estimation_file is not None and sampling.torques == "measured"
+    )
+    projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
+    allowed = section.acceleration_error
+    budget = Budget(section.torque_error, _ANY if allowed is None else allowed)
+    lean = LeanModels(model.mechanism, model.formulations, independent=projected)
+    functions: dict[str, TermModel] = {}
+    for name in dict.fromkeys(section.functions):
+        direct = name == "direct"
+        starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
+        judge = Judge(
+            model, samples, reduction.nominal_torque, direct=direct,
+            projected=projected, measured=measured,
+        )  # fmt: skip
+
+        def progress(share: float, remark: str, name: str = name) -> None:
+            run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
+
+        validation = None if measured else samples.validation
+        found, front = simplified(
+            lean, starts,
+            judge.thinned(samples.estimation, _SEARCHED),
+            judge.thinned(validation, _WATCHED) if validation is not None else None,
+            budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=run.jobs, progress=progress,
+        )  # fmt: skip
+        fitted = judge.thinned(samples.estimation, _FITTED)
+        refitted = (one.refitted(fitted, budget) for one in found)
+        way = [one.refitted(fitted, budget) for one in front]
+        records = (_record(one, judge, budget, way) for one in refitted)
+        record = next((record for record in records if record is not None), None)
+        if record is None:
+            raise ConfigError(
+                f"nothing within it was found for the {name} dynamics. Allow more, or let reduction find "
+                "subsets that are better than that.",
+                ("terms", "torque_error"),
+            )
+        functions[name] = record
+    return TermReduction(section.torque_error, np.inf if allowed is None else allowed, functions)
+
+
+def _record(
+    one: Simplified, judge: Judge, budget: Budget, way: list[Simplified]
+) -> TermModel | None:
+    """A program with what it is worth and those on the way to it; None if it is not within the budget."""
+    estimation, validation = judge.errors(one)
+    looked_at = (estimation,) if judge.measured else (estimation, validation)
+    for torque, acceleration in looked_at:
+        if torque > budget.torque or acceleration > budget.acceleration:
+            return None
+    smallest, states = judge.smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
+    if smallest <= 0:
+        return None
+    model, program = one.compact()
+    random, largest = judge.random(one)
+    return TermModel(
+        heuristic=one.start.heuristic,
+        n_start=one.start.model.n,
+        names=model.names,
+        values=model.values,
+        position=model.position,
+        program=program.stored(),
+        projected=judge.projected,
+        operations=program.n_operations,
+        operations_start=one.operations_start,
+        torque_error_estimation=estimation[0],
+        torque_error_validation=validation[0],
+        acceleration_error_estimation=estimation[1],
+        acceleration_error_validation=validation[1],
+        random_torque_error=random,
+        largest_difference=largest,
+        smallest_eigenvalue=smallest,
+        random_states=states,
+        lower=judge.lower,
+        upper=judge.upper,
+        front=_front(judge, [*way, one]),
+    )
+
+
+def _front(judge: Judge, programs: list[Simplified]) -> TermFront:
+    """What programs are worth that no leaner one beats."""
+    kept: list[tuple[int, tuple[float, float], tuple[float, float]]] = []
+    for one in sorted(programs, key=lambda one: one.program.n_operations):
+        estimation, validation = judge.errors(one)
+        if not kept or estimation[0] < kept[-1][1][0]:
+            kept.append((one.program.n_operations, estimation, validation))
+    errors = np.array([[estimation, validation] for _, estimation, validation in kept])
+    return TermFront(
+        operations=np.array([count for count, _, _ in kept], dtype=np.int64),
+        torque_error_estimation=errors[:, 0, 0],
+        torque_error_validation=errors[:, 1, 0],
+        acceleration_error_estimation=errors[:, 0, 1],
+        acceleration_error_validation=errors[:, 1, 1],
+    )

@@ -1,0 +1,1 @@
+"""Reduced models whose terms are reduced, not only their parameters."""

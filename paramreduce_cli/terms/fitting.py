@@ -1,0 +1,203 @@
+"""Values of a program's parameters that fit torques, and accelerations, and how well they do."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+from paramreduce_cli.terms.samples import TermSamples, signed_outputs
+from paramreduce_cli.terms.tape import Tape
+
+_LARGEST = 1e100
+"""Share of an allowed error from which on it does not matter how large it is."""
+_RIDGE = 1e-13
+"""Added to the unit diagonal of normal equations: parameters that nothing tells stay small."""
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Errors that are allowed."""
+
+    torque: float
+    acceleration: float = np.inf
+
+
+@dataclass(frozen=True)
+class Linear:
+    """The least-squares problem that a fit is the solution of."""
+
+    rows: FloatArray
+    """Transposed, (n_parameters, n_rows)."""
+    factor: FloatArray
+    """Times the rows it makes them orthonormal, (n_parameters, n_parameters)."""
+    residual: FloatArray
+    """(n_rows,)"""
+    metric: FloatArray | None
+    """Where accelerations matter, (n_samples, n_dof, n_dof)."""
+
+    def explained(self, changes: FloatArray) -> FloatArray:
+        """Squares of what the parameters make up for, (k,), of changes (k, n_rows)."""
+        return np.sum((changes @ self.rows.T @ self.factor.T) ** 2, axis=1)
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A program without some of its terms, its parameters fitted."""
+
+    mask: BoolArray
+    beta: FloatArray
+    """(n_parameters,)"""
+    torque_error: float
+    acceleration_error: float
+    """Infinite where a mass matrix is not positive definite; not a number where it is not asked for."""
+    cost: float
+    """Sum of the squares of both errors over the allowed ones."""
+    excess: float
+    """The largest of all errors over the allowed one."""
+    watched: tuple[float, float]
+    """Errors of torques and accelerations on the samples that are watched; not numbers without any."""
+    linear: Linear
+
+    @property
+    def within(self) -> bool:
+        """Whether all errors are allowed."""
+        return self.excess <= 1.0
+
+
+class Fitting:
+    """Fits a program whose terms are left out.
+
+    Args:
+        tape: The program.
+        n_parameters: How many of its inputs, the first ones, are parameters.
+        samples: What the parameters are fitted to.
+        budget: How well they must do.
+        watched: Samples on which they must do as well.
+    """
+
+    def __init__(
+        self,
+        tape: Tape,
+        n_parameters: int,
+        samples: TermSamples,
+        budget: Budget,
+        watched: TermSamples | None = None,
+    ) -> None:
+        self.tape, self.samples, self.budget = tape, samples, budget
+        self.n = n_parameters
+        self._watched = watched
+        self._parameters = tape.parameters(n_parameters)
+        chi = samples.tau / samples.nominal_torque[:, None]
+        self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi) * budget.torque)
+        nominal = samples.nominal_acceleration
+        size = float(np.linalg.norm(samples.ddz / nominal[:, None]))
+        self._acceleration_scale = 1 / (nominal * size * budget.acceleration)
+
+    def _inputs(self, beta: FloatArray, samples: TermSamples) -> FloatArray:
+        m = samples.tau.shape[1]
+        return np.vstack([np.broadcast_to(beta[:, None], (self.n, m)), samples.states])
+
+    def fit(self, mask: BoolArray, beta: FloatArray, looks: int = 1) -> Fit:
+        """Fit the parameters.
+
+        Args:
+            mask: What is kept of the program.
+            beta: Values to start from, for the mass matrices that accelerations are found with.
+            looks: How often these are found anew.
+        """
+        samples, program = self.samples, self.tape.program
+        values, _ = self.tape.values(mask, self._inputs(beta, samples))
+        adjoints = self.tape.adjoints(mask, values, samples.seeds)
+        present = self._parameters >= 0
+        present[present] = mask[self._parameters[present], 2]
+        W = np.zeros((self.n, *samples.tau.shape))
+        W[present] = adjoints[self._parameters[present]]
+        inverse = samples.inverse_masses(signed_outputs(program, values))
+        for _ in range(looks):
+            metric = self._metric(inverse)
+            rows = self._weighed(W, metric)
+            target = self._weighed(samples.tau[None], metric)[0]
+            beta, gram = _solved(rows, target)
+            off = samples.tau - np.tensordot(beta, W, 1)
+            if not samples.direct:
+                break
+            # Accelerations go with the mass matrices of the fitted values.
+            values, _ = self.tape.values(mask, self._inputs(beta, samples))
+            inverse = samples.inverse_masses(signed_outputs(program, values))
+        residual = self._weighed(off[None], metric)[0]
+        errors = self._errors(off, inverse)
+        return self._judged(mask, beta, errors, Linear(rows, gram, residual, metric))
+
+    def _judged(
+        self, mask: BoolArray, beta: FloatArray, errors: tuple[float, float], linear: Linear
+    ) -> Fit:
+        budget, watched = self.budget, (np.nan, np.nan)
+        shares = [errors[0] / budget.torque, np.nan_to_num(errors[1] / budget.acceleration)]
+        if self._watched is not None and max(shares) <= 1.0:
+            watched = self.errors(mask, beta, self._watched)
+            shares += [watched[0] / budget.torque, np.nan_to_num(watched[1] / budget.acceleration)]
+        cost = float(np.sum(np.minimum(shares[:2], _LARGEST) ** 2))
+        return Fit(mask, beta, *errors, cost, float(max(shares)), watched, linear)
+
+    def _errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
+        """Of torques and of accelerations, from differences of torques."""
+        torque = np.linalg.norm(off * self._torque_scale[:, None]) * self.budget.torque
+        if not self.samples.direct:
+            return float(torque), np.nan
+        if inverse is None:
+            return float(torque), np.inf
+        caused = np.einsum("mij,jm->im", inverse, off) * self._acceleration_scale[:, None]
+        return float(torque), float(np.linalg.norm(caused) * self.budget.acceleration)
+
+    def errors(
+        self, mask: BoolArray, beta: FloatArray, samples: TermSamples
+    ) -> tuple[float, float]:
+        """Errors of torques and of accelerations on other samples."""
+        values, _ = self.tape.values(mask, self._inputs(beta, samples))
+        return samples.errors(signed_outputs(self.tape.program, values))
+
+    def effects(self, fit: Fit, candidates: IntArray) -> FloatArray:
+        """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
+        values, own = self.tape.values(fit.mask, self._inputs(fit.beta, self.samples))
+        adjoints = self.tape.adjoints(fit.mask, values, self.samples.seeds)
+        found = self.tape.effects(candidates, values, own, adjoints)
+        return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
+
+    def _metric(self, inverse: FloatArray | None) -> FloatArray | None:
+        """Square roots of the quadratic forms that take differences of torques to the cost.
+
+        None where only torques matter, whose form is diagonal; (n_samples, n_dof, n_dof).
+        """
+        if inverse is None:
+            return None
+        caused = inverse * self._acceleration_scale[:, None]
+        forms = np.swapaxes(caused, 1, 2) @ caused + np.diag(self._torque_scale**2)
+        return np.swapaxes(np.linalg.cholesky(forms), 1, 2)
+
+    def _weighed(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
+        """Torques as they enter the cost, (k, n_rows)."""
+        if metric is None:
+            scaled = torques * self._torque_scale[:, None]
+        else:
+            scaled = np.einsum("mij,kjm->kim", metric, torques)
+        return scaled.reshape(torques.shape[0], -1)
+
+
+def _solved(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Least squares by the normal equations of unit columns, as quick as a search needs.
+
+    Args:
+        rows: Transposed, (n_parameters, n_rows).
+        target: (n_rows,)
+
+    Returns:
+        The parameters, and the inverse of the triangular factor of their Gram matrix.
+    """
+    size = np.linalg.norm(rows, axis=1)
+    size[size == 0] = 1.0
+    gram = (rows @ rows.T) / np.outer(size, size)
+    gram[np.diag_indices_from(gram)] += _RIDGE
+    factor = np.linalg.inv(np.linalg.cholesky(gram)) / size
+    return factor.T @ (factor @ (rows @ target)), factor

@@ -1,0 +1,182 @@
+"""States, and how torques and mass matrices follow from what a program gives for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.records import Block, FloatArray, Mechanism
+
+
+@dataclass(frozen=True)
+class TermSamples:
+    """Samples on which a program is fitted."""
+
+    states: FloatArray
+    """Inputs of the program after its parameters, (n_states, n_samples)."""
+    direct: bool
+    """Whether the program gives the lower triangle of M, row by row, then delta; else torques."""
+    ddq: FloatArray
+    """Accelerations that M is multiplied by, (n, n_samples)."""
+    tangent: FloatArray | None
+    """By which torques of the program's n coordinates are projected, (n_samples, n, n_dof); None where
+    they are the independent ones."""
+    tau: FloatArray
+    """Torques to be met, (n_dof, n_samples)."""
+    nominal_torque: FloatArray
+    """(n_dof,)"""
+    ddz: FloatArray
+    """Accelerations to be met by the direct dynamics, (n_dof, n_samples)."""
+    nominal_acceleration: FloatArray
+    """(n_dof,)"""
+
+    @cached_property
+    def seeds(self) -> FloatArray:
+        """Torques by outputs of the program, (n_outputs, n_dof, n_samples)."""
+        n, count = self.ddq.shape
+        tangent = (
+            np.broadcast_to(np.eye(n), (count, n, n)) if self.tangent is None else self.tangent
+        )
+        across = np.moveaxis(tangent, 0, 2)
+        if not self.direct:
+            return np.ascontiguousarray(across)
+        rows, columns = np.tril_indices(n)
+        mirrored = np.where(rows == columns, 0.0, 1.0)[:, None, None]
+        lower = across[rows] * self.ddq[columns][:, None]
+        lower = lower + mirrored * across[columns] * self.ddq[rows][:, None]
+        return np.concatenate([lower, across])
+
+    def differences(self, outputs: FloatArray) -> FloatArray:
+        """Torques to be met less those of a program, (n_dof, n_samples).
+
+        Args:
+            outputs: Of the program, (n_outputs, n_samples).
+        """
+        n = len(self.ddq)
+        torques = outputs
+        if self.direct:
+            torques = np.einsum("mij,jm->im", self._masses(outputs), self.ddq) + outputs[-n:]
+        if self.tangent is not None:
+            torques = np.einsum("mij,im->jm", self.tangent, torques)
+        result: FloatArray = self.tau - torques
+        return result
+
+    def _masses(self, outputs: FloatArray) -> FloatArray:
+        n = len(self.ddq)
+        rows, columns = np.tril_indices(n)
+        M = np.empty((outputs.shape[1], n, n))
+        M[:, rows, columns] = M[:, columns, rows] = outputs[:-n].T
+        return M
+
+    def mass_matrices(self, outputs: FloatArray) -> FloatArray:
+        """Of the independent coordinates, (n_samples, n_dof, n_dof)."""
+        M = self._masses(outputs)
+        if self.tangent is not None:
+            M = np.swapaxes(self.tangent, 1, 2) @ M @ self.tangent
+        return M
+
+    def inverse_masses(self, outputs: FloatArray) -> FloatArray | None:
+        """Inverses of the mass matrices, (n_samples, n_dof, n_dof).
+
+        None for the inverse dynamics, or where a matrix is not positive definite.
+        """
+        if not self.direct:
+            return None
+        M = self.mass_matrices(outputs)
+        try:
+            np.linalg.cholesky(M)
+        except np.linalg.LinAlgError:
+            return None
+        return np.asarray(np.linalg.inv(M), dtype=float)
+
+    def errors(self, outputs: FloatArray) -> tuple[float, float]:
+        """Normalised errors of torques and of accelerations [Ros2019].
+
+        The latter is infinite where a mass matrix is not positive definite, and not a number where
+        accelerations do not matter.
+        """
+        return errors_over([(self, outputs)])
+
+
+def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float, float]:
+    """The same over several parts of a set together, each with the outputs on it."""
+    squares = np.zeros(4)
+    for part, given in parts:
+        off, weights = part.differences(given), part.nominal_torque[:, None]
+        squares[:2] += np.sum((off / weights) ** 2), np.sum((part.tau / weights) ** 2)
+        inverse = part.inverse_masses(given)
+        if not part.direct:
+            squares[2:] = np.nan
+            continue
+        if inverse is None:
+            squares[2:] = np.inf, 1.0
+            continue
+        scale = part.nominal_acceleration[:, None]
+        caused = np.einsum("mij,jm->im", inverse, off) / scale
+        squares[2] += np.sum(caused**2)
+        squares[3] += np.sum((part.ddz / scale) ** 2)
+    torque, acceleration = np.sqrt(squares[[0, 2]] / squares[[1, 3]])
+    return float(torque), float(acceleration)
+
+
+def signed_outputs(program: Program, values: FloatArray) -> FloatArray:
+    """Outputs of a program from the values of its nodes, (n_outputs, n_samples)."""
+    outputs = np.array(program.outputs)
+    signed: FloatArray = values[outputs >> 1] * np.where(outputs & 1, -1.0, 1.0)[:, None]
+    return signed
+
+
+def term_samples(
+    mechanism: Mechanism,
+    blocks: Iterable[Block],
+    nominal_torque: FloatArray,
+    nominal_acceleration: FloatArray,
+    *,
+    direct: bool,
+    projected: bool,
+    coordinates: Coordinates | None = None,
+) -> TermSamples:
+    """Samples for the inverse or the direct dynamics.
+
+    Args:
+        mechanism: The mechanism.
+        blocks: States and torques.
+        nominal_torque: (n_dof,)
+        nominal_acceleration: (n_dof,)
+        direct: Whether the program gives the lower triangle of M, row by row, and delta, not torques.
+        projected: Whether it does so for the independent coordinates of loops, with R and b handed in.
+        coordinates: Of the mechanism, if they are at hand.
+    """
+    parts = list(blocks)
+    coordinates = coordinates or Coordinates(mechanism, once=True)
+
+    def joined(key: str) -> FloatArray:
+        return np.concatenate([getattr(part, key) for part in parts])
+
+    q, dq, ddq, tau, ddz = (joined(key) for key in ("q", "dq", "ddq", "tau", "ddz"))
+    states = [q.T, dq.T, ddq.T]
+    tangent = None
+    if mechanism.loops is not None:
+        tangent = coordinates.tangent(q)
+    if tangent is not None and projected:
+        dependent, independent = list(mechanism.dependent), list(mechanism.independent)
+        R = tangent[:, dependent]
+        b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
+        states += [R.reshape(len(q), -1).T, b.T]
+        # The program itself takes accelerations to torques of the independent coordinates.
+        tangent, ddq = None, ddz
+    return TermSamples(
+        states=np.vstack(states),
+        direct=direct,
+        ddq=np.ascontiguousarray(ddq.T),
+        tangent=tangent,
+        tau=np.ascontiguousarray(tau.T),
+        nominal_torque=nominal_torque,
+        ddz=np.ascontiguousarray(ddz.T),
+        nominal_acceleration=nominal_acceleration,
+    )

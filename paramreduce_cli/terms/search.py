@@ -1,0 +1,200 @@
+"""Which terms to leave out: down greedily, then some back in and down again, as long as there is time."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+from paramreduce_cli.terms.fitting import Fit, Fitting
+
+_TRIED = 8
+"""Most promising terms that are tried: by the error with parameters fitted again, and without."""
+_TRIED_LAST = 60
+"""The same where none of these will do: first-order errors are far off for large terms."""
+_AT_ONCE = 8
+"""Terms that are left out in one step, at most."""
+_SUM_HOLDS = 1.2
+"""Several terms go together if they cost no more than this times what each costs alone."""
+_BACK = (1, 8)
+"""Terms that are put back before others are left out."""
+_NOISE = 0.3
+"""Of the logarithm of what terms seem to cost, when others have been put back."""
+_WORSE = 0.2
+"""Probability with which the search goes on from a program with one operation more."""
+_SPREAD = 4.0
+"""Of the choice of terms to put back: how far down the list it reaches."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A program on the way, with the operations that it takes."""
+
+    fit: Fit
+    count: int
+
+
+class Search:
+    """Leaves terms of one program out.
+
+    Args:
+        fitting: Fits the program.
+        seed: Of what is put back.
+    """
+
+    def __init__(self, fitting: Fitting, seed: int) -> None:
+        self._fitting = fitting
+        self._tape = fitting.tape
+        self._candidates = self._tape.candidates()
+        self._rng = np.random.default_rng(seed)
+
+    def start(self, beta: FloatArray) -> Step:
+        """With all terms."""
+        return self._step(self._fitting.fit(self._tape.everything(), beta, looks=2))
+
+    def descended(
+        self,
+        step: Step,
+        visit: Callable[[Step], None] = lambda _: None,
+        noise: float = 0.0,
+        held: IntArray | None = None,
+    ) -> Step:
+        """Leave terms out until any more would exceed the budget.
+
+        Args:
+            step: Where to start.
+            visit: Told of every program on the way.
+            noise: Of the logarithm of what terms seem to cost.
+            held: Terms that stay.
+        """
+        weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
+        if held is not None:
+            weights[held] = np.inf
+        looked_at = _TRIED
+        while True:
+            following = self._next(step, weights, looked_at)
+            if following is not None:
+                step = following
+                visit(step)
+            elif noise == 0 and looked_at == _TRIED:
+                looked_at = _TRIED_LAST
+            else:
+                return step
+
+    def improved(self, step: Step, rounds: int, visit: Callable[[Step], None]) -> Step:
+        """Put terms back and leave others out instead, so many times."""
+        best = now = step
+        for round_ in range(rounds):
+            some, held = self._some_back(now) if round_ % 2 == 0 else self._one_out(now)
+            if not some.fit.within:
+                continue
+            found = self.descended(some, visit, _NOISE, held)
+            if found.count <= now.count + int(self._rng.random() < _WORSE):
+                now = found
+            if found.count < best.count or (
+                found.count == best.count and found.fit.cost < best.fit.cost
+            ):
+                best = found
+            if now.count > best.count + 2:
+                now = best
+        return self.descended(best, visit)
+
+    def _next(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
+        """The program with the cheapest terms left out, None if all are too dear."""
+        fit = step.fit
+        numbers, saved = self._useful(step, np.isfinite(weights))
+        if not numbers.size:
+            return None
+        live, saved = self._candidates[numbers], saved / weights[numbers]
+        tried = []
+        again, plain = self._costs(fit, live)
+        lists = [np.argsort(cost / saved, kind="stable")[:looked_at] for cost in (again, plain)]
+        for number in np.unique(np.concatenate(lists)):
+            changed = self._with(fit, live[number : number + 1])
+            if changed.within:
+                tried.append(((changed.cost - fit.cost) / saved[number], number, changed))
+        if not tried:
+            return None
+        tried.sort(key=lambda entry: entry[0])
+        _, number, best = tried[0]
+        chosen = [number]
+        for _, number, alone in tried[1:_AT_ONCE]:
+            expected = best.cost + max(alone.cost - fit.cost, 0.0) * _SUM_HOLDS
+            changed = self._with(fit, live[[*chosen, number]])
+            if changed.within and changed.cost <= expected:
+                best, chosen = changed, [*chosen, number]
+        return self._step(best)
+
+    def _useful(self, step: Step, allowed: BoolArray) -> tuple[IntArray, FloatArray]:
+        """Numbers of terms without which there are fewer operations, and how many fewer."""
+        mask = step.fit.mask
+        numbers = np.flatnonzero(allowed & self._kept(mask))
+        saved = step.count - self._tape.counts(mask, self._candidates[numbers])
+        return numbers[saved > 0], saved[saved > 0].astype(float)
+
+    def _kept(self, mask: BoolArray) -> BoolArray:
+        kept: BoolArray = mask[self._candidates[:, 0], self._candidates[:, 1]]
+        return kept
+
+    def _step(self, fit: Fit) -> Step:
+        return Step(fit, self._tape.count(fit.mask))
+
+    def _with(self, fit: Fit, flipped: IntArray) -> Fit:
+        """Fitted with some terms the other way round."""
+        mask = fit.mask.copy()
+        mask[flipped[:, 0], flipped[:, 1]] ^= True
+        return self._fitting.fit(mask, fit.beta)
+
+    def _costs(self, fit: Fit, live: IntArray) -> tuple[FloatArray, FloatArray]:
+        """What leaving each term out costs to first order, with parameters fitted again and without."""
+        D = self._fitting.effects(fit, live)
+        plain = np.einsum("cr,cr->c", D, D) + 2 * (D @ fit.linear.residual)
+        return plain - fit.linear.explained(D), plain
+
+    def _some_back(self, step: Step) -> tuple[Step, IntArray]:
+        """The program with some terms that help much for what they cost, and their numbers."""
+        fit = step.fit
+        back: list[int] = []
+        for _ in range(int(self._rng.integers(*_BACK))):
+            fit = self._one_back(fit, back, _SPREAD)
+        return self._step(fit), np.array(back, dtype=np.int64)
+
+    def _one_out(self, step: Step) -> tuple[Step, IntArray]:
+        """The program without one term that it cannot spare, mended by others, and the numbers of these."""
+        everything = np.ones(len(self._candidates), dtype=np.bool_)
+        numbers, saved = self._useful(step, everything)
+        if not numbers.size:
+            return step, np.zeros(0, np.int64)
+        again, _ = self._costs(step.fit, self._candidates[numbers])
+        order = np.argsort(again / saved, kind="stable")
+        out = int(numbers[order[self._drawn(order.size, 2 * _SPREAD)]])
+        fit = self._with(step.fit, self._candidates[out][None])
+        back: list[int] = [out]
+        for _ in range(_BACK[1]):
+            if fit.within:
+                break
+            fit = self._one_back(fit, back, 0.0)
+        return self._step(fit), np.array(back[1:], dtype=np.int64)
+
+    def _one_back(self, fit: Fit, back: list[int], spread: float) -> Fit:
+        """Put back one of the terms that help most for what they cost, none of some; note its number."""
+        gone = ~self._kept(fit.mask)
+        gone[back] = False
+        numbers = np.flatnonzero(gone)
+        if not numbers.size:
+            return fit
+        terms = self._candidates[numbers]
+        dearer = self._tape.counts(fit.mask, terms) - self._tape.count(fit.mask)
+        G = self._fitting.effects(fit, terms)
+        gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
+        gain += fit.linear.explained(G)
+        order = np.argsort(-gain / np.maximum(dearer, 0.5), kind="stable")
+        place = order[self._drawn(order.size, spread)]
+        back.append(int(numbers[place]))
+        return self._with(fit, terms[place][None])
+
+    def _drawn(self, size: int, spread: float) -> int:
+        """A place in a list, near its head."""
+        return min(int(self._rng.exponential(spread)), size - 1) if spread else 0

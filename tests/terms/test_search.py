@@ -1,0 +1,142 @@
+"""Fits and searches on a small arm, against definitions and against all that could be left out."""
+
+import itertools
+
+import numpy as np
+import pytest
+from conftest import model_of
+
+from paramreduce_cli.expressions.graph import ZERO, Graph
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Block, ReducedModel
+from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.samples import term_samples
+from paramreduce_cli.terms.search import Search
+from paramreduce_cli.terms.tape import Tape
+
+NOMINAL = np.array([20.0, 5.0])
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return model_of("two_link")
+
+
+def states(model, count, seed):
+    rng = np.random.default_rng(seed)
+    q, dq, ddq = rng.uniform(-2, 2, (3, count, 2))
+    tau = Dynamics(model.mechanism).inverse(q, dq, ddq, model.values)
+    return Block(0, np.zeros(count), q, dq, ddq, tau, q, dq, ddq, np.zeros((0, model.values.size)))
+
+
+def fitting_of(model, direct, budget, count=60, reduced=None):
+    reduced = reduced or base_model(model)
+    lean = LeanModels(model.mechanism, model.formulations)
+    program = lean.several(reduced, 1, direct=direct)[0]
+    graph = Graph()
+    start = lean.n_parameters
+
+    def substitute(position):
+        if position >= start:
+            return graph.input(position - start + reduced.n)
+        place = int(reduced.position[position])
+        return ZERO if place < 0 else graph.input(place)
+
+    numbered = Program.of_graph(graph, program.rebuilt(graph, substitute))
+    samples = term_samples(
+        model.mechanism, [states(model, count, 0)], NOMINAL, np.array([1.0, 2.0]),
+        direct=direct, projected=False,
+    )  # fmt: skip
+    return Fitting(Tape(numbered), reduced.n, samples, budget), reduced, samples
+
+
+def predicted(fitting, fit, samples, direct):
+    """Torques, and mass matrices, from the program that is left, written out."""
+    program = fitting.tape.rebuilt(fit.mask)
+    m = samples.tau.shape[1]
+    given = program.evaluated(
+        [*np.broadcast_to(fit.beta[:, None], (fit.beta.size, m)), *samples.states]
+    )
+    given = [np.broadcast_to(value, m) for value in given]
+    if not direct:
+        return np.array(given), None
+    ddq = samples.states[4:6]
+    M = np.array([[given[0], given[1]], [given[1], given[2]]])
+    return np.einsum("ijm,jm->im", M, ddq) + np.array(given[3:]), M
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct):
+    fitting, reduced, samples = fitting_of(arm, direct, Budget(0.1, 0.1))
+    search = Search(fitting, 0)
+    whole = search.start(reduced.values)
+    assert whole.fit.torque_error < 1e-6
+
+    found = search.descended(whole).fit
+    tau, M = predicted(fitting, found, samples, direct)
+    weights = NOMINAL[:, None]
+    error = np.linalg.norm((tau - samples.tau) / weights) / np.linalg.norm(samples.tau / weights)
+    assert found.torque_error == pytest.approx(error, rel=1e-6)
+    assert error <= 0.1
+    if not direct:
+        # No other values do better.
+        rows = (
+            np.array(
+                [
+                    predicted(
+                        fitting,
+                        type(found)(found.mask, e, *[None] * 5, found.linear),
+                        samples,
+                        False,
+                    )[0]
+                    for e in np.eye(found.beta.size)
+                ]
+            )
+            / weights
+        )
+        flat = rows.reshape(found.beta.size, -1).T
+        best = np.linalg.lstsq(flat, (samples.tau / weights).ravel(), rcond=None)[0]
+        left = np.linalg.norm(flat @ best - (samples.tau / weights).ravel())
+        assert error == pytest.approx(left / np.linalg.norm(samples.tau / weights), rel=1e-6)
+        return
+    accelerations = np.linalg.solve(
+        np.moveaxis(M, 2, 0), np.moveaxis(samples.tau - tau, 1, 0)[..., None]
+    )[..., 0]
+    scale = np.array([1.0, 2.0])
+    expected = np.linalg.norm(accelerations / scale) / np.linalg.norm(samples.ddz.T / scale)
+    assert found.acceleration_error == pytest.approx(expected, rel=1e-6)
+    assert expected <= 0.1
+
+
+@pytest.mark.parametrize("budget", [2.0, 4.0])
+def test_nothing_leaner_can_be_had_on_a_small_arm(arm, budget):
+    """All ways to leave addends out of the inverse dynamics are tried."""
+    base = base_model(arm)
+    kept = ["Izz_upper", "mx_upper", "Izz_fore", "mx_fore"]
+    assert set(kept) <= set(base.names)
+    position = np.full(arm.values.size, -1)
+    for k, name in enumerate(kept):
+        position[arm.mechanism.parameter_names.index(name)] = k
+    values = np.array([base.values[base.names.index(name)] for name in kept])
+    reduced = ReducedModel(tuple(kept), values, position)
+    whole, *_ = fitting_of(arm, False, Budget(1.0), 25, reduced)
+    error = whole.fit(whole.tape.everything(), values).torque_error
+    fitting, *_ = fitting_of(arm, False, Budget(budget * error), 25, reduced)
+
+    tape = fitting.tape
+    sums = sorted({k for k, what in tape.candidates().tolist() if what < 2})
+    assert 5 <= len(sums) <= 10, "an arm of this size can be searched exhaustively"
+    fewest = tape.count(tape.everything())
+    for ways in itertools.product(((True, True), (True, False), (False, True)), repeat=len(sums)):
+        mask = tape.everything()
+        mask[sums, :2] = ways
+        if tape.count(mask) < fewest and fitting.fit(mask, values).within:
+            fewest = tape.count(mask)
+    search = Search(fitting, 0)
+    found = search.descended(search.start(values))
+    found = search.improved(found, 200, lambda _: None)
+    assert found.fit.within
+    assert found.count <= fewest, "whole nodes may go as well, so it may even be leaner"

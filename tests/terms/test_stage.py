@@ -1,0 +1,231 @@
+"""reduce-terms on whole robots, its records and its exported code against definitions."""
+
+import ctypes
+import json
+import shutil
+
+import numpy as np
+import pytest
+from conftest import ONE_FORMAT, config_of
+
+from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.config import load_config
+from paramreduce_cli.export.choice import simplified_model
+from paramreduce_cli.export.writing import Exported, export
+from paramreduce_cli.expressions.compiled import load
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
+from paramreduce_cli.runner import Runner
+
+TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
+STAGES = {stage.name: stage for stage in pipeline()}
+
+
+def simplified(folder, robot, *overrides):
+    """Run a config as far as its functions without small terms."""
+    config = config_of(robot, ONE_FORMAT, *TERMS, *overrides)
+    runner = Runner(config, Store(folder))
+    for stage in stages_to_run(config):
+        runner.run(stage)
+        if stage.output is TermReduction:
+            return runner
+    raise AssertionError("there is no such stage")
+
+
+def loaded(runner, record):
+    return load_file(runner.store.path(record), record, None, "")[0]
+
+
+@pytest.fixture(scope="module")
+def two_link(tmp_path_factory):
+    return simplified(tmp_path_factory.mktemp("two_link_terms"), "two_link")
+
+
+LOOPS = {
+    "generalised": ("validation.operations=generalised",),
+    "independent": ("validation.operations=independent",),
+}
+
+
+@pytest.fixture(scope="module", params=list(LOOPS))
+def four_bar(request, tmp_path_factory):
+    folder = tmp_path_factory.mktemp(f"four_bar_{request.param}")
+    return simplified(folder, "four_bar", *LOOPS[request.param])
+
+
+def errors_by_definition(runner, name):
+    """Torque errors on both sets, from the stored program and plain formulas alone."""
+    model, samples, found = (loaded(runner, r) for r in (Model, Samples, TermReduction))
+    term = found.functions[name]
+    mechanism, program = model.mechanism, Program.of_stored(term.program)
+    coordinates = Coordinates(mechanism)
+    result = []
+    for part in (samples.estimation, samples.validation):
+        off = total = 0.0
+        for b in part.blocks():
+            n = b.q.shape[1]
+            tangent = np.broadcast_to(np.eye(n), (len(b.q), n, n))
+            inputs = [*b.q.T, *b.dq.T, *b.ddq.T]
+            ddq = b.ddq
+            if mechanism.loops is not None:
+                tangent = coordinates.tangent(b.q)
+            if term.projected:
+                d, z = list(mechanism.dependent), list(mechanism.independent)
+                drift = b.ddq[:, d] - np.einsum("kij,kj->ki", tangent[:, d], b.ddq[:, z])
+                inputs += [*tangent[:, d].reshape(len(b.q), -1).T, *drift.T]
+                n = mechanism.n_dof
+                tangent, ddq = np.broadcast_to(np.eye(n), (len(b.q), n, n)), b.ddz
+            values = [np.full(len(b.q), value) for value in term.values]
+            given = [np.broadcast_to(x, len(b.q)) for x in program.evaluated([*values, *inputs])]
+            torques = np.array(given).T
+            if name == "direct":
+                M = np.zeros((len(b.q), n, n))
+                for (i, j), entry in zip(
+                    zip(*np.tril_indices(n), strict=True), given, strict=False
+                ):
+                    M[:, i, j] = M[:, j, i] = entry
+                torques = np.einsum("kij,kj->ki", M, ddq) + np.array(given[-n:]).T
+                M_zz = np.einsum("kia,kij,kjb->kab", tangent, M, tangent)
+                assert np.linalg.eigvalsh(M_zz).min() > 0
+            tau = np.einsum("kij,ki->kj", tangent, torques)
+            off += np.sum(((tau - b.tau) / model_weights(runner)) ** 2)
+            total += np.sum((b.tau / model_weights(runner)) ** 2)
+        result.append(float(np.sqrt(off / total)))
+    return term, result
+
+
+def model_weights(runner):
+    return loaded(runner, Reduction).nominal_torque
+
+
+@pytest.mark.parametrize("name", ["inverse", "direct"])
+def test_errors_are_what_they_are_defined_as_and_within_the_budget(two_link, name):
+    term, (estimation, validation) = errors_by_definition(two_link, name)
+    assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-9)
+    assert term.torque_error_validation == pytest.approx(validation, rel=1e-9)
+    assert max(estimation, validation) <= 0.05
+    assert 0 < term.operations < term.operations_start
+    assert term.operations == Program.of_stored(term.program).n_operations
+    if name == "direct":
+        assert term.smallest_eigenvalue > 0
+        assert term.random_states == 100_000
+        assert max(term.acceleration_error_estimation, term.acceleration_error_validation) <= 0.2
+    front = term.front
+    assert np.all(np.diff(front.operations) > 0)
+    assert front.torque_error_estimation[-1] < front.torque_error_estimation[0]
+
+
+@pytest.mark.parametrize("name", ["inverse", "direct"])
+def test_loops(four_bar, name):
+    term, (estimation, validation) = errors_by_definition(four_bar, name)
+    assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
+    assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+    assert max(estimation, validation) <= 0.05
+    assert np.isnan(term.random_torque_error), "nobody knows random states of loops"
+
+
+@pytest.mark.parametrize("name", ["inverse", "direct"])
+def test_exported_functions_compute_the_same(four_bar, name):
+    """The export checks itself against the stored program, projected by matrices."""
+    model, found = loaded(four_bar, Model), loaded(four_bar, TermReduction)
+    chosen, term, title = simplified_model(found, name)
+    what = {"inverse": Exported.IDM, "direct": Exported.DDM}[name]
+    for constant in (False, True):
+        files = export(
+            model,
+            chosen,
+            title=title,
+            language="python",
+            what=what,
+            constant=constant,
+            simplified=term,
+        )
+        assert any(name.endswith(".py") for name in files)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def test_the_exported_c_has_the_reported_error_on_the_validation_set(two_link):
+    model, samples = loaded(two_link, Model), loaded(two_link, Samples)
+    chosen, term, title = simplified_model(loaded(two_link, TermReduction), "inverse")
+    files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=term)
+    header, source = files["two_link.h"].decode(), files["two_link.c"].decode()
+    assert "TERMS WERE LEFT OUT" in header
+    assert "velocity -3" in header or "velocity -2" in header, "ranges stand in the header"
+    library = load(header + source.replace('#include "two_link.h"', ""))
+    off = total = 0.0
+    phi = np.ascontiguousarray(term.values)
+    for block in samples.validation.blocks():
+        for q, dq, ddq, tau in zip(block.q, block.dq, block.ddq, block.tau, strict=True):
+            given = np.empty(2)
+            arrays = [np.ascontiguousarray(a) for a in (phi, q, dq, ddq)]
+            pointers = [ctypes.c_void_p(a.ctypes.data) for a in (*arrays, given)]
+            library.two_link_inverse_dynamics(*pointers)
+            off += np.sum(((given - tau) / samples.nominal_torque) ** 2)
+            total += np.sum((tau / samples.nominal_torque) ** 2)
+    assert term.torque_error_validation == pytest.approx(np.sqrt(off / total), rel=1e-9)
+
+
+def test_what_is_found_does_not_depend_on_threads(two_link, tmp_path):
+    shutil.copytree(two_link.store.folder, tmp_path / "r")
+    runner = Runner(two_link.config, Store(tmp_path / "r"), jobs=2)
+    runner.run(STAGES["reduce-terms"], force=True)
+    one, two = loaded(two_link, TermReduction), loaded(runner, TermReduction)
+    for name in ("inverse", "direct"):
+        np.testing.assert_array_equal(one.functions[name].values, two.functions[name].values)
+        assert one.functions[name].operations == two.functions[name].operations
+
+
+def test_summary_and_page(two_link, tmp_path):
+    shutil.copytree(two_link.store.folder, tmp_path / "r")
+    runner = Runner(two_link.config, Store(tmp_path / "r"))
+    for stage in ("validate", "report"):
+        runner.run(STAGES[stage])
+    path = runner.store.path(Report)
+    summary = json.loads(path.read_text())
+    assert [one["function"] for one in summary["terms"]] == ["inverse", "direct"]
+    for one in summary["terms"]:
+        assert max(one["torque_error"].values()) <= 0.05
+        assert one["pareto"][0]["operations"] <= one["operations"]
+    page = path.with_name("index.html").read_text()
+    assert "Without small terms" in page
+    assert (path.parent / "figures" / "terms.svg").exists()
+
+
+def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measured_copy):
+    settings = [text for text in TERMS if "acceleration" not in text]
+    settings.append("terms.torque_error=0.2")
+    config = load_config(measured_copy / "arm.yaml", [ONE_FORMAT, *settings])
+    runner = Runner(config, Store(measured_copy / "results"))
+    runner.run(STAGES["reduce-terms"])
+    for name in ("inverse", "direct"):
+        term, (estimation, validation) = errors_by_definition(runner, name)
+        assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
+        assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+        assert estimation <= 0.2
+        assert np.isnan(term.random_torque_error), "torques at other states are not known"
+
+
+def test_bad_input(two_link, invoke, tmp_path):
+    config = config_of("two_link", *TERMS)
+    assert config.terms is not None
+    results = tmp_path / "r"
+    shutil.copytree(two_link.store.folder, results)
+    common = ("--results", results)
+    sets = [part for setting in (ONE_FORMAT, *TERMS) for part in ("--set", setting)]
+    path = "configs/two_link.yaml"
+    refused = invoke("reduce-terms", path, *common, code=2)
+    assert "terms is missing" in refused.err
+    refused = invoke(
+        "reduce-terms", path, *common, *sets, "--set", "terms.torque_error=1e-15", code=2
+    )
+    assert "terms.torque_error" in refused.err
+    refused = invoke("reduce-terms", path, *common, *sets, "--set", "terms.torque_error=2", code=2)
+    assert "less than 1" in refused.err
+    refused = invoke("export", path, *common, *sets, "--model", "terms", code=2)
+    assert "--what idm or --what ddm" in refused.err
+    refused = invoke(
+        "export", path, *common, *sets, "--model", "terms", "--what", "regressor", code=2
+    )
+    assert "each function has values of its own" in refused.err
