@@ -223,18 +223,18 @@ class Runner:
     def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:
         brought = self.samples if entry.type is Samples else None
         path = brought or self.store.path(entry.type)
-        if entry.optional and not self._expected(entry.type, path):
+        if entry.optional and not self._expected(entry.type):
             return None
         robot = self.config.robot if self.config is not None and brought is None else None
         record, stamp = load_file(path, entry.type, robot, "" if brought else maker_of(entry.type))
         inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
         return record
 
-    def _expected(self, record: type, path: Path) -> bool:
+    def _expected(self, record: type) -> bool:
         """Whether an optional input must be there: a full run of this config would make it."""
         if self.config is None:
             return False
-        return path.exists() or record in [s.output for s in stages_to_run(self.config)]
+        return record in [s.output for s in stages_to_run(self.config)]
 
     @property
     def _robot(self) -> str:

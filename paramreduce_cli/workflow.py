@@ -2,7 +2,7 @@
 
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.pipeline import Stage, pipeline
-from paramreduce_cli.records import Identification, MeasuredLog, Trajectories
+from paramreduce_cli.records import Identification, MeasuredLog, TermReduction, Trajectories
 
 
 def make_rules() -> str:
@@ -16,10 +16,11 @@ def make_rules() -> str:
         "PARAMREDUCE_FLAGS ?=",
         "# What must be there before paramreduce can be called, such as an installation.",
         "PARAMREDUCE_READY ?=",
-        "# Files that there are for robots with a log only, or for those without.",
+        "# Files that there are for some robots only: with a log, without one, with terms to leave out.",
         "has_log = $(shell grep -Es '^ +log:' $(CONFIGS)/$(1).yaml)",
         "with_log = $(if $(call has_log,$(1)),$(2))",
         "without_log = $(if $(call has_log,$(1)),,$(2))",
+        "with_terms = $(if $(shell grep -Es '^terms:' $(CONFIGS)/$(1).yaml),$(2))",
         ".SECONDEXPANSION:",
     ]
     for stage in pipeline():
@@ -38,6 +39,7 @@ _CONDITIONS: dict[type, str] = {
     MeasuredLog: "with_log",
     Identification: "with_log",
     Trajectories: "without_log",
+    TermReduction: "with_terms",
 }
 """Functions in the rules that say which robots have a file."""
 

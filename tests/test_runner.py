@@ -8,7 +8,7 @@ from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.runner import Runner
 
 ORDER = [
-    "build-model", "optimize-trajectories", "process-log", "sample", "reduce", "validate", "identify", "report",
+    "build-model", "optimize-trajectories", "process-log", "sample", "reduce", "reduce-terms", "validate", "identify", "report",
 ]  # fmt: skip
 STAGES = {stage.name: stage for stage in pipeline()}
 

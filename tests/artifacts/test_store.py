@@ -26,6 +26,7 @@ from paramreduce_cli.records import (
     Model,
     Reduction,
     Samples,
+    TermReduction,
     Trajectories,
     Validation,
 )
@@ -156,7 +157,7 @@ DAMAGES = {
 @pytest.mark.parametrize("record", list(LAYOUTS))
 def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy, request):
     folder = two_link_copy
-    if record in (MeasuredLog, Identification):
+    if record in (MeasuredLog, Identification, TermReduction):
         folder = request.getfixturevalue("measured_copy") / "results"
     path = Store(folder).path(record)
     DAMAGES[damage](path)
