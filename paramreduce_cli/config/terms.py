@@ -20,7 +20,7 @@ class TermsSection(Section):
     """Allowed on the estimation set, and on the validation set where its torques are not held out."""
     acceleration_error: Annotated[Number, Field(gt=0)] | None = None
     """The same of accelerations, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
-    rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 40
+    rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 20
     """How often terms are put back and others left out instead."""
     seed: Annotated[Whole, Field(ge=0)] = 0
     """Of what is put back."""

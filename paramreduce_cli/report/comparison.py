@@ -27,6 +27,7 @@ TOLERANCES: dict[str, Tolerance] = {
     "operations": Tolerance(0.0),
     "mass_matrix": Tolerance(1e-4, 1e-9),
     "parameters": Tolerance(1e-5, 1e-9),
+    "terms": Tolerance(0.05),
 }
 _TIE = Tolerance(1e-7, 1e-9)
 
@@ -226,6 +227,24 @@ def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> It
             yield Difference(f"selected.parameters.{name}", _text(x[name]), _text(y[name]), holds)
 
 
+def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+    """Which terms are left out first may hang on round-off, so it is gated by how many operations are
+    left, upwards, and by the budget."""
+    first, second = ({one["function"]: one for one in s.get("terms", [])} for s in (a, b))
+    yield from _exact("functions without small terms", sorted(first), sorted(second))
+    for name in first.keys() & second.keys():
+        x, y = first[name], second[name]
+        most = x["operations"] * (1 + tolerances["terms"].relative)
+        if x["operations"] != y["operations"]:
+            yield Difference(
+                f"operations without small terms, {name}",
+                str(x["operations"]),
+                str(y["operations"]),
+                y["operations"] <= most,
+            )
+        yield from _exact(f"budget of terms, {name}", x["budget"], y["budget"])
+
+
 QUANTITIES: dict[str, Quantity] = {
     "model": _model,
     "kappa": _kappa,
@@ -236,4 +255,5 @@ QUANTITIES: dict[str, Quantity] = {
     "operations": _numbers("operations"),
     "mass_matrix": _numbers("mass_matrix"),
     "selected": _selected,
+    "terms": _terms,
 }

@@ -164,11 +164,14 @@ def _identification(found: Identification | None) -> dict[str, Any] | None:
 
 def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
     """Functions with terms left out; empty where that was not asked for."""
+    if found is None:
+        return []
     return [
         {
             "function": name,
             "heuristic": one.heuristic,
             "n_start": one.n_start,
+            "budget": {"torque": found.torque_budget, "acceleration": found.acceleration_budget},
             "operations": one.operations,
             "operations_start": one.operations_start,
             **_errors(one),
@@ -181,7 +184,7 @@ def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
                 for k, count in enumerate(one.front.operations)
             ],
         }
-        for name, one in (found.functions.items() if found is not None else ())
+        for name, one in found.functions.items()
     ]
 
 

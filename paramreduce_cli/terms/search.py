@@ -12,7 +12,7 @@ from paramreduce_cli.terms.fitting import Fit, Fitting
 
 _TRIED = 8
 """Most promising terms that are tried: by the error with parameters fitted again, and without."""
-_TRIED_LAST = 60
+_TRIED_LAST = 20
 """The same where none of these will do: first-order errors are far off for large terms."""
 _AT_ONCE = 8
 """Terms that are left out in one step, at most."""

@@ -95,3 +95,13 @@ def test_a_search_that_was_cut_short_may_have_found_less(summary):
 def test_only_what_is_asked(summary):
     other = changed(summary, ["model", "n_base"], lambda v: v + 1)
     assert bad(summary, other, only=("kappa", "order")) == []
+
+
+def test_more_operations_without_small_terms_are_a_regression_and_fewer_are_not(summary):
+    term = {"function": "inverse", "operations": 100, "budget": {"torque": 0.01}}
+    one = summary | {"terms": [term]}
+    assert bad(one, summary) == ["functions without small terms"]
+    for operations, what in ((80, []), (104, []), (106, ["operations without small terms, inverse"])):
+        assert bad(one, summary | {"terms": [term | {"operations": operations}]}) == what
+    other = term | {"budget": {"torque": 0.02}}
+    assert bad(one, summary | {"terms": [other]}) == ["budget of terms, inverse"]
