@@ -229,7 +229,8 @@ def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> It
 
 def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
     """Which terms are left out first may hang on round-off, so it is gated by how many operations are
-    left, upwards, and by the budget."""
+    left, upwards, and by the budget.
+    """
     first, second = ({one["function"]: one for one in s.get("terms", [])} for s in (a, b))
     yield from _exact("functions without small terms", sorted(first), sorted(second))
     for name in first.keys() & second.keys():

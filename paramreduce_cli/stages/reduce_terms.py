@@ -24,6 +24,8 @@ from paramreduce_cli.terms.starts import starts_within
 
 _SEARCHED, _WATCHED = 300, 200
 """Samples of the estimation and the validation set that are looked at while terms are left out."""
+_POSES = 300
+"""States at which mass matrices are looked at meanwhile."""
 _FITTED = 1000
 """Samples of the estimation set to which the parameters of what is left are fitted."""
 _ANY = 1e6
@@ -71,6 +73,7 @@ def reduce_terms(
             lean, starts,
             judge.thinned(samples.estimation, _SEARCHED),
             judge.thinned(validation, _WATCHED) if validation is not None else None,
+            judge.poses(_POSES),
             budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=run.jobs, progress=progress,
         )  # fmt: skip
         fitted = judge.thinned(samples.estimation, _FITTED)

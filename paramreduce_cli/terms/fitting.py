@@ -75,6 +75,7 @@ class Fitting:
         samples: What the parameters are fitted to.
         budget: How well they must do.
         watched: Samples on which they must do as well.
+        poses: States at which mass matrices must be positive definite; what else they hold does not matter.
     """
 
     def __init__(
@@ -84,10 +85,11 @@ class Fitting:
         samples: TermSamples,
         budget: Budget,
         watched: TermSamples | None = None,
+        poses: TermSamples | None = None,
     ) -> None:
         self.tape, self.samples, self.budget = tape, samples, budget
         self.n = n_parameters
-        self._watched = watched
+        self._watched, self._poses = watched, poses
         self._parameters = tape.parameters(n_parameters)
         chi = samples.tau / samples.nominal_torque[:, None]
         self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi) * budget.torque)
@@ -138,6 +140,10 @@ class Fitting:
         if self._watched is not None and max(shares) <= 1.0:
             watched = self.errors(mask, beta, self._watched)
             shares += [watched[0] / budget.torque, np.nan_to_num(watched[1] / budget.acceleration)]
+        if self._poses is not None and max(shares) <= 1.0:
+            values, _ = self.tape.values(mask, self._inputs(beta, self._poses))
+            if self._poses.inverse_masses(signed_outputs(self.tape.program, values)) is None:
+                shares.append(np.inf)
         cost = float(np.sum(np.minimum(shares[:2], _LARGEST) ** 2))
         return Fit(mask, beta, *errors, cost, float(max(shares)), watched, linear)
 

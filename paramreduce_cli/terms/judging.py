@@ -127,6 +127,19 @@ class Judge:
         )
         return smallest, 0 if self._model.mechanism.loops is not None else _MASSES
 
+    def poses(self, count: int) -> TermSamples | None:
+        """States inside the ranges, half of them in their corners; None where M does not matter, or with
+        loops, whose states would have to be assembled.
+        """
+        if not self.direct or self._model.mechanism.loops is not None:
+            return None
+        corners = self._rng.random((count - count // 2, *self.lower.shape)) < 0.5
+        q, dq, ddq = np.moveaxis(np.where(corners, self.lower, self.upper), 1, 0)
+        inside = self._random_states(count // 2)
+        return self._made(
+            [self._block(*(np.vstack(pair) for pair in zip((q, dq, ddq), inside, strict=True)))]
+        )
+
     def _looked_at(self) -> Iterator[TermSamples]:
         for parts in self._sets:
             yield from parts

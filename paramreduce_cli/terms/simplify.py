@@ -24,7 +24,7 @@ from paramreduce_cli.terms.tape import Tape
 
 _FORMULATIONS = 2
 """Of each start that are gone down from."""
-_LEAN, _LOOKED_AT = 3, 15
+_LEAN, _LOOKED_AT = 3, 60
 """Leanest starts that are gone down from, and how many are looked at to find them."""
 _IMPROVED = 3
 """Ends of descents from which the search goes on."""
@@ -118,6 +118,7 @@ def simplified(
     starts: tuple[list[Start], list[Start]],
     samples: TermSamples,
     watched: TermSamples | None,
+    poses: TermSamples | None,
     budget: Budget,
     *,
     direct: bool,
@@ -136,6 +137,7 @@ def simplified(
         starts: Where to go down from: the first few that are within the budget, and all of others.
         samples: What parameters are fitted to.
         watched: Samples on which errors must be within the budget as well.
+        poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
         direct: Whether [M | delta] is meant, not torques.
         rounds: How often terms are put back.
@@ -152,7 +154,7 @@ def simplified(
 
     def begun(start: Start, program: Program) -> _Way:
         tape = Tape(_numbered(program, start.model, lean.n_parameters))
-        search = Search(Fitting(tape, start.model.n, samples, budget, watched), seed)
+        search = Search(Fitting(tape, start.model.n, samples, budget, watched, poses), seed)
         return _Way(
             start, program.n_operations, search, tape, search.start(start.model.values), {}, stop
         )
