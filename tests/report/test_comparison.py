@@ -101,7 +101,11 @@ def test_more_operations_without_small_terms_are_a_regression_and_fewer_are_not(
     term = {"function": "inverse", "operations": 100, "budget": {"torque": 0.01}}
     one = summary | {"terms": [term]}
     assert bad(one, summary) == ["functions without small terms"]
-    for operations, what in ((80, []), (104, []), (106, ["operations without small terms, inverse"])):
+    for operations, what in (
+        (80, []),
+        (104, []),
+        (106, ["operations without small terms, inverse"]),
+    ):
         assert bad(one, summary | {"terms": [term | {"operations": operations}]}) == what
     other = term | {"budget": {"torque": 0.02}}
     assert bad(one, summary | {"terms": [other]}) == ["budget of terms, inverse"]
