@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import prod
 
-from paramreduce_cli.expressions.graph import Graph, Node
+from paramreduce_cli.expressions.graph import Node
 from paramreduce_cli.expressions.operations import Program
 
 
@@ -55,10 +55,8 @@ class Function:
         """The same with some of its arguments; the others are not used."""
         places = enumerate(self.places(self.arguments))
         kept = [position for position, (argument, _) in places if argument.name in names]
-        graph = Graph()
-        outputs = self.program.rebuilt(graph, lambda position: graph.input(kept.index(position)))
         arguments = tuple(a for a in self.arguments if a.name in names)
-        return replace(self, arguments=arguments, program=Program.of_graph(graph, outputs))
+        return replace(self, arguments=arguments, program=self.program.renumbered(kept.index))
 
     def steps(self) -> Iterator[tuple[int, Node]]:
         """Numbers and nodes of the operations, in an order in which they can be done."""

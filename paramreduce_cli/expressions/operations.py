@@ -172,6 +172,20 @@ class Program:
             values.append(value)
         return [graph.negate(values[a >> 1]) if a & 1 else values[a >> 1] for a in self.outputs]
 
+    def renumbered(self, place: Callable[[int], int]) -> Program:
+        """The function with its inputs at other positions.
+
+        Args:
+            place: Position of an input, by the one it has now; negative for one that is zero.
+        """
+        graph = Graph()
+
+        def substitute(position: int) -> int:
+            moved = place(position)
+            return graph.input(moved) if moved >= 0 else ZERO
+
+        return Program.of_graph(graph, self.rebuilt(graph, substitute))
+
     def count(
         self,
         zero_inputs: Collection[int] = (),

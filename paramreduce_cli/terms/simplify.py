@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramreduce_cli.expressions.factoring import least
-from paramreduce_cli.expressions.graph import ZERO, Graph
+from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
@@ -71,14 +71,10 @@ class Simplified:
         )
         place = np.full(model.n + 1, NOT_KEPT)
         place[used] = np.arange(len(used))
-        graph = Graph()
-
-        def substitute(position: int) -> int:
-            if position >= model.n:
-                return graph.input(position - model.n + len(used))
-            return graph.input(int(place[position]))
-
-        program = Program.of_graph(graph, self.program.rebuilt(graph, substitute))
+        dropped = model.n - len(used)
+        program = self.program.renumbered(
+            lambda position: position - dropped if position >= model.n else int(place[position])
+        )
         names = tuple(model.names[k] for k in used)
         return ReducedModel(names, self.beta[used], place[model.position]), program
 
@@ -143,7 +139,7 @@ def simplified(
         rounds: How often terms are put back.
         seed: Of what is put back.
         jobs: Threads; what is found does not depend on them.
-        progress: Told what share is done, and of the fewest operations so far.
+        progress: Told what share is done, and where the last search has ended.
 
     Returns:
         Programs, the leanest first, and programs on the way to them, by operations; both are empty
@@ -153,7 +149,11 @@ def simplified(
     done = itertools.count(1)
 
     def begun(start: Start, program: Program) -> _Way:
-        tape = Tape(_numbered(program, start.model, lean.n_parameters))
+        n, n_standard, place = start.model.n, lean.n_parameters, start.model.position
+        # First the parameters of the model, not all standard ones.
+        tape = Tape(
+            program.renumbered(lambda k: k - n_standard + n if k >= n_standard else int(place[k]))
+        )
         search = Search(Fitting(tape, start.model.n, samples, budget, watched, poses), seed)
         return _Way(
             start, program.n_operations, search, tape, search.start(start.model.values), {}, stop
@@ -213,16 +213,3 @@ def _front(ways: list[_Way]) -> list[Simplified]:
             kept.append((count, k))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
     return [ways[k].simplified(ways[k].visited[count]) for count, k in (kept[i] for i in picks)]
-
-
-def _numbered(program: Program, model: ReducedModel, n_standard: int) -> Program:
-    """A program whose first inputs are the parameters of a model, not standard parameters."""
-    graph = Graph()
-
-    def substitute(position: int) -> int:
-        if position >= n_standard:
-            return graph.input(position - n_standard + model.n)
-        place = int(model.position[position])
-        return ZERO if place == NOT_KEPT else graph.input(place)
-
-    return Program.of_graph(graph, program.rebuilt(graph, substitute))

@@ -6,8 +6,6 @@ import numpy as np
 import pytest
 from conftest import model_of
 
-from paramreduce_cli.expressions.graph import ZERO, Graph
-from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, ReducedModel
@@ -36,16 +34,8 @@ def fitting_of(model, direct, budget, count=60, reduced=None):
     reduced = reduced or base_model(model)
     lean = LeanModels(model.mechanism, model.formulations)
     program = lean.several(reduced, 1, direct=direct)[0]
-    graph = Graph()
-    start = lean.n_parameters
-
-    def substitute(position):
-        if position >= start:
-            return graph.input(position - start + reduced.n)
-        place = int(reduced.position[position])
-        return ZERO if place < 0 else graph.input(place)
-
-    numbered = Program.of_graph(graph, program.rebuilt(graph, substitute))
+    start, place = lean.n_parameters, reduced.position
+    numbered = program.renumbered(lambda k: k - start + reduced.n if k >= start else int(place[k]))
     samples = term_samples(
         model.mechanism, [states(model, count, 0)], NOMINAL, np.array([1.0, 2.0]),
         direct=direct, projected=False,
