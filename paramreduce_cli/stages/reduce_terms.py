@@ -28,9 +28,6 @@ _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
 _FITTED = 1000
 """Samples of the estimation set to which the parameters of what is left are fitted."""
-_ANY = 1e6
-"""Error of accelerations that is allowed where none is named: mass matrices are positive definite then,
-and that is all."""
 
 
 def reduce_terms(
@@ -54,7 +51,7 @@ def reduce_terms(
     )
     projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
     allowed = section.acceleration_error
-    budget = Budget(section.torque_error, _ANY if allowed is None else allowed)
+    budget = Budget(section.torque_error, np.inf if allowed is None else allowed)
     lean = LeanModels(model.mechanism, model.formulations, independent=projected)
     functions: dict[str, TermModel] = {}
     for name in dict.fromkeys(section.functions):
@@ -88,7 +85,7 @@ def reduce_terms(
                 ("terms", "torque_error"),
             )
         functions[name] = record
-    return TermReduction(section.torque_error, np.inf if allowed is None else allowed, functions)
+    return TermReduction(budget.torque, budget.acceleration, functions)
 
 
 def _record(

@@ -21,7 +21,8 @@ class Budget:
     """Errors that are allowed."""
 
     torque: float
-    acceleration: float = np.inf
+    acceleration: float
+    """Infinite where accelerations do not matter; mass matrices must be positive definite even so."""
 
 
 @dataclass(frozen=True)
@@ -56,8 +57,6 @@ class Fit:
     """Sum of the squares of both errors over the allowed ones."""
     excess: float
     """The largest of all errors over the allowed one."""
-    watched: tuple[float, float]
-    """Errors of torques and accelerations on the samples that are watched; not numbers without any."""
     linear: Linear
 
     @property
@@ -92,10 +91,10 @@ class Fitting:
         self._watched, self._poses = watched, poses
         self._parameters = tape.parameters(n_parameters)
         chi = samples.tau / samples.nominal_torque[:, None]
-        self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi) * budget.torque)
+        self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi))
         nominal = samples.nominal_acceleration
         size = float(np.linalg.norm(samples.ddz / nominal[:, None]))
-        self._acceleration_scale = 1 / (nominal * size * budget.acceleration)
+        self._acceleration_scale = 1 / (nominal * size)
 
     def _inputs(self, beta: FloatArray, samples: TermSamples) -> FloatArray:
         m = samples.tau.shape[1]
@@ -121,7 +120,7 @@ class Fitting:
             metric = self._metric(inverse)
             rows = self._weighed(W, metric)
             target = self._weighed(samples.tau[None], metric)[0]
-            beta, gram = _solved(rows, target)
+            beta, factor = _solved(rows, target)
             off = samples.tau - np.tensordot(beta, W, 1)
             if not samples.direct:
                 break
@@ -130,32 +129,39 @@ class Fitting:
             inverse = samples.inverse_masses(signed_outputs(program, values))
         residual = self._weighed(off[None], metric)[0]
         errors = self._errors(off, inverse)
-        return self._judged(mask, beta, errors, Linear(rows, gram, residual, metric))
+        return self._judged(mask, beta, errors, Linear(rows, factor, residual, metric))
 
     def _judged(
         self, mask: BoolArray, beta: FloatArray, errors: tuple[float, float], linear: Linear
     ) -> Fit:
-        budget, watched = self.budget, (np.nan, np.nan)
-        shares = [errors[0] / budget.torque, np.nan_to_num(errors[1] / budget.acceleration)]
+        shares = self._shares(errors)
+        cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
         if self._watched is not None and max(shares) <= 1.0:
-            watched = self.errors(mask, beta, self._watched)
-            shares += [watched[0] / budget.torque, np.nan_to_num(watched[1] / budget.acceleration)]
+            shares += self._shares(self.errors(mask, beta, self._watched))
         if self._poses is not None and max(shares) <= 1.0:
             values, _ = self.tape.values(mask, self._inputs(beta, self._poses))
             if self._poses.inverse_masses(signed_outputs(self.tape.program, values)) is None:
                 shares.append(np.inf)
-        cost = float(np.sum(np.minimum(shares[:2], _LARGEST) ** 2))
-        return Fit(mask, beta, *errors, cost, float(max(shares)), watched, linear)
+        return Fit(mask, beta, *errors, cost, float(max(shares)), linear)
+
+    def _shares(self, errors: tuple[float, float]) -> list[float]:
+        """Errors over the allowed ones."""
+        torque, acceleration = errors
+        if not self.samples.direct:
+            return [torque / self.budget.torque]
+        # Of an infinite one no budget is large enough: M is not positive definite.
+        share = np.inf if np.isinf(acceleration) else acceleration / self.budget.acceleration
+        return [torque / self.budget.torque, share]
 
     def _errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
         """Of torques and of accelerations, from differences of torques."""
-        torque = np.linalg.norm(off * self._torque_scale[:, None]) * self.budget.torque
+        torque = float(np.linalg.norm(off * self._torque_scale[:, None]))
         if not self.samples.direct:
-            return float(torque), np.nan
+            return torque, np.nan
         if inverse is None:
-            return float(torque), np.inf
+            return torque, np.inf
         caused = np.einsum("mij,jm->im", inverse, off) * self._acceleration_scale[:, None]
-        return float(torque), float(np.linalg.norm(caused) * self.budget.acceleration)
+        return torque, float(np.linalg.norm(caused))
 
     def errors(
         self, mask: BoolArray, beta: FloatArray, samples: TermSamples
@@ -176,16 +182,17 @@ class Fitting:
 
         None where only torques matter, whose form is diagonal; (n_samples, n_dof, n_dof).
         """
-        if inverse is None:
+        if inverse is None or np.isinf(self.budget.acceleration):
             return None
-        caused = inverse * self._acceleration_scale[:, None]
-        forms = np.swapaxes(caused, 1, 2) @ caused + np.diag(self._torque_scale**2)
+        caused = inverse * (self._acceleration_scale / self.budget.acceleration)[:, None]
+        torque = np.diag((self._torque_scale / self.budget.torque) ** 2)
+        forms = np.swapaxes(caused, 1, 2) @ caused + torque
         return np.swapaxes(np.linalg.cholesky(forms), 1, 2)
 
     def _weighed(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
         """Torques as they enter the cost, (k, n_rows)."""
         if metric is None:
-            scaled = torques * self._torque_scale[:, None]
+            scaled = torques * (self._torque_scale / self.budget.torque)[:, None]
         else:
             scaled = np.einsum("mij,kjm->kim", metric, torques)
         return scaled.reshape(torques.shape[0], -1)

@@ -54,7 +54,7 @@ class Judge:
         measured: bool,
     ) -> None:
         self.direct, self.projected = direct, projected
-        self.n_standard = model.values.size
+        self._n_standard = model.values.size
         self._model, self._samples, self._nominal_torque = model, samples, nominal_torque
         self.measured = measured
         self._rng = np.random.default_rng(0)
@@ -64,11 +64,13 @@ class Judge:
             )
         self._nominal_acceleration = samples.nominal_acceleration
         self._coordinates = Coordinates(model.mechanism, once=True)
-        states = [(b.z, b.dz, b.ddz) for b in samples.estimation.blocks()]
-        joined = [np.concatenate(parts) for parts in zip(*states, strict=True)]
-        self.lower = np.array([part.min(axis=0) for part in joined])
+        ranges = [
+            [(x.min(axis=0), x.max(axis=0)) for x in (b.z, b.dz, b.ddz)]
+            for b in samples.estimation.blocks()
+        ]
+        self.lower = np.array(ranges)[:, :, 0].min(axis=0)
         """Smallest z, dz and ddz of the estimation set, (3, n_dof)."""
-        self.upper = np.array([part.max(axis=0) for part in joined])
+        self.upper = np.array(ranges)[:, :, 1].max(axis=0)
 
     def thinned(self, part: SampleSet, most: int) -> TermSamples:
         """So many samples of a set at most, evenly spread."""
@@ -151,7 +153,7 @@ class Judge:
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray, tau: FloatArray | None = None
     ) -> Block:
         """States of a tree; without torques where these do not matter."""
-        nothing = np.zeros((0, self.n_standard))
+        nothing = np.zeros((0, self._n_standard))
         tau = np.zeros_like(q) if tau is None else tau
         return Block(0, np.zeros(len(q)), q, dq, ddq, tau, q, dq, ddq, nothing)
 

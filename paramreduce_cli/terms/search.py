@@ -1,4 +1,4 @@
-"""Which terms to leave out: down greedily, then some back in and down again, as long as there is time."""
+"""Which terms to leave out: down greedily, then some back in and down again, round by round."""
 
 from __future__ import annotations
 

@@ -78,7 +78,7 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
                 [
                     predicted(
                         fitting,
-                        type(found)(found.mask, e, *[None] * 5, found.linear),
+                        type(found)(found.mask, e, *[None] * 4, found.linear),
                         samples,
                         False,
                     )[0]
@@ -112,9 +112,9 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, budget):
         position[arm.mechanism.parameter_names.index(name)] = k
     values = np.array([base.values[base.names.index(name)] for name in kept])
     reduced = ReducedModel(tuple(kept), values, position)
-    whole, *_ = fitting_of(arm, False, Budget(1.0), 25, reduced)
+    whole, *_ = fitting_of(arm, False, Budget(1.0, np.inf), 25, reduced)
     error = whole.fit(whole.tape.everything(), values).torque_error
-    fitting, *_ = fitting_of(arm, False, Budget(budget * error), 25, reduced)
+    fitting, *_ = fitting_of(arm, False, Budget(budget * error, np.inf), 25, reduced)
 
     tape = fitting.tape
     sums = sorted({k for k, what in tape.candidates().tolist() if what < 2})
