@@ -24,6 +24,7 @@ from paramreduce_cli.records import (
     Samples,
     TermReduction,
     Trajectories,
+    Validation,
 )
 from paramreduce_cli.stages import stages
 
@@ -73,7 +74,7 @@ class Stage:
     def needs_config(self) -> bool:
         """Whether it cannot run on brought samples alone."""
         made = {entry.type for entry in self.artifacts if not entry.optional}
-        on_samples = Samples in made and made <= {Samples, Reduction}
+        on_samples = Samples in made and made <= {Samples, Reduction, Validation}
         return not on_samples or not all(has_default(entry.type) for entry in self.sections)
 
 

@@ -255,14 +255,17 @@ class Runner:
             ArtifactError: It is of another layout.
         """
         stamp = self.store.stamp(record)
-        if self.config is None or stamp is None:
+        if stamp is None:
             return
         path = self.store.path(record)
         check_schema(path, stamp)
-        changed = [f"another {name} section" for name in self._changed_sections(stamp)]
+        changed = []
+        if self.config is not None:
+            changed += [f"another {name} section" for name in self._changed_sections(stamp)]
         changed += [f"another {name}" for name in self._changed_artifacts(record, stamp)]
         if changed:
-            yield f"{path} was made with {' and '.join(changed)}; `paramreduce run` rebuilds it"
+            again = "`paramreduce run` rebuilds it" if self.config is not None else "make it again"
+            yield f"{path} was made with {' and '.join(changed)}; {again}"
 
     def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
         """Files of the folder that are not those a record was made from."""
@@ -317,13 +320,12 @@ class Runner:
         )
 
     def _provenance(self) -> Provenance:
-        assert self.config is not None
         seconds = {}
         for stage in pipeline():
             stamp = self.store.stamp(stage.output)
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
-        text = json.dumps(self.config.model_dump(mode="json"), sort_keys=True)
-        return Provenance(
-            self.config.robot, hashlib.sha256(text.encode()).hexdigest(), versions(), seconds
-        )
+        asked = self.config or self.settings or Settings()
+        text = json.dumps(asked.model_dump(mode="json"), sort_keys=True)
+        digest = hashlib.sha256(text.encode()).hexdigest()
+        return Provenance(self._robot, digest, versions(), seconds)

@@ -9,13 +9,14 @@ from paramreduce_cli.pipeline import maker_of
 from paramreduce_cli.runner import Runner
 
 
-def up_to_date(config: Config, store: Store, record: type) -> Any:
-    """A record that fits the config: what goes onto a controller had better be up to date.
+def up_to_date(config: Config | None, store: Store, record: type) -> Any:
+    """A record that fits the config, if there is one: what goes onto a controller had better be up to date.
 
     Raises:
         ArtifactError: It is missing, or was made from something else.
     """
-    found = load_file(store.path(record), record, config.robot, maker_of(record))[0]
+    robot = config.robot if config is not None else None
+    found = load_file(store.path(record), record, robot, maker_of(record))[0]
     for remark in Runner(config, store, jobs=1).remarks_on(record):
         raise ArtifactError(f"{remark}.")
     return found

@@ -10,6 +10,9 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError
 
 CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
+OPTIONAL_CONFIG = click.argument(
+    "config", type=click.Path(path_type=Path, dir_okay=False), required=False
+)
 RESULTS = click.option(
     "--results",
     type=click.Path(path_type=Path, file_okay=False),

@@ -399,6 +399,8 @@ class Settings(Section):
     """The model to judge."""
     validation: ValidationSection = ValidationSection()
     """Judgement."""
+    report: ReportSection = ReportSection()
+    """Figures and tables."""
 
 
 class Config(Robot):

@@ -25,7 +25,7 @@ TERMS = "terms"
 
 def chosen_model(
     text: str | None,
-    model: Model,
+    model: Model | None,
     reduction: Reduction | None,
     validation: Validation | None,
     identification: Identification | None = None,
@@ -34,7 +34,7 @@ def chosen_model(
 
     Args:
         text: ``full``, ``base``, ``identified``, ``consistent`` or ``HEURISTIC:N``; None for the selected one.
-        model: Of the robot.
+        model: Of the robot; None of samples that were brought without one.
         reduction: Where reduced models are; not needed for ``full`` and ``base``.
         validation: Says which one is selected.
         identification: Where identified models are; needed for these alone.
@@ -42,11 +42,11 @@ def chosen_model(
     Raises:
         ConfigError: There is none of that name.
     """
-    if text == FULL:
+    if text == FULL and model is not None:
         return full_model(model), "full model"
-    if text == BASE:
+    if text == BASE and model is not None:
         return base_model(model), "base parameters"
-    if text in (IDENTIFIED, CONSISTENT):
+    if text in (IDENTIFIED, CONSISTENT) and model is not None:
         assert identification is not None
         return _identified(text, model, identification)
     assert reduction is not None
@@ -57,14 +57,16 @@ def chosen_model(
         choice = ModelChoice.parse(text)
     row = choice.row(reduction)
     if row is None:
+        others = f"{FULL}, {BASE}, " if model is not None else ""
         raise ConfigError(
-            f"--model {text}: there is {FULL}, {BASE}, {known_choices(reduction)}; with a log also "
+            f"--model {text}: there is {others}{known_choices(reduction)}; with a config and a log also "
             f"{IDENTIFIED} and {CONSISTENT}."
         )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {share(error)}"
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
-    return reduced_model(reduction, choice.heuristic, row, model.values), title
+    known = model.values if model is not None else None
+    return reduced_model(reduction, choice.heuristic, row, known), title
 
 
 def _identified(

@@ -207,6 +207,11 @@ class Reduction:
     """Of the best subsets by torque, where they were looked for."""
 
     @property
+    def n_affecting(self) -> int:
+        """Columns of the observation matrix that are not zero."""
+        return int(self.factor[:, :-1].any(axis=0).sum())
+
+    @property
     def unfinished(self) -> bool:
         """Whether more time could prove more."""
         return self.proofs is not None and ProofStatus.BEST_FOUND in self.proofs.status

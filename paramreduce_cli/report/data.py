@@ -26,6 +26,8 @@ class ShownMotion:
     """One trajectory of the validation set with its torques over the nominal ones."""
 
     time: FloatArray
+    """s, or numbers of samples where times are not known."""
+    timed: bool
     z: FloatArray
     dz: FloatArray
     ddz: FloatArray
@@ -42,7 +44,8 @@ class ReportData:
     """What the report is made from."""
 
     title: str
-    model: Model
+    known_model: Model | None
+    """None of samples that were brought without a robot; sections of a mechanism are then left out."""
     trajectories: Trajectories | None
     symmetries: int
     """How many symmetries complete the estimation set."""
@@ -58,6 +61,24 @@ class ReportData:
     """Where torques were measured."""
     terms: TermReduction | None
     """Where terms were left out."""
+
+    @property
+    def n_affecting(self) -> int:
+        """How many parameters act on the torques: columns of the observation matrix that are not zero."""
+        if self.known_model is None:
+            return self.reduction.n_affecting
+        return int(self.known_model.affecting.sum())
+
+    @property
+    def model(self) -> Model:
+        """The model, for what is of a mechanism.
+
+        Raises:
+            LookupError: There is none.
+        """
+        if self.known_model is None:
+            raise LookupError("a figure or a table of a mechanism, and there is none")
+        return self.known_model
 
 
 def first_motion(
@@ -79,10 +100,13 @@ def first_motion(
         parts.append(block)
         count += block.time.size
     phi = model.standard
+    time = np.concatenate([p.time for p in parts])
+    timed = bool(np.ptp(time) > 0)
     full = np.concatenate([p.tau for p in parts])
     reduced = np.concatenate([(p.W @ phi).reshape(p.tau.shape) for p in parts])
     return ShownMotion(
-        time=np.concatenate([p.time for p in parts]),
+        time=time if timed else np.arange(float(time.size)),
+        timed=timed,
         z=np.concatenate([p.z for p in parts]),
         dz=np.concatenate([p.dz for p in parts]),
         ddz=np.concatenate([p.ddz for p in parts]),

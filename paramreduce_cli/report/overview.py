@@ -42,13 +42,23 @@ def overview_row(summary: Summary) -> tuple[str, ...]:
 
 def _function(summary: Summary, name: str, error: str) -> tuple[str, ...]:
     errors, reduced = summary["selected"][error], summary["selected"]["operations"][name]
-    full = summary["full"][f"operations_{name}"]
-    return function_cells(int(full), int(reduced), errors["estimation"], errors["validation"])
+    full = summary["full"].get(f"operations_{name}")
+    return function_cells(name, full, reduced, errors["estimation"], errors["validation"])
 
 
 def function_cells(
-    full: int, reduced: int, estimation: float | None, validation: float | None
+    name: str,
+    full: float | None,
+    reduced: float | None,
+    estimation: float | None,
+    validation: float | None,
 ) -> tuple[str, ...]:
-    """What one function costs and how wrong it is: operations of both models, both errors."""
+    """What one function costs and how wrong it is: operations of both models, both errors.
+
+    Without a mechanism nothing is counted, and accelerations are not known.
+    """
+    errors = share(estimation), share(validation)
+    if full is None or reduced is None:
+        return "-", "-", "-", *(errors if name == "inverse" else ("-", "-"))
     saved = f"{100 * (1 - reduced / full):.0f} %" if full else "-"
-    return str(full), str(reduced), saved, share(estimation), share(validation)
+    return f"{full:.0f}", f"{reduced:.0f}", saved, *errors

@@ -46,7 +46,9 @@ def render_page(
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["percent"] = share
-    context = {"s": summary, "loops": data.model.mechanism.loops is not None}
+    model = data.known_model
+    loops = model is not None and model.mechanism.loops is not None
+    context = {"s": summary, "loops": loops}
     items = _items(images, made)
     sections = [
         {

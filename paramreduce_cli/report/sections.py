@@ -9,7 +9,10 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class PageSection(Enum):
-    """A heading and what is said under it, a template over the summary ``s``; in this order."""
+    """A heading and what is said under it, a template over the summary ``s``; in this order.
+
+    Some tell of a mechanism, and stand on the page only where there is one.
+    """
 
     ANSWER = ("", "")
     IDENTIFICATION = (
@@ -43,31 +46,36 @@ class PageSection(Enum):
         "common subexpressions. <b>The paper's rule</b>: plain recursion with sign changes counted. "
         "{{ 'With loops, d and [M, δ] are those of the open tree; exported functions, which also "
         "project, say their own count.' if loops }}",
+        True,
     )
     TERMS = (
         "Without small terms",
         "Addends of the lean functions were left out too, and the parameters that remain fitted again; each "
         "function has values of its own. Such a function holds where it was fitted: inside the ranges of the "
         "estimation set. <code>paramreduce export --model terms --what idm</code> (or <code>ddm</code>) writes it.",
+        True,
     )
     TRACKING = (
         "What it is for",
         "The arm follows the full model; the controller evaluates exported code, whose torques are held "
         "for one period.",
+        True,
     )
-    ACCELERATIONS = ("Accelerations", "")
-    MECHANISM = ("The mechanism", "")
+    ACCELERATIONS = ("Accelerations", "", True)
+    MECHANISM = ("The mechanism", "", True)
     BASE = (
         "Base parameters",
         "Rank {{ s.model.n_base }}; the singular values drop by a factor of "
         "{{ '%.2g'|format(s.model.rank_gap) if s.model.rank_gap else '∞' }} after it.",
+        True,
     )
-    TRAJECTORIES = ("Exciting trajectories", "")
+    TRAJECTORIES = ("Exciting trajectories", "", True)
     ORDERING = ("Parameter ordering", "")
 
-    def __init__(self, title: str, text: str) -> None:
+    def __init__(self, title: str, text: str, of_mechanism: bool = False) -> None:
         self.title = title
         self.text = text
+        self.of_mechanism = of_mechanism
 
 
 @dataclass(frozen=True)

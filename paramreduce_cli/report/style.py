@@ -87,7 +87,9 @@ def joint_style(j: int) -> tuple[str, str]:
 
 def joint_label(data: ReportData, j: int) -> str:
     """Name of a joint's coordinate."""
-    return data.model.mechanism.coordinate_names[j]
+    if data.known_model is None:
+        return f"joint {j + 1}"
+    return data.known_model.mechanism.coordinate_names[j]
 
 
 def legend_beside(axes: Axes) -> None:

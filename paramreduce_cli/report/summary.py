@@ -25,7 +25,7 @@ from paramreduce_cli.records import (
 
 
 def summary_of(
-    model: Model,
+    model: Model | None,
     trajectories: Trajectories | None,
     reduction: Reduction,
     validation: Validation,
@@ -33,30 +33,27 @@ def summary_of(
     terms: TermReduction | None,
     provenance: Provenance,
 ) -> dict[str, Any]:
-    """Gather the numbers of all artifacts as plain data; infinite ones become None."""
+    """Gather the numbers of all artifacts as plain data; infinite ones become None, and so do those
+    that only a mechanism tells where there is none.
+    """
     selected = validation.selected
+    counted = model is not None
     chosen = validation.heuristics[selected.heuristic]
     data = {
         "robot": provenance.robot,
         "config_sha256": provenance.config_sha256,
         "versions": dict(provenance.versions),
         "seconds": dict(provenance.seconds),
-        "model": {
-            "n_dof": model.mechanism.n_dof,
-            "n_parameters": model.values.size,
-            "unmeasured": list(model.unmeasured),
-            "n_affecting": int(model.affecting.sum()),
-            "n_base": model.base.columns.size,
-            "rank_gap": model.base.rank_gap,
-            "names": list(model.mechanism.parameter_names),
-        },
+        "model": _brought(reduction) if model is None else _model(model),
         "trajectories": _trajectories(trajectories),
         "reduction": {
             **{name: _subsets(reduction, found) for name, found in reduction.heuristics.items()},
             "proofs": _proofs(reduction),
-            "pareto": [_pareto(reduction, validation, model) for model in validation.pareto],
+            "pareto": [_pareto(reduction, validation, choice) for choice in validation.pareto],
         },
-        "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
+        "validation": {
+            name: _rows(result, counted) for name, result in validation.heuristics.items()
+        },
         "full": dict(validation.full),
         "identification": _identification(identification),
         "terms": _terms(terms),
@@ -68,13 +65,38 @@ def summary_of(
             "accepted": validation.accepted,
             "verdict": validation.verdict,
             "remarks": [r.text for r in validation.remarks if r.about is About.SELECTED],
-            **next(row for row in _rows(chosen) if row["n"] == selected.n),
+            **next(row for row in _rows(chosen, counted) if row["n"] == selected.n),
         },
         "stability": _stability(reduction, validation),
         "remarks": [remark.text for remark in validation.remarks],
     }
     plain: dict[str, Any] = _plain(data)
     return plain
+
+
+def _model(model: Model) -> dict[str, Any]:
+    return {
+        "n_dof": model.mechanism.n_dof,
+        "n_parameters": model.values.size,
+        "unmeasured": list(model.unmeasured),
+        "n_affecting": int(model.affecting.sum()),
+        "n_base": model.base.columns.size,
+        "rank_gap": model.base.rank_gap,
+        "names": list(model.mechanism.parameter_names),
+    }
+
+
+def _brought(reduction: Reduction) -> dict[str, Any]:
+    """What an observation matrix tells of itself."""
+    return {
+        "n_dof": reduction.nominal_torque.size,
+        "n_parameters": len(reduction.columns.names),
+        "unmeasured": [],
+        "n_affecting": reduction.n_affecting,
+        "n_base": reduction.rank,
+        "rank_gap": None,
+        "names": list(reduction.columns.names),
+    }
 
 
 def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
@@ -101,8 +123,8 @@ def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
     return [{key: getattr(proofs, key)[k] for key in keys} for k in range(proofs.n.size)]
 
 
-def _pareto(reduction: Reduction, validation: Validation, model: ModelChoice) -> dict[str, Any]:
-    heuristic, n = model.heuristic, model.n
+def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -> dict[str, Any]:
+    heuristic, n = choice.heuristic, choice.n
     result = validation.heuristics[heuristic]
     row = result.row(n)
     subset = reduction.heuristics[heuristic].subset(n)
@@ -113,8 +135,8 @@ def _pareto(reduction: Reduction, validation: Validation, model: ModelChoice) ->
         "torque_error": result.torque_error_estimation[row],
         "acceleration_error": result.acceleration_error_estimation[row],
         "operations": {
-            "inverse": result.operations_inverse[row],
-            "direct": result.operations_direct[row],
+            function: getattr(result, f"operations_{function}")[row] if validation.full else None
+            for function in ("inverse", "direct")
         },
     }
 
@@ -222,7 +244,7 @@ def _first(found: Subsets) -> int | None:
     return int(beyond[0]) if beyond.size else None
 
 
-def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
+def _rows(found: HeuristicValidation, counted: bool) -> list[dict[str, Any]]:
     counts = [f.name for f in fields(found) if f.name.startswith("operations_")]
     sets = ("estimation", "validation")
     errors = {
@@ -237,7 +259,10 @@ def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     return [
         {"n": n}
         | {
-            part: {key: getattr(found, name)[k] for key, name in of.items()}
+            part: {
+                key: getattr(found, name)[k] if counted or part != "operations" else None
+                for key, name in of.items()
+            }
             for part, of in names.items()
         }
         for k, n in enumerate(found.n)

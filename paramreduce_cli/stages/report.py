@@ -1,5 +1,7 @@
 """report: figures, tables, the page and summary.json."""
 
+from typing import Any
+
 import numpy as np
 
 from paramreduce_cli.config.schema import ReportSection, SamplingSection
@@ -23,9 +25,11 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import full_model
+from paramreduce_cli.registry import Registry
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.skeleton import skeleton
+from paramreduce_cli.report.sections import place_of
+from paramreduce_cli.report.skeleton import Skeleton, skeleton
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.tracking.demonstration import tracked
@@ -36,7 +40,7 @@ _POSES = 3
 def report(
     section: ReportSection,
     sampling: SamplingSection,
-    model: Model,
+    model: Model | None,
     trajectories: Trajectories | None,
     samples: Samples,
     reduction: Reduction,
@@ -46,7 +50,11 @@ def report(
     terms: TermReduction | None,
     provenance: Provenance,
 ) -> Report:
-    """Draw the figures, set the tables and write the page and summary.json."""
+    """Draw the figures, set the tables and write the page and summary.json.
+
+    Works on any samples.h5, also one that a user brings: without a model what is of a mechanism is
+    left out.
+    """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
     from paramreduce_cli.report.page import render_page
     from paramreduce_cli.report.style import render
@@ -55,15 +63,15 @@ def report(
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), selected.model, reduction.nominal_torque)
     data = ReportData(
-        title=section.title or model.mechanism.robot,
-        model=model,
+        title=section.title or provenance.robot,
+        known_model=model,
         trajectories=trajectories,
         symmetries=len(sampling.symmetries),
         reduction=reduction,
         validation=validation,
         motion=motion,
-        skeletons=tuple(skeleton(model, q) for q in _shown_poses(section, model, motion)),
-        tracking=_tracking(section, model, selected, motion),
+        skeletons=() if model is None else _skeletons(section, model, motion),
+        tracking=None if model is None else _tracking(section, model, selected, motion),
         log=log,
         identification=identification,
         terms=terms,
@@ -74,17 +82,27 @@ def report(
     files: dict[str, bytes] = {}
     images = {}
     formats = [str(name) for name in section.formats]
-    for name, draw in figures.items():
+    for name, draw in _shown(figures, model):
         encoded = render(draw, data, sorted({*formats, "svg"}))
         if encoded:
             images[name] = encoded["svg"]
             files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
-    made = {name: make(data) for name, make in tables.items()}
+    made = {name: make(data) for name, make in _shown(tables, model)}
+    symbols = {} if model is None else model.mechanism.symbols
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
-        files[f"tables/{name}.tex"] = table.to_latex(model.mechanism.symbols).encode()
+        files[f"tables/{name}.tex"] = table.to_latex(symbols).encode()
     files["index.html"] = render_page(data, summary, images, made).encode()
     return Report(summary, files)
+
+
+def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
+    """Figures or tables by name; those of a mechanism only where there is one."""
+    return [
+        (name, draw)
+        for name, draw in offered.items()
+        if model is not None or not place_of(draw).section.of_mechanism
+    ]
 
 
 def _tracking(
@@ -96,6 +114,10 @@ def _tracking(
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
     controllers = {title: RunningModel(model, chosen) for title, chosen in models.items()}
     return tracked(section.tracking, model, controllers, motion.z, motion.dz)
+
+
+def _skeletons(section: ReportSection, model: Model, motion: ShownMotion) -> tuple[Skeleton, ...]:
+    return tuple(skeleton(model, q) for q in _shown_poses(section, model, motion))
 
 
 def _shown_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:

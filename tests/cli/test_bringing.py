@@ -1,3 +1,5 @@
+import json
+
 import h5py
 import numpy as np
 import pytest
@@ -79,6 +81,49 @@ def test_settings_without_a_robot(as_file, invoke, noisy, tmp_path):
     with h5py.File(results / "validation.h5") as file:
         assert file["selected/n"][()] == 3
         assert file["forward-selection/torque_error_validation"][2] == pytest.approx(0.07, abs=0.02)
+
+
+def test_a_page_and_values_without_a_robot(invoke, noisy, tmp_path):
+    """The page tells what matrices tell, and the values that are exported predict their torques."""
+    results = tmp_path / "r"
+    brought = ("--samples", noisy, "--results", results)
+    settings = ["reduction.heuristics=[swap, qr]", "selected.heuristic=swap", "selected.n=3",
+                "report.formats=[svg]"]  # fmt: skip
+    for stage in ("reduce", "validate", "report"):
+        invoke(stage, *brought, settings=settings)
+    summary = summary_of(results)
+    assert summary["model"]["n_base"] == 7
+    assert set(summary["selected"]["operations"].values()) == {None}
+    page = (results / "report" / "index.html").read_text()
+    assert "nothing is known of the robot itself" in page
+    assert "figure-torques" in page
+    assert "operations" not in page
+    invoke("export", "--results", results, "--format", "values")
+    found = json.loads((results / "export" / "values" / "parameters.json").read_text())
+    values = {entry["name"]: entry["value"] for entry in found["parameters"]}
+    with h5py.File(noisy) as file:
+        matrix, tau = file["validation/W"][:], file["validation/tau"][:]
+        scale = file["estimation/tau"][:].std(axis=0)
+    phi = np.array([values.get(f"p{k + 1}", 0.0) for k in range(7)])
+    residual = (tau.ravel() - matrix @ phi).reshape(tau.shape) / scale
+    error = np.linalg.norm(residual) / np.linalg.norm(tau / scale)
+    assert error == pytest.approx(summary["selected"]["torque_error"]["validation"])
+    invoke("compare", results, results)
+    assert "need a CONFIG" in invoke("export", "--results", results, code=2).err
+    refused = invoke(
+        "export", "--results", results, "--format", "values", "--model", "full", code=2
+    )
+    assert "need a CONFIG" in refused.err
+
+
+def test_values_of_a_validation_of_another_reduction_are_not_written(invoke, noisy, tmp_path):
+    results = tmp_path / "r"
+    brought = ("--samples", noisy, "--results", results)
+    invoke("reduce", *brought, settings=["reduction.heuristics=[qr]"])
+    invoke("validate", *brought, settings=["selected.n=3", "validation.stability=false"])
+    invoke("reduce", *brought, settings=["reduction.heuristics=[swap]"])
+    refused = invoke("export", "--results", results, "--format", "values", code=2)
+    assert "made with another reduction.h5; make it again" in refused.err
 
 
 @pytest.mark.parametrize(

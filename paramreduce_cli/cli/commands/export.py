@@ -6,9 +6,8 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.report_files import save_files
-from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.exporting import up_to_date
-from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
+from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import load_config
 from paramreduce_cli.export.choice import (
@@ -22,6 +21,7 @@ from paramreduce_cli.export.choice import (
 )
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import FORMATS, robot_file
+from paramreduce_cli.export.values import VALUES, values_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
 from paramreduce_cli.records import (
@@ -37,15 +37,17 @@ from paramreduce_cli.reduction.models import closest_standard
 
 _FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
 """What one function alone is called."""
+_OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, TERMS)
+"""Models that need more than an observation matrix."""
 
 
 @click.command()
-@CONFIG
+@OPTIONAL_CONFIG
 @RESULTS
 @SET
 @click.option(
-    "--format", "kind", type=click.Choice([*sorted(languages), *FORMATS]), default="c", show_default=True,
-    help="Language of the code; or urdf, mjcf: the robot's own file with the model's parameters.",
+    "--format", "kind", type=click.Choice([*sorted(languages), *FORMATS, VALUES]), default="c", show_default=True,
+    help="Language of the code; or urdf, mjcf: the robot's own file with the model's parameters; or values alone, as JSON.",
 )  # fmt: skip
 @click.option(
     "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
@@ -64,7 +66,7 @@ _FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
     help="[default: RESULTS/export/FORMAT]",
 )  # fmt: skip
 def export(
-    config: Path,
+    config: Path | None,
     results: Path | None,
     overrides: tuple[str, ...],
     kind: str,
@@ -79,19 +81,25 @@ def export(
     The code is checked against plain recursion on random states before it is written. For
     mechanisms with loops it also solves positions, velocities and accelerations.
 
+    Without a CONFIG, of samples that were brought, values alone can be written.
+
     Example: paramreduce export configs/puma560.yaml --format c --model best-subset:18
     """
-    loaded = load_config(config, overrides)
-    store = Store(results or Path("results") / loaded.robot)
+    loaded = load_config(config, overrides) if config is not None else None
+    store = results_store(loaded, results)
+    if loaded is None and (kind != VALUES or text in _OF_A_ROBOT):
+        raise click.UsageError(
+            f"Code and robots' files need a CONFIG; without one there is --format {VALUES} of a reduced model."
+        )
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
-    if kind in FORMATS and (what != Exported.BOTH or constants):
+    if kind in (*FORMATS, VALUES) and (what != Exported.BOTH or constants) and text != TERMS:
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
     if text == TERMS and what not in _FUNCTIONS:
         raise click.UsageError(
             f"--model {TERMS}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."
         )
-    records: list[type] = [Model]
+    records: list[type] = [] if loaded is None else [Model]
     if text == TERMS:
         records.append(TermReduction)
     elif text in (IDENTIFIED, CONSISTENT):
@@ -105,14 +113,18 @@ def export(
     else:
         chosen, title = chosen_model(
             text,
-            loading[Model],
+            loading.get(Model),
             loading.get(Reduction),
             loading.get(Validation),
             loading.get(Identification),
         )
     stamp = store.stamp(records[-1])
     folder = output or store.folder / "export" / kind
-    if kind in FORMATS:
+    origin = f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
+    if kind == VALUES:
+        files = values_file(chosen, title, origin)
+    elif kind in FORMATS:
+        assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:
         files = exported(
@@ -124,7 +136,7 @@ def export(
             constant=constants,
             single=single,
             simplified=simplified,
-            origin=f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}",
+            origin=origin,
         )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")

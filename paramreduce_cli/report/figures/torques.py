@@ -10,8 +10,9 @@ from paramreduce_cli.report.style import joint_label, joint_style
 
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
-    """Torques, full or measured, and those of the selected model over the nominal ones, along the validation set."""
-    label = "full" if data.identification is None else "measured"
+    """Torques, of the full model, measured or brought, and those of the selected model over the nominal ones, along the validation set."""
+    modelled = data.identification is None
+    label = ("full" if data.known_model is not None else "given") if modelled else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
     n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1
@@ -30,5 +31,5 @@ def torques(data: ReportData) -> Figure:
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:
-        axes.set_xlabel("t (s)")
+        axes.set_xlabel("t (s)" if data.motion.timed else "sample")
     return drawn

@@ -11,14 +11,15 @@ def summary(data: ReportData) -> Table:
     """Every heuristic at the selected number of parameters, both functions."""
     n = data.validation.selected.n
     full = data.validation.full
-    model = (str(int(data.model.affecting.sum())), str(data.reduction.rank), str(n))
+    model = (str(data.n_affecting), str(data.reduction.rank), str(n))
     rows = []
     for name, r in data.validation.heuristics.items():
         k = r.row(n)
         if k is not None:
             d, M = (
                 function_cells(
-                    int(full[f"operations_{key}"]),
+                    key,
+                    full.get(f"operations_{key}"),
                     getattr(r, f"operations_{key}")[k],
                     getattr(r, f"{error}_error_estimation")[k],
                     getattr(r, f"{error}_error_validation")[k],
