@@ -1,6 +1,7 @@
 """Whether exported functions compute what plain recursion does."""
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -117,6 +118,24 @@ def check(
         for name, got in _evaluated(function, stored).items():
             wanted = stored[name].reshape(got.shape)
             refuse_if_off(f"{function.name}: {name}", got - wanted, wanted, tolerance)
+
+
+def single_precision_errors(
+    functions: tuple[Function, ...], stored: Mapping[str, FloatArray]
+) -> dict[str, float]:
+    """What single precision costs: the largest error of each result, a share of its largest value.
+
+    Args:
+        functions: With their arguments and results.
+        stored: Arguments and exact results, (n_states, ...) by name.
+    """
+    rounded: dict[str, Any] = {name: values.astype(np.float32) for name, values in stored.items()}
+    return {
+        name: float(np.abs(got - stored[name].reshape(got.shape)).max() / np.abs(got).max())
+        for function in functions
+        for name, got in _evaluated(function, rounded).items()
+        if got.any()
+    }
 
 
 def check_closures(closures: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:

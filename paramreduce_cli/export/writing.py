@@ -1,18 +1,25 @@
 """A reduced model as files in some language, checked before they are written."""
 
 import warnings
+from collections.abc import Mapping
 from enum import StrEnum
 
 import numpy as np
 
 from paramreduce_cli import __version__
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.check import check, check_closures, doubtful_mass_matrices, random_cases
+from paramreduce_cli.export.check import (
+    check,
+    check_closures,
+    doubtful_mass_matrices,
+    random_cases,
+    single_precision_errors,
+)
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
-from paramreduce_cli.records import Mechanism, Model, ReducedModel, TermModel
+from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
 
 _CASES = 16
 """States in the self-test."""
@@ -96,6 +103,7 @@ def export(
                 else []
             ),
             *([] if simplified is None else _validity(mechanism, simplified)),
+            *([_rounding(functions, checked)] if single else []),
             "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
             f"Made by paramreduce {__version__} ({origin}).",
         ),
@@ -112,6 +120,15 @@ def export(
     )
     files: dict[str, bytes] = languages[language](exported)
     return files
+
+
+def _rounding(functions: tuple[Function, ...], checked: Mapping[str, FloatArray]) -> str:
+    """What single precision costs, on the states that the functions are checked on."""
+    errors = single_precision_errors(functions, checked)
+    listed = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
+    return (
+        f"Single precision, on {_CHECKED} random states off by at most (of the largest): {listed}."
+    )
 
 
 def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:

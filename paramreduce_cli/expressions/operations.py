@@ -215,12 +215,13 @@ class Program:
         """Values of the outputs for many samples.
 
         Args:
-            inputs: One per position, all of one shape or scalar.
+            inputs: One per position, all of one shape or scalar; in their precision all is calculated.
         """
         values: list[FloatArray] = []
+        precision = np.result_type(*inputs) if len(inputs) else np.float64
         for operation, operands, number in self.nodes:
             if operation == "constant":
-                value = np.array(number)
+                value = np.array(number, precision)
             elif operation == "input":
                 value = inputs[int(number)]
             else:

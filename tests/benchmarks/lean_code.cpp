@@ -20,6 +20,10 @@
 #include "fs18_K.h"
 #include "full.h"
 #include "full_K.h"
+#include "single_M.h"
+#include "single_d.h"
+#include "terms_M.h"
+#include "terms_d.h"
 
 namespace {
 
@@ -53,30 +57,55 @@ void report() {
   }
 }
 
-double q[N][6], dq[N][6], ddq[N][6], tau[N][6], M[N][36], delta[N][6];
-double all_q[6 * N], all_dq[6 * N], all_ddq[6 * N], all_tau[6 * N], all_M[36 * N], all_delta[6 * N];
+double q[N][6], dq[N][6], ddq[N][6], tau[N][6];
 
 }  // namespace
 
-#define COMPARE(NAME)                                                                            \
+// Arguments in the precision of a model, filled with the same states.
+#define GIVEN(NAME)                                                                              \
+  static NAME##_real phi[NAME##_n_parameters], q_[N][6], dq_[N][6], ddq_[N][6];                  \
+  static NAME##_real Q[6 * N], DQ[6 * N], DDQ[6 * N];                                            \
+  NAME##_parameters(phi);                                                                        \
+  for (int k = 0; k < N; ++k)                                                                    \
+    for (int i = 0; i < 6; ++i) {                                                                \
+      Q[i * N + k] = q_[k][i] = NAME##_real(q[k][i]);                                            \
+      DQ[i * N + k] = dq_[k][i] = NAME##_real(dq[k][i]);                                         \
+      DDQ[i * N + k] = ddq_[k][i] = NAME##_real(ddq[k][i]);                                      \
+    }
+
+#define INVERSE(NAME)                                                                            \
   do {                                                                                           \
-    static double phi[NAME##_n_parameters];                                                      \
-    static double K[N][6 * NAME##_n_parameters];                                                 \
-    NAME##_parameters(phi);                                                                      \
+    GIVEN(NAME)                                                                                  \
+    static NAME##_real tau_[N][6], TAU[6 * N];                                                   \
     enter(#NAME "_idm", [&] {                                                                    \
-      for (int k = 0; k < N; ++k) NAME##_inverse_dynamics(phi, q[k], dq[k], ddq[k], tau[k]);     \
+      for (int k = 0; k < N; ++k) NAME##_inverse_dynamics(phi, q_[k], dq_[k], ddq_[k], tau_[k]); \
     });                                                                                          \
     enter(#NAME "_idm_batch",                                                                    \
-           [&] { NAME##_inverse_dynamics_batch(N, phi, all_q, all_dq, all_ddq, all_tau); });     \
+           [&] { NAME##_inverse_dynamics_batch(N, phi, Q, DQ, DDQ, TAU); });                     \
+  } while (false)
+
+#define DIRECT(NAME)                                                                             \
+  do {                                                                                           \
+    GIVEN(NAME)                                                                                  \
+    static NAME##_real M_[N][36], delta_[N][6], MM[36 * N], DELTA[6 * N];                        \
     enter(#NAME "_ddm", [&] {                                                                    \
-      for (int k = 0; k < N; ++k) NAME##_direct_dynamics(phi, q[k], dq[k], M[k], delta[k]);      \
+      for (int k = 0; k < N; ++k) NAME##_direct_dynamics(phi, q_[k], dq_[k], M_[k], delta_[k]);  \
     });                                                                                          \
-    enter(#NAME "_ddm_batch",                                                                    \
-           [&] { NAME##_direct_dynamics_batch(N, phi, all_q, all_dq, all_M, all_delta); });      \
+    enter(#NAME "_ddm_batch", [&] { NAME##_direct_dynamics_batch(N, phi, Q, DQ, MM, DELTA); });  \
+  } while (false)
+
+#define REGRESSOR(NAME)                                                                          \
+  do {                                                                                           \
+    static double K[N][6 * NAME##_n_parameters];                                                 \
     enter(#NAME "_regressor", [&] {                                                              \
       for (int k = 0; k < N; ++k) NAME##_K_regressor(q[k], dq[k], ddq[k], K[k]);                 \
     });                                                                                          \
   } while (false)
+
+#define COMPARE(NAME) \
+  INVERSE(NAME);      \
+  DIRECT(NAME);       \
+  REGRESSOR(NAME)
 
 int main() {
   pinocchio::Model model;
@@ -100,13 +129,14 @@ int main() {
   for (int k = 0; k < N; ++k) {
     Q.emplace_back(6), V.emplace_back(6), A.emplace_back(6);
     for (int i = 0; i < 6; ++i) {
-      all_q[i * N + k] = q[k][i] = Q[k][i] = normal(random);
-      all_dq[i * N + k] = dq[k][i] = V[k][i] = normal(random);
-      all_ddq[i * N + k] = ddq[k][i] = A[k][i] = normal(random);
+      q[k][i] = Q[k][i] = normal(random);
+      dq[k][i] = V[k][i] = normal(random);
+      ddq[k][i] = A[k][i] = normal(random);
     }
   }
 
-  double phi[full_n_parameters], worst = 0;
+  static double phi[full_n_parameters];
+  double worst = 0;
   full_parameters(phi);
   for (int k = 0; k < N; ++k) {
     full_inverse_dynamics(phi, q[k], dq[k], ddq[k], tau[k]);
@@ -135,6 +165,10 @@ int main() {
   COMPARE(full);
   COMPARE(base);
   COMPARE(fs18);
+  INVERSE(terms_d);
+  DIRECT(terms_M);
+  INVERSE(single_d);
+  DIRECT(single_M);
   report();
   return sink == 1e300;
 }

@@ -15,11 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
+from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import chosen_model, simplified_model
 from paramreduce_cli.export.writing import Exported, export
-from paramreduce_cli.records import Kind
-from tests.conftest import model_of, whole
+from paramreduce_cli.records import Kind, TermReduction
+from tests.conftest import ROOT, model_of, whole
 
 DRIVER = Path(__file__).with_suffix(".cpp")
 FLAGS = ["-O3", "-march=native", "-DNDEBUG"]
@@ -30,6 +31,22 @@ PINNED = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(
 FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
 DYNAMIC = [Kind.of(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
 """Pinocchio's order."""
+
+
+def cache():
+    """Where what takes long is kept."""
+    base = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return base / "paramreduce" / "benchmark"
+
+
+def without_small_terms():
+    """The functions that `reduce-terms` makes of the committed trajectories."""
+    folder = cache() / "puma560"
+    trajectories = f"trajectories.file={ROOT / 'results' / 'reference' / 'puma560.json'}"
+    command = ["run", ROOT / "configs" / "puma560.yaml", "--set", trajectories, "--quiet"]
+    command = [sys.executable, "-m", "paramreduce_cli", *command, "--results", folder]
+    subprocess.run(command, check=True)
+    return load_file(Store(folder).path(TermReduction), TermReduction, None, "run")[0]
 
 
 def sources():
@@ -47,6 +64,18 @@ def sources():
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
             made = export(named, one, title=name, language="c", what=what)
+            files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
+    found = without_small_terms()
+    for function, what, ending in (("inverse", Exported.IDM, "d"), ("direct", Exported.DDM, "M")):
+        one, term, title = simplified_model(found, function)
+        for kind in ("terms", "single"):
+            robot = f"{kind}_{ending}"
+            mechanism = dataclasses.replace(model.mechanism, robot=robot)
+            named = dataclasses.replace(model, mechanism=mechanism)
+            made = export(
+                named, one, title=title, language="c", what=what, single=kind == "single",
+                simplified=term,
+            )  # fmt: skip
             files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
     return files
 
@@ -84,8 +113,7 @@ def driver():
     digest = hashlib.sha256()
     for name, content in sorted(files.items()):
         digest.update(name.encode() + content)
-    cache = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "paramreduce"
-    folder = cache / "benchmark" / digest.hexdigest()[:16]
+    folder = cache() / digest.hexdigest()[:16]
     program = folder / "lean_code"
     if program.exists():
         return program
@@ -133,6 +161,14 @@ def rows():
         yield compared(f"{name} d, batched / single", t[f"{name}_idm_batch"], d, 1 / 3)
         batched = t[f"{name}_ddm_batch"]
         yield compared(f"{name} [M, delta], batched / single", batched, direct_d, 1 / 3)
+    what = "d without small terms"
+    yield compared(f"{what} / rnea", t["terms_d_idm"], t["rnea"], 1 / 14)
+    yield compared(f"{what}, batched / rnea", t["terms_d_idm_batch"], t["rnea"], 1 / 60)
+    single = t["single_d_idm_batch"]
+    yield compared(f"{what}, batched, single precision / rnea", single, t["rnea"], 1 / 60)
+    what = "[M, delta] without small terms"
+    yield compared(f"{what} / crba + bias", t["terms_M_ddm"], t["crba_bias"], 1 / 14)
+    yield compared(f"{what}, batched / crba + bias", t["terms_M_ddm_batch"], t["crba_bias"], 1 / 60)
 
 
 if __name__ == "__main__":

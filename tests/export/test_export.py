@@ -155,6 +155,15 @@ def test_c_with_constants_and_in_single_precision(model, tmp_path, options):
     c_test(model.mechanism.robot, tmp_path)
 
 
+def test_the_header_says_what_single_precision_costs(model, tmp_path):
+    write(model, tmp_path, "c", single=True)
+    header = (tmp_path / f"{model.mechanism.robot}.h").read_text()
+    said = re.search(
+        r"off by at most .*: tau (\S+), M (\S+), delta (\S+)\.", " ".join(header.split())
+    )
+    assert all(1e-8 < float(error) < 1e-4 for error in said.groups())
+
+
 @needs_gcc
 def test_c_of_closed_loops_solves_them(hexaglide, tmp_path):
     write(hexaglide, tmp_path, "c")

@@ -1,6 +1,7 @@
 """C99, with a face for C++17: headers, a source, a self-test, an example, and what builds them."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -8,6 +9,7 @@ import numpy as np
 from paramreduce_cli.export.exported import ExportedModel, about
 from paramreduce_cli.export.expressions import FUNCTIONS, Language, signed
 from paramreduce_cli.export.rendering import rendered
+from paramreduce_cli.export.sines import DOUBLE, SINGLE, polynomial
 from paramreduce_cli.expressions.functions import Argument, Function
 
 BLOCK = 64
@@ -69,6 +71,7 @@ class _Writer:
             "about": about(model),
             "real": "float" if model.single else "double",
             "f": self._suffix,
+            "bits": 32 if model.single else 64,
             "block": BLOCK,
             **model.sides(),
             "n_phi": 0 if model.constant else len(model.parameters),
@@ -88,7 +91,8 @@ class _Writer:
             "closures": [self.function(f) for f in model.closures],
             "stack": self.stack(),
             "signs": any("sign" in f.program.operations for f in model.functions),
-            "waves": any(self.batched(f)["angles"] for f in model.functions),
+            "angles": any(_dependence(f).angles for f in (*model.functions, *model.closures)),
+            "sines": self.sines(),
             "cases": self.cases(),
             "n_cases": len(next(iter(model.cases.values()))),
             "tolerance": "1e-3f" if model.single else "1e-12",
@@ -155,12 +159,45 @@ class _Writer:
         given = ["case_phi[0]" if a.name == "phi" else f"all_{a.name}" for a in f["arguments"]]
         return ", ".join([*given, *(f"all_{a.name}" for a in f["results"])])
 
+    def sines(self) -> dict[str, object]:
+        """Constants of sines and cosines, as they are written."""
+        known = SINGLE if self._model.single else DOUBLE
+        return {
+            "one": self.number(1),
+            "half": self.number(0.5),
+            "magic": self.number(known.magic),
+            "limit": self.number(known.limit),
+            "inverse": self.number(2 / np.pi),
+            "parts": [self.number(part) for part in known.parts],
+            "sine": polynomial([self.number(value) for value in known.sine]),
+            "cosine": polynomial([self.number(value) for value in known.cosine]),
+        }
+
     def statements(self, function: Function) -> list[str]:
-        """The body, one operation a line."""
-        steps, outputs = self._language(batched=False).body(function)
-        lines = [f"const {self._real} {name} = {text};" for name, text in steps]
-        places = zip(function.places(function.results), outputs, strict=True)
-        return lines + [f"{array.name}[{k}] = {text};" for (array, k), text in places]
+        """The body, one operation a line; sines and cosines of all angles at once."""
+        language = self._language(batched=False)
+        names = language.leaves(function)
+        found = _dependence(function)
+        rows = {angle: row for row, angle in enumerate(found.angles)}
+        before: list[str] = []
+        rest: list[str] = []
+        for number, node in function.steps():
+            if number in found.waves:
+                row = rows[node.operands[0] >> 1]
+                names[number] = f"{'sine' if node.operation == 'sin' else 'cosine'}[{row}]"
+                continue
+            text = f"const {self._real} t{number} = {language.expression(names, node)};"
+            names[number] = f"t{number}"
+            (before if number in found.before else rest).append(text)
+        if rows:
+            count = len(rows)
+            angles = ", ".join(names[angle] for angle in rows)
+            before.append(f"{self._real} angles[{count}] = {{{angles}}};")
+            before.append(f"{self._real} sine[{count}], cosine[{count}];")
+            before.append(f"sines({count}, angles, sine, cosine);")
+        places = zip(function.places(function.results), function.program.outputs, strict=True)
+        outputs = [f"{array.name}[{k}] = {signed(names, value)};" for (array, k), value in places]
+        return [*before, *rest, *outputs]
 
     @property
     def _real(self) -> str:
@@ -181,29 +218,27 @@ class _Writer:
         program = function.program
         language = self._language(batched=True)
         names = language.leaves(function)
-        states, angles, needed = _dependence(function)
+        found = _dependence(function)
+        rows = {angle: row for row, angle in enumerate(found.angles)}
         once: list[str] = []
         before: list[str] = []
         rest: list[str] = []
-        waves: dict[int, int] = {}
         for number, node in function.steps():
-            if node.operation in ("sin", "cos") and states[number]:
-                angle = node.operands[0] >> 1
-                row = waves.setdefault(angle, len(waves))
-                names[number] = f"{node.operation}_{row}[k]"
+            if number in found.waves:
+                names[number] = f"{node.operation}_{rows[node.operands[0] >> 1]}[k]"
                 continue
-            if number not in needed:
+            if number not in found.rest:
                 continue
             text = f"const {self._real} t{number} = {language.expression(names, node)};"
             names[number] = f"t{number}"
-            (rest if states[number] else once).append(text)
+            (rest if found.states[number] else once).append(text)
         again = language.leaves(function)
         for number, node in function.steps():
-            if number in angles:
+            if number in found.before:
                 text = f"const {self._real} a{number} = {language.expression(again, node)};"
                 again[number] = f"a{number}"
                 before.append(text)
-        filled = [(row, again[angle]) for angle, row in waves.items()]
+        filled = [(row, again[angle]) for angle, row in rows.items()]
         outputs = list(dict.fromkeys(program.outputs))
         rest += [f"out[{row}][k] = {signed(names, value)};" for row, value in enumerate(outputs)]
         places = zip(function.places(function.results), program.outputs, strict=True)
@@ -236,8 +271,23 @@ class _Writer:
         }
 
 
-def _dependence(function: Function) -> tuple[list[bool], set[int], set[int]]:
-    """Which nodes depend on the state, which ones the angles are made of, which all the rest."""
+@dataclass(frozen=True)
+class _Dependence:
+    """What of a function's nodes depends on what."""
+
+    states: list[bool]
+    """Which ones depend on the state, and not on parameters alone."""
+    waves: set[int]
+    """Sines and cosines of what depends on the state, taken all at once."""
+    angles: list[int]
+    """Of which nodes these are taken, each once."""
+    before: set[int]
+    """Operations that the angles are made of."""
+    rest: set[int]
+    """What the results are made of."""
+
+
+def _dependence(function: Function) -> _Dependence:
     places = function.places(function.arguments)
     nodes = function.program.nodes
     states: list[bool] = []
@@ -246,14 +296,19 @@ def _dependence(function: Function) -> tuple[list[bool], set[int], set[int]]:
             states.append(places[int(node.number)][0].name != "phi")
         else:
             states.append(any(states[value >> 1] for value in node.operands))
-    angles: set[int] = set()
-    needed = {value >> 1 for value in function.program.outputs}
+    waves: set[int] = set()
+    before: set[int] = set()
+    rest = {value >> 1 for value in function.program.outputs}
     for number in range(len(nodes) - 1, -1, -1):
         below = {value >> 1 for value in nodes[number].operands}
-        if nodes[number].operation in ("sin", "cos") and states[number]:
-            angles |= below
-        else:
-            angles |= below if number in angles else set()
-            needed |= below if number in needed else set()
+        wave = nodes[number].operation in ("sin", "cos") and states[number]
+        if wave and number not in before:
+            waves.add(number)
+        if wave or number in before:
+            before |= below
+        elif number in rest:
+            rest |= below
     operations = {number for number, _ in function.steps()}
-    return states, angles & operations, needed
+    waves &= operations
+    angles = dict.fromkeys(nodes[number].operands[0] >> 1 for number in sorted(waves))
+    return _Dependence(states, waves, list(angles), before & operations, rest)
