@@ -58,6 +58,24 @@ class Function:
         arguments = tuple(a for a in self.arguments if a.name in names)
         return replace(self, arguments=arguments, program=self.program.renumbered(kept.index))
 
+    def on_state(self) -> list[bool]:
+        """Which nodes of the program depend on more than the parameters, ``phi``."""
+        places = self.places(self.arguments)
+        found: list[bool] = []
+        for node in self.program.nodes:
+            if node.operation == "input":
+                found.append(places[int(node.number)][0].name != "phi")
+            else:
+                found.append(any(found[value >> 1] for value in node.operands))
+        return found
+
+    def cost(self) -> str:
+        """How many operations it takes, for people: some are the same for all states."""
+        of_state = self.on_state()
+        once = sum(not of_state[number] for number, _ in self.steps())
+        total = f"{self.program.n_operations} operations"
+        return f"{total}, {once} of them on parameters alone." if once else f"{total}."
+
     def steps(self) -> Iterator[tuple[int, Node]]:
         """Numbers and nodes of the operations, in an order in which they can be done."""
         for number, node in enumerate(self.program.nodes):

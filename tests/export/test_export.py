@@ -155,6 +155,19 @@ def test_c_with_constants_and_in_single_precision(model, tmp_path, options):
     c_test(model.mechanism.robot, tmp_path)
 
 
+def test_the_header_says_what_depends_on_parameters_alone(puma, tmp_path):
+    """Counted again by hand: what the batched functions compute before any state."""
+    write(puma, tmp_path, "c")
+    header = (tmp_path / "puma560.h").read_text()
+    source = (tmp_path / "puma560.c").read_text()
+    for name in ("inverse", "direct"):
+        comment = header[: header.index(f"void puma560_{name}_dynamics(")].rsplit("/*", 1)[1]
+        said = re.search(r"operations, (\d+) of them", " ".join(comment.replace("*", "").split()))
+        block = source[source.index(f"{name}_dynamics_block(") :]
+        before = block[: block.index("for (size_t k")]
+        assert int(said.group(1)) == before.count("const double t") > 0
+
+
 def test_the_header_says_what_single_precision_costs(model, tmp_path):
     write(model, tmp_path, "c", single=True)
     header = (tmp_path / f"{model.mechanism.robot}.h").read_text()

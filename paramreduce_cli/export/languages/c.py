@@ -111,7 +111,7 @@ class _Writer:
             "text": function.text,
             "arguments": function.arguments,
             "results": function.results,
-            "operations": function.program.n_operations,
+            "cost": function.cost(),
             "unused": [a.name for a in function.arguments if a.name not in function.used()],
             "statements": self.statements(function),
             "batched": self.batched(function),
@@ -288,14 +288,7 @@ class _Dependence:
 
 
 def _dependence(function: Function) -> _Dependence:
-    places = function.places(function.arguments)
-    nodes = function.program.nodes
-    states: list[bool] = []
-    for node in nodes:
-        if node.operation == "input":
-            states.append(places[int(node.number)][0].name != "phi")
-        else:
-            states.append(any(states[value >> 1] for value in node.operands))
+    nodes, states = function.program.nodes, function.on_state()
     waves: set[int] = set()
     before: set[int] = set()
     rest = {value >> 1 for value in function.program.outputs}

@@ -31,7 +31,7 @@ def _function(model: ExportedModel, function: Function) -> str:
     results = ", ".join(r.name for r in function.results)
     arguments = ", ".join(a.name for a in function.arguments)
     lines = [f"function [{results}] = {model.name}_{function.name}({arguments})"]
-    documented = [f"{function.text} {function.program.n_operations} operations."]
+    documented = [f"{function.text} {function.cost()}"]
     documented += [
         f"{array.name}: {array.text}, {' x '.join(map(str, array.shape))}"
         for array in (*function.arguments, *function.results)
