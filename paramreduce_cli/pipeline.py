@@ -22,6 +22,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
+    Share,
     TermReduction,
     Trajectories,
     Validation,
@@ -69,6 +70,11 @@ class Stage:
     def lends_run(self) -> StageInput | None:
         """Where the stage takes workers and an audience."""
         return next((entry for entry in self.inputs if entry.type is Run), None)
+
+    @property
+    def in_shares(self) -> bool:
+        """Whether it can be done as several jobs."""
+        return any(entry.type is Share for entry in self.inputs)
 
     @property
     def needs_config(self) -> bool:

@@ -18,7 +18,7 @@ from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.artifacts.log_files import load_log
-from paramreduce_cli.artifacts.parts import Parts
+from paramreduce_cli.artifacts.parts import Parts, StoredShares
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
@@ -34,6 +34,7 @@ from paramreduce_cli.pipeline import (
     stages_to_run,
 )
 from paramreduce_cli.records import (
+    WHOLE,
     Coefficients,
     Progress,
     Provenance,
@@ -43,6 +44,8 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
+    Share,
+    Shares,
     Trajectories,
 )
 
@@ -81,6 +84,13 @@ class _Inputs:
         return found
 
 
+def _called(stage: Stage, arguments: dict[str, Any]) -> Any:
+    try:
+        return stage.function(**arguments)
+    except ConcernError as error:
+        raise explained(error) from error
+
+
 def _logs(inputs: _Inputs) -> RawLogs:
     found = {name: load_log(path) for name, path in inputs.files(RawLogs).items()}
     held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
@@ -112,13 +122,18 @@ class Runner:
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
 
-    def run(self, stage: Stage, *, force: bool = False, go_on: bool = False) -> Outcome:
-        """Run one stage, unless its artifact is up to date.
+    def run(
+        self, stage: Stage, *, force: bool = False, go_on: bool = False, share: Share = WHOLE
+    ) -> Outcome:
+        """Run one stage, unless its artifact is up to date, or do a share of its work.
+
+        What is found of shares is put together where all of the work is asked for.
 
         Args:
             stage: Which one.
             force: Run it even so.
             go_on: Run it also where more time could make its artifact better.
+            share: What of it is to be done.
 
         Raises:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
@@ -126,6 +141,8 @@ class Runner:
         path = self.store.path(stage.output)
         self.store.refuse_to_replace(stage.output, self._robot)
         self._look_at_inputs(stage)
+        if not share.whole:
+            return self._run_share(stage, share, force)
         previous = self._previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
         if not force and not better and self.is_current(stage):
@@ -134,20 +151,53 @@ class Runner:
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
         inputs = _Inputs(self.config)
-        lent = (Run, stage.output)
+        lent = (Run, stage.output, Share, Shares)
         arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
         if stage.previous is not None:
             arguments[stage.previous.name] = previous
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
-        try:
-            record = stage.function(**arguments)
-        except ConcernError as error:
-            raise explained(error) from error
+        shares = StoredShares(path)
+        self._hand_shares(stage, arguments, [] if force else self._shares(stage, inputs, shares))
+        record = _called(stage, arguments)
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
             parts.clear()
+        shares.clear()
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
+
+    def _run_share(self, stage: Stage, share: Share, force: bool) -> Outcome:
+        """Do a share of a stage's work, unless that is done."""
+        started = time.perf_counter()
+        shares = StoredShares(self.store.path(stage.output))
+        inputs = _Inputs(self.config)
+        inputs.digests |= self._input_digests(stage)
+        path = shares.path(share)
+        if not force and shares.is_current(share, self._stamp(stage, inputs, started)):
+            return Outcome(stage.name, path, True, 0.0)
+        lent = (Run, stage.output, Share, Shares)
+        inputs = _Inputs(self.config)
+        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
+        if stage.previous is not None:
+            arguments[stage.previous.name] = None
+        self._lend_run(stage, arguments, inputs, frozenset())
+        self._hand_shares(stage, arguments, [], share)
+        record = _called(stage, arguments)
+        self.store.save(record, self._stamp(stage, inputs, started), path)
+        return Outcome(stage.name, path, False, time.perf_counter() - started, record)
+
+    def _shares(self, stage: Stage, inputs: _Inputs, shares: StoredShares) -> list[Any]:
+        """Records of all shares of a stage that were made from the same; none where it is done as a whole."""
+        if not stage.in_shares:
+            return []
+        paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), stage.name)
+        return [load_file(path, stage.output, self._robot, stage.name)[0] for path in paths]
+
+    def _hand_shares(
+        self, stage: Stage, arguments: dict[str, Any], found: list[Any], share: Share = WHOLE
+    ) -> None:
+        values = {Share: share, Shares: Shares(tuple(found))}
+        arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""

@@ -47,6 +47,8 @@ def check_is_file(path: Path) -> None:
         raise ArtifactError(f"{path}: is no file.")
 
 
+SHARES = ".parts"
+"""Ending of folders with parts of an artifact that is not whole yet."""
 _LEFT = re.compile(r"\..+\.\w{8}\.tmp")
 """Names of temporary files."""
 
@@ -54,7 +56,8 @@ _LEFT = re.compile(r"\..+\.\w{8}\.tmp")
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
     for path in folder.rglob(".*.tmp"):
-        if _LEFT.fullmatch(path.name):
+        # Shares of a stage may be at work on other machines.
+        if _LEFT.fullmatch(path.name) and path.parent.suffix != SHARES:
             path.unlink(missing_ok=True)
 
 

@@ -59,8 +59,8 @@ _BY_SIZE = {
     *((Proofs, name) for name in ("subsets", "logs")),
 }
 """Arrays, one for each subset: datasets named by its size."""
-_TIMINGS = {"seconds", "cpu_seconds"}
-"""How long something took, which is no part of what a file holds."""
+_TIMINGS = {"seconds", "cpu_seconds", "nodes"}
+"""How long something took, which is no part of what a file holds; nodes depend on the number of threads."""
 _KEYS: dict[tuple[type, str], str] = {(Trajectory, "kappa_variants"): "scalings"}
 """What the list of the names in a mapping is called."""
 _DERIVED: dict[type, Callable[[Any], dict[str, Any]]] = {

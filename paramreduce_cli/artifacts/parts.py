@@ -1,4 +1,4 @@
-"""Finished parts of an artifact that is not whole yet."""
+"""Finished parts of an artifact that is not whole yet: trajectories, and shares of a stage's work."""
 
 import contextlib
 from collections.abc import Iterator, MutableMapping
@@ -6,9 +6,10 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.atomic import SHARES
 from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp, reading, write
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import Trajectory
+from paramreduce_cli.records import Share, Trajectory
 
 
 class Parts(MutableMapping[str, Trajectory]):
@@ -54,7 +55,8 @@ class Parts(MutableMapping[str, Trajectory]):
         self._path(key).unlink()
 
     def __iter__(self) -> Iterator[str]:
-        return iter(sorted(path.stem for path in self._folder.glob("*.h5")))
+        names = (path.stem for path in self._folder.glob("*.h5"))
+        return iter(sorted(name for name in names if not name.startswith("share-")))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -65,6 +67,71 @@ class Parts(MutableMapping[str, Trajectory]):
             del self[key]
         with contextlib.suppress(OSError):
             self._folder.rmdir()
+
+
+class StoredShares:
+    """What the jobs of a stage have made, a file each, until it is put together.
+
+    Args:
+        path: The artifact that they are shares of.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._artifact = path
+        self.folder = path.with_name(f"{path.name}{SHARES}")
+
+    def path(self, share: Share) -> Path:
+        """Where a share is kept."""
+        return self.folder / f"share-{share.number:04d}-of-{share.count:04d}.h5"
+
+    def is_current(self, share: Share, stamp: Stamp) -> bool:
+        """Whether a share was made from just this, and is whole."""
+        path = self.path(share)
+        try:
+            known = read_stamp(path) if path.exists() else None
+            if known is None or _origin(known) != _origin(stamp):
+                return False
+            with reading(path) as reader:
+                reader.verify()
+        except ArtifactError:
+            return False
+        return True
+
+    def found(self, stamp: Stamp, command: str) -> list[Path]:
+        """Files of all shares, in their order; none where no job has begun.
+
+        Args:
+            stamp: What they must have been made from; others are of no concern.
+            command: That makes a share, for messages.
+
+        Raises:
+            ArtifactError: Some are missing or damaged.
+        """
+        counts: dict[int, int] = {}
+        for path in self.folder.glob("share-*-of-*.h5"):
+            number = int(path.stem.rpartition("-")[2])
+            counts[number] = max(counts.get(number, 0), path.stat().st_mtime_ns)
+        for count in sorted(counts, key=lambda n: -counts[n]):
+            shares = [Share(number, count) for number in range(1, count + 1)]
+            good = [self.is_current(share, stamp) for share in shares]
+            if not any(good):
+                continue
+            if not all(good):
+                wrong = shares[good.index(False)]
+                state = "damaged, or of another config" if self.path(wrong).exists() else "missing"
+                raise ArtifactError(
+                    f"{self.path(wrong)}: part {wrong} is {state} ({good.count(False)} of {count} are). Make it "
+                    f"with `paramreduce {command} --part {wrong}`, or do without parts with --force."
+                )
+            return [self.path(share) for share in shares]
+        return []
+
+    def clear(self) -> None:
+        """Remove all shares, what was left of killed jobs, and the folder if nothing else is in it."""
+        for path in [*self.folder.glob("share-*"), *self.folder.glob(".*")]:
+            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self.folder.rmdir()
 
 
 def _origin(stamp: Stamp) -> tuple[Any, ...]:

@@ -13,9 +13,11 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.atomic import SHARES
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
 from paramreduce_cli.records import LAST, Block, FloatArray, Model, Samples, SampleSet
 
@@ -46,28 +48,53 @@ _GENERALISED = ("q", "dq", "ddq")
 
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
-    """One set; its triangular factors are collected on the way."""
+    """One set; its triangular factors are collected on the way, unless they are known from its parts."""
+    known = sample_set.factors() if isinstance(sample_set, JoinedSet) else None
     accumulator = FactorAccumulator()
     appenders: dict[str, Any] = {}
-    for block in sample_set.blocks():
+    for block in _read(sample_set, known):
         if not appenders:
-            n_dof = block.tau.shape[1]
-            appenders = {key: writer.rows(f"{name}/{key}", n_dof) for key in _STATES}
-            appenders["time"] = writer.rows(f"{name}/time", None)
-            appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
-            size = sample_set.n_samples * n_dof, block.W.shape[1]
-            if sample_set.recomputable and size[0] * size[1] > _MOST_KEPT:
-                writer.dataset(f"{name}/{_LEFT_OUT}", size)
-            else:
-                appenders["W"] = writer.rows(f"{name}/W", block.W.shape[1])
-            n_q = block.q.shape[1]
-            if n_q != n_dof:  # loops: the independent coordinates are not all there is
-                appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
+            n_parameters = block.W.shape[1]
+            kept = not _left_out(sample_set, block.tau.shape[1], n_parameters)
+            appenders = _appenders(writer, name, block, sample_set.n_samples, kept=kept)
         for key, append in appenders.items():  # in this order: the digest depends on it
             own = np.full(block.time.size, float(block.trajectory))
             append(own if key == "trajectory" else getattr(block, key))
-        accumulator.add(block)
-    writer.dataset(f"{name}/factors", accumulator.result())
+        if known is None:
+            accumulator.add(block)
+    writer.dataset(f"{name}/factors", accumulator.result() if known is None else known)
+
+
+def _read(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
+    """The samples; without observation matrices where these are neither kept nor needed."""
+    if isinstance(sample_set, JoinedSet) and known is not None:
+        _, n_dof, k, _ = known.shape
+        if _left_out(sample_set, n_dof, k - 1):
+            return sample_set.states()
+    return sample_set.blocks()
+
+
+def _left_out(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
+    """Whether the observation matrix is not kept."""
+    return sample_set.recomputable and sample_set.n_samples * n_dof * n_parameters > _MOST_KEPT
+
+
+def _appenders(
+    writer: Writer, name: str, first: Block, n_samples: int, *, kept: bool
+) -> dict[str, Callable[[FloatArray], None]]:
+    """What writes each dataset of a set, block by block."""
+    (_, n_dof), n_parameters = first.tau.shape, first.W.shape[1]
+    appenders = {key: writer.rows(f"{name}/{key}", n_dof) for key in _STATES}
+    appenders["time"] = writer.rows(f"{name}/time", None)
+    appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
+    if kept:
+        appenders["W"] = writer.rows(f"{name}/W", n_parameters)
+    else:
+        writer.dataset(f"{name}/{_LEFT_OUT}", (n_samples * n_dof, n_parameters))
+    n_q = first.q.shape[1]
+    if n_q != n_dof:  # loops: the independent coordinates are not all there is
+        appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
+    return appenders
 
 
 class StoredSet:
@@ -85,6 +112,7 @@ class StoredSet:
 
     def __init__(self, path: Path, name: str, n_parameters: int, *, own: bool) -> None:
         self._path, self._name, self._own = path, name, own
+        self._n_parameters = n_parameters
         with reading(path) as reader:
             tau = reader.rows(f"{name}/tau")
             self.recomputable = own and f"{name}/{_LEFT_OUT}" in reader
@@ -125,6 +153,8 @@ class StoredSet:
             ArtifactError: It is not next to the file.
         """
         path = self._path.with_name(_MODEL)
+        if self._path.parent.suffix == SHARES:
+            path = self._path.parent.with_name(_MODEL)
         own = read_stamp(self._path)
         with reading(
             path, f"The observation matrix of {self._path} is computed from it."
@@ -139,10 +169,18 @@ class StoredSet:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
+        return self._blocks(W=True)
+
+    def states(self) -> Iterator[Block]:
+        """The same with observation matrices of no rows."""
+        return self._blocks(W=False)
+
+    def _blocks(self, *, W: bool) -> Iterator[Block]:
         with reading(self._path) as reader:
             base = self._name
             tau = reader.rows(f"{base}/tau")
-            W = None if self.recomputable else reader.rows(f"{base}/W")
+            rows = None if self.recomputable else reader.rows(f"{base}/W")
+            none = np.zeros((0, self._n_parameters))
             owner = self._column(reader, "trajectory")
             time = self._column(reader, "time")
             states_of = self._states(reader, _STATES[:3])
@@ -151,11 +189,13 @@ class StoredSet:
                 tau_block = tau[start:stop].astype(float)
                 states = states_of(start, stop)
                 whole = generalised_of(start, stop) if self._has_generalised else states
-                if W is None:
+                if not W:
+                    W_block = none
+                elif rows is None:
                     K = self._dynamics.regressor(*whole)
                     W_block = K.reshape(-1, K.shape[2])
                 else:
-                    W_block = W[start * self.n_dof : stop * self.n_dof].astype(float)
+                    W_block = rows[start * self.n_dof : stop * self.n_dof].astype(float)
                 if not (np.isfinite(tau_block).all() and np.isfinite(W_block).all()):
                     raise ArtifactError(
                         f"{self._path}: /{base} holds numbers that are not finite between samples "
@@ -205,10 +245,13 @@ def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
 def load_samples(reader: Reader) -> Samples:
     """samples.h5, the project's own or one that a user brings."""
     own = reader.attribute("stage") == "sample"
-    W = _matrix_shape(reader, "estimation")
-    if len(W) != 2:
-        raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
-    n = W[1]
+    if own and _is_empty(reader, "estimation"):  # of a share that had nothing to do
+        n = len(reader.texts("parameters/names"))
+    else:
+        W = _matrix_shape(reader, "estimation")
+        if len(W) != 2:
+            raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
+        n = W[1]
     if "parameters/names" in reader:
         names = reader.texts("parameters/names")
         if len(names) != n or len(set(names)) != n:
@@ -218,24 +261,35 @@ def load_samples(reader: Reader) -> Samples:
             )
     else:
         names = tuple(f"p{k + 1}" for k in range(n))
-    sets = [
-        StoredSet(reader.path, name, n, own=own)
-        if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader
-        else None
-        for name in ("estimation", "validation")
-    ]
-    estimation, validation = sets
+
+    def stored(name: str) -> SampleSet | None:
+        if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader:
+            return StoredSet(reader.path, name, n, own=own)
+        return JoinedSet([]) if own and _is_empty(reader, name) else None
+
+    estimation, validation = stored("estimation"), stored("validation")
     assert estimation is not None
+    nominal = {
+        key: _optional(reader, key, reader.rows("estimation/tau").shape[1])
+        for key in ("nominal_torque", "nominal_acceleration")
+        if key in reader
+    }
     ranks = _optional(reader, "parameters/preference", n)
     return Samples(
         names=names,
         preference=np.full(n, LAST) if ranks is None else ranks.astype(np.int64),
         values=_optional(reader, "parameters/values", n),
-        nominal_torque=_optional(reader, "nominal_torque", estimation.n_dof),
-        nominal_acceleration=_optional(reader, "nominal_acceleration", estimation.n_dof),
+        nominal_torque=nominal.get("nominal_torque"),
+        nominal_acceleration=nominal.get("nominal_acceleration"),
         estimation=estimation,
         validation=validation,
     )
+
+
+def _is_empty(reader: Reader, name: str) -> bool:
+    """Whether a set was written without any sample."""
+    known = f"{name}/factors"
+    return known in reader and reader.array(known).size == 0
 
 
 def _matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:

@@ -127,12 +127,12 @@ class Store:
                 "choose another folder with --results."
             )
 
-    def save(self, record: Any, stamp: Stamp) -> Stamp:
-        """Write a record to its file, whole or not at all."""
+    def save(self, record: Any, stamp: Stamp, path: Path | None = None) -> Stamp:
+        """Write a record, whole or not at all: to its file, or to another path."""
         if isinstance(record, Report):
             return save_report(self.folder / "report", record, stamp)
         layout = LAYOUTS[type(record)]
-        return write(self.folder / layout.file, stamp, lambda w: layout.save(w, record))
+        return write(path or self.folder / layout.file, stamp, lambda w: layout.save(w, record))
 
     def touch(self, record: type) -> None:
         """Make a file look new, so that Make agrees that it is current."""
@@ -140,20 +140,23 @@ class Store:
             os.utime(self.path(record))
 
     @contextlib.contextmanager
-    def locked(self) -> Iterator[None]:
-        """Keep other runs out of the folder.
+    def locked(self, part: str = "") -> Iterator[None]:
+        """Keep other runs out of the folder, or away from one part of an artifact.
+
+        Args:
+            part: Name of it; all if empty.
 
         Raises:
             ArtifactError: Another run is in it.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            lock = filelock.FileLock(self.folder / ".lock", timeout=0)
+            lock = filelock.FileLock(self.folder / f".lock{part}", timeout=0)
             lock.acquire()
         except filelock.Timeout as error:
+            what = "is at work on this part" if part else "is using this folder"
             raise ArtifactError(
-                f"{self.folder}: another run is using this folder. Wait for it, or choose another "
-                "with --results."
+                f"{self.folder}: another run {what}. Wait for it, or choose another with --results."
             ) from error
         except OSError as error:
             if not self.folder.is_dir():
@@ -161,10 +164,13 @@ class Store:
             yield  # nobody writes to it, so what is up to date may be looked at
             return
         try:
-            remove_leftovers(self.folder)
+            if not part:
+                remove_leftovers(self.folder)
             yield
         finally:
             lock.release()
+            if part:
+                (self.folder / f".lock{part}").unlink(missing_ok=True)
 
 
 def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:

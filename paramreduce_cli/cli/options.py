@@ -2,12 +2,14 @@
 
 import os
 from pathlib import Path
+from typing import Any
 
 import click
 
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.records import Share
 
 CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
 OPTIONAL_CONFIG = click.argument(
@@ -27,6 +29,27 @@ QUIET = click.option("--quiet", is_flag=True, help="Say nothing but errors and w
 JOBS = click.option(
     "--jobs", type=click.IntRange(min=1), default=None, metavar="N",
     help="Worker processes.  [default: all cores]",
+)  # fmt: skip
+
+
+class ShareType(click.ParamType):
+    """A share of a stage's work, such as 3/8."""
+
+    name = "i/N"
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> Share:
+        """Read it."""
+        try:
+            return Share.parse(str(value))
+        except ValueError as error:
+            self.fail(str(error), param, ctx)
+
+
+PART = click.option(
+    "--part", "share", type=ShareType(), metavar="i/N",
+    help="Do the i-th of N shares of the work; afterwards the same command without it puts them together.",
 )  # fmt: skip
 
 

@@ -7,13 +7,13 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import file_of, load_file
-from paramreduce_cli.cli.options import FORCE, JOBS, QUIET, RESULTS, SET, cores, results_store
+from paramreduce_cli.cli.options import FORCE, JOBS, PART, QUIET, RESULTS, SET, cores, results_store
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, describe_stage
-from paramreduce_cli.records import Validation
+from paramreduce_cli.records import WHOLE, Share, Validation
 from paramreduce_cli.runner import Outcome, Runner
 from paramreduce_cli.stages import stages
 
@@ -31,6 +31,7 @@ def stage_command(name: str) -> click.Command:
         quiet: bool,
         jobs: int | None = None,
         samples: Path | None = None,
+        share: Share | None = None,
     ) -> int:
         if config is None and samples is None:
             raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
@@ -39,7 +40,8 @@ def stage_command(name: str) -> click.Command:
         settings = None if loaded is not None else load_settings(config, overrides)
         store = results_store(loaded, results)
         placed = placed_errors(config, overrides)
-        with placed, store.locked(), progress_bars(quiet) as progress:
+        lock = "" if share is None else f"-{stage.name}-{share.number}-{share.count}"
+        with placed, store.locked(lock), progress_bars(quiet) as progress:
             runner = Runner(
                 loaded,
                 store,
@@ -50,7 +52,7 @@ def stage_command(name: str) -> click.Command:
                 remark,
                 interruption.heeded,
             )
-            outcome = runner.run(stage, force=force, go_on=True)
+            outcome = runner.run(stage, force=force, go_on=True, share=share or WHOLE)
         if not quiet:
             say_outcome(outcome)
         return _exit_code(stage, outcome, quiet)
@@ -58,6 +60,8 @@ def stage_command(name: str) -> click.Command:
     params: list[Any] = [RESULTS, SET, FORCE, QUIET]
     if stage.lends_run is not None:
         params.append(JOBS)
+    if stage.in_shares:
+        params.append(PART)
     if config_optional:
         params.append(
             click.option(

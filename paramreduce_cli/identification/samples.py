@@ -13,8 +13,10 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
     ObservedSet,
+    Span,
     StateBlock,
     joint_factors,
+    spans,
 )
 from paramreduce_cli.records import Block, FloatArray, IntArray, MeasuredLog, MeasuredMotions
 
@@ -73,8 +75,9 @@ class LoggedSet:
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
+        ends = [*self._first.tolist(), self.motions.time.size]
         observed = ObservedSet(
-            self._state_blocks, self.motions.time.size, self.dynamics,
+            spans(np.diff(ends).tolist()), self._states_at, self.dynamics,
             np.zeros(self.dynamics.mechanism.n_parameters), self.source,
         )  # fmt: skip
         for piece, blocks in groupby(observed.blocks(), attrgetter("trajectory")):
@@ -95,16 +98,12 @@ class LoggedSet:
                 at = first + some
                 yield StateBlock(piece, m.time[at], m.z[at], m.dz[at], m.ddz[at], tau)
 
-    def _state_blocks(self) -> Iterator[StateBlock]:
-        """States of all samples, also those that only serve the low-pass, and torques as measured."""
-        m = self.motions
-        for piece in range(self._first.size):
-            rows = self._rows(piece)
-            for start in range(rows.start, rows.stop, BLOCK_SAMPLES):
-                part = slice(start, min(start + BLOCK_SAMPLES, rows.stop))
-                yield StateBlock(
-                    piece, m.time[part], m.z[part], m.dz[part], m.ddz[part], m.tau[part]
-                )
+    def _states_at(self, span: Span) -> StateBlock:
+        """States, also those that only serve the low-pass, and torques as measured."""
+        m, first = self.motions, self._rows(span.trajectory).start
+        part = slice(first + span.start, first + span.stop)
+        states = m.time[part], m.z[part], m.dz[part], m.ddz[part]
+        return StateBlock(span.trajectory, *states, m.tau[part])
 
     def _low_passed(self, piece: int, blocks: Iterator[Block]) -> Iterator[Block]:
         """Blocks of the samples that are used; only what the low-pass still needs is held."""

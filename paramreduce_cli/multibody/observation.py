@@ -5,8 +5,10 @@ one is kept for every trajectory and joint, so that any weighting of joints and 
 of trajectories follows from the factors alone.
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.records import Block, FloatArray
+from paramreduce_cli.records import Block, FloatArray, Share
 
 BLOCK_SAMPLES = 150
 """Samples evaluated at a time: small enough for the cache, large enough for the loops."""
@@ -36,20 +38,55 @@ class StateBlock:
     """Positions z on a grid several times finer, on which loops are followed, (m n_samples, n_dof)."""
 
 
+@dataclass(frozen=True)
+class Span:
+    """Consecutive samples of one trajectory, few enough to be evaluated at a time."""
+
+    trajectory: int
+    start: int
+    stop: int
+
+
+def spans(lengths: Iterable[int]) -> list[Span]:
+    """All samples of trajectories of some lengths, in order."""
+    return [
+        Span(trajectory, start, min(start + BLOCK_SAMPLES, length))
+        for trajectory, length in enumerate(lengths)
+        for start in range(0, length, BLOCK_SAMPLES)
+    ]
+
+
 @dataclass
 class ObservedSet:
     """A sample set computed from states as it is read."""
 
-    states: Callable[[], Iterable[StateBlock]]
-    """Called to start reading anew."""
-    n_samples: int
-    """How many samples it yields in all."""
+    spans: list[Span]
+    """What it holds, trajectory by trajectory."""
+    at: Callable[[Span], StateBlock]
+    """The states of a span."""
     dynamics: Dynamics
     phi: FloatArray
     """Standard parameters, for torques that were not measured."""
     source: str
     """What the states are, for messages."""
     recomputable = True
+
+    @property
+    def n_samples(self) -> int:
+        """How many samples it yields in all."""
+        return sum(span.stop - span.start for span in self.spans)
+
+    def states(self) -> Iterator[StateBlock]:
+        """Yield the states in order; every call starts anew."""
+        return map(self.at, self.spans)
+
+    def restricted(self, share: Share) -> ObservedSet:
+        """A share of it: whole trajectories where there are enough, and of loops, which are followed along them."""
+        numbers = list(dict.fromkeys(span.trajectory for span in self.spans))
+        if self.dynamics.mechanism.loops is None and len(numbers) < share.count:
+            return replace(self, spans=share.cut(self.spans))
+        own = set(share.cut(numbers))
+        return replace(self, spans=[span for span in self.spans if span.trajectory in own])
 
     @cached_property
     def _coordinates(self) -> Coordinates:
@@ -127,9 +164,11 @@ class FactorAccumulator:
         self._waiting = []
 
     def result(self) -> FloatArray:
-        """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows."""
+        """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows; without trajectories for no blocks."""
         if self._waiting:
             self._factorise()
+        if not self._factors:
+            return np.zeros((0, 0, 0, 0))
         return np.array([[_square(factor) for factor in factors] for factors in self._factors])
 
 
@@ -143,6 +182,28 @@ def joint_factors(blocks: Iterable[Block]) -> FloatArray:
     for block in blocks:
         accumulator.add(block)
     return accumulator.result()
+
+
+def joined_factors(parts: Iterable[FloatArray]) -> FloatArray:
+    """Triangular factors of all rows, from those of parts of them.
+
+    Args:
+        parts: Of consecutive parts of the samples, (n_trajectories, n_dof, k, k) each, where later trajectories
+            may be missing.
+
+    Returns:
+        (n_trajectories, n_dof, k, k); what only one part holds is what it was there.
+    """
+    found = [part for part in parts if part.size]
+    if not found:
+        return np.zeros((0, 0, 0, 0))
+    _, n_dof, k, _ = found[0].shape
+    result = np.zeros((max(part.shape[0] for part in found), n_dof, k, k))
+    for part in found:
+        for own, more in zip(result, part, strict=False):
+            for j in np.flatnonzero(more.any(axis=(1, 2))):
+                own[j] = _square(np.vstack([own[j], more[j]])) if own[j].any() else more[j]
+    return result
 
 
 def append_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:

@@ -54,6 +54,7 @@ from paramreduce_cli.records.reduction import (
 )
 from paramreduce_cli.records.run import Progress, Provenance, Report, Run
 from paramreduce_cli.records.samples import Block, Recording, Recordings, Samples, SampleSet
+from paramreduce_cli.records.shares import UNSHARED, WHOLE, Share, Shares
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
     StoredProgram,

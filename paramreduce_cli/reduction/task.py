@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paramreduce_cli.records import IntArray, Progress, Proofs
+from paramreduce_cli.records import WHOLE, IntArray, Progress, Proofs, Share
 from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.objective import Objective, Units
 
@@ -42,6 +42,8 @@ class SelectionTask:
     effort: Effort = Effort()
     previous: Proofs | None = None
     """What an earlier run has proven on the same data."""
+    share: Share = WHOLE
+    """Which of the sizes are to be proven, of several jobs."""
     progress: Callable[[Progress], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told that a KeyboardInterrupt was met and heeded."""

@@ -17,6 +17,7 @@ from paramreduce_cli.records import (
     Mechanism,
     Model,
     Run,
+    Share,
     Trajectories,
     Trajectory,
 )
@@ -27,7 +28,11 @@ _LIMIT_ROUNDING = 1e-9
 
 
 def optimize_trajectories(
-    trajectories: TrajectoriesSection, model: Model, coefficients: Coefficients | None, run: Run
+    trajectories: TrajectoriesSection,
+    model: Model,
+    coefficients: Coefficients | None,
+    share: Share,
+    run: Run,
 ) -> Trajectories:
     """Find exciting trajectories, or take the Fourier coefficients that the config names.
 
@@ -37,7 +42,7 @@ def optimize_trajectories(
     period = wanted.period if coefficients is None else coefficients.period
     task = excitation_task(wanted, model, period)
     if coefficients is None:
-        sets = _optimised(wanted, task, run)
+        sets = _optimised(wanted, task, share, run)
     else:
         sets = _measured(wanted, model, task, coefficients)
     return Trajectories(
@@ -99,12 +104,13 @@ def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonic
 
 
 def _optimised(
-    wanted: TrajectoriesSection, task: ExcitationTask, run: Run
+    wanted: TrajectoriesSection, task: ExcitationTask, share: Share, run: Run
 ) -> dict[str, tuple[Trajectory, ...]]:
     counts = {"estimation": wanted.count, "validation": wanted.validation_count}
     keys = {name: [f"{name}-{k:04d}" for k in range(counts[name])] for name in _SETS}
-    found = optimise_all(task, [key for own in keys.values() for key in own], run)
-    return {name: tuple(found[key] for key in keys[name]) for name in _SETS}
+    own = share.dealt([key for some in keys.values() for key in some])
+    found = optimise_all(task, own, run)
+    return {name: tuple(found[key] for key in keys[name] if key in found) for name in _SETS}
 
 
 def _measured(

@@ -2,6 +2,7 @@
 
 import time
 import warnings
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -30,8 +31,11 @@ from paramreduce_cli.records import (
     Run,
     Samples,
     SelectionMethod,
+    Share,
+    Shares,
     Subsets,
 )
+from paramreduce_cli.reduction.best_subset.merging import merged
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
@@ -42,6 +46,9 @@ from paramreduce_cli.reduction.setup import SIZES, effort, selection_columns, se
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
+PROVING = "best-subset"
+"""The heuristic that proves."""
+
 
 def reduce(
     reduction: ReductionSection,
@@ -49,13 +56,15 @@ def reduce(
     model: Model | None,
     samples: Samples,
     previous: Reduction | None,
+    share: Share,
+    shares: Shares,
     run: Run,
 ) -> Reduction:
     """Select parameters with each heuristic, for every number of them.
 
     Works on any samples.h5, also one that a user brings: without a model all columns that
     are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
-    same command goes on from there.
+    same command goes on from there. A share of the work are the proofs of some sizes.
     """
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
@@ -74,21 +83,33 @@ def reduce(
         )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
-    if previous is not None and not np.array_equal(previous.factor, factor):
-        previous = None
+    known = [one for one in (previous, *shares.found) if one is not None]
+    proven = [one.proofs for one in known if one.proofs and np.array_equal(one.factor, factor)]
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
     objectives: dict[str, Objective] = {}
     found, proofs = {}, None
-    for name in reduction.heuristics:
+    for name in _wanted(reduction.heuristics, share):
         method = SelectionMethod.parse(name)
         if method.criterion not in objectives:
             objectives[method.criterion] = criteria[method.criterion](problem, inputs)
-        task = _task(objectives[method.criterion], reduction, previous, run)
+        task = _task(objectives[method.criterion], reduction, proven, share, run)
         found[name], made = _selected(task, method, reduction.stop)
         proofs = made if made is not None else proofs
-    _remark_on_proofs(proofs)
+    _remark_on_proofs(proofs, share)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)
+
+
+def _wanted(heuristics: Sequence[str], share: Share) -> Sequence[str]:
+    """What is run: of a share of the work what proves alone, as the others take seconds."""
+    if share.whole:
+        return heuristics
+    if PROVING not in heuristics:
+        raise ConfigError(
+            f"has no {PROVING}, and proofs are all that is done in parts. Leave --part out.",
+            ("reduction", "heuristics"),
+        )
+    return [PROVING]
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
@@ -165,9 +186,9 @@ def _criterion_inputs(
     return CriterionInputs(wanted.operations.torque_error, accelerations, cost)
 
 
-def _remark_on_proofs(proofs: Proofs | None) -> None:
+def _remark_on_proofs(proofs: Proofs | None, share: Share) -> None:
     """Say what is not proven."""
-    if proofs is None or set(proofs.status) == {ProofStatus.OPTIMAL}:
+    if not share.whole or proofs is None or set(proofs.status) == {ProofStatus.OPTIMAL}:
         return
     counts = {status: proofs.status.count(status) for status in ProofStatus}
     text = f"best-subset: {counts[ProofStatus.OPTIMAL]} of {proofs.n.size} sizes are proven"
@@ -194,13 +215,14 @@ class _Selected:
 
 
 def _task(
-    objective: Objective, wanted: ReductionSection, previous: Reduction | None, run: Run
+    objective: Objective, wanted: ReductionSection, proven: Sequence[Proofs], share: Share, run: Run
 ) -> SelectionTask:
     return SelectionTask(
         objective=objective,
         largest=wanted.stop.parameters,
         effort=effort(wanted, run),
-        previous=previous.proofs if previous is not None else None,
+        previous=merged(proven) if proven else None,
+        share=share,
         progress=run.progress,
         interrupted=run.interrupted,
     )

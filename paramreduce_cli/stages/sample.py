@@ -3,7 +3,7 @@
 import itertools
 import warnings
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -16,25 +16,34 @@ from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import (
-    BLOCK_SAMPLES,
     ObservedSet,
+    Span,
     StateBlock,
+    spans,
     standard_deviation,
 )
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import (
+    UNSHARED,
+    WHOLE,
+    Block,
     FloatArray,
     MeasuredLog,
     Model,
     Recording,
     Recordings,
     Samples,
+    SampleSet,
+    Share,
+    Shares,
     Trajectories,
 )
 
 ComputedSet = ObservedSet | LoggedSet
+StatesAt = Callable[[Span], StateBlock]
 
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
@@ -46,11 +55,21 @@ def sample(
     trajectories: Trajectories | None,
     recordings: Recordings,
     log: MeasuredLog | None = None,
+    share: Share = WHOLE,
+    shares: Shares = UNSHARED,
 ) -> Samples:
     """Sample both sets: states, torques and observation matrices.
 
-    From the optimised trajectories, or from a log or recorded states where the config names them.
+    From the optimised trajectories, or from a log or recorded states where the config names them. A
+    share of the work are some trajectories, or a part of a recording.
     """
+    if shares.found:
+        return _put_together(sampling, model, shares)
+    if sampling.log is not None and not share.whole:
+        raise ConfigError(
+            "is sampled as a whole, as its low-pass runs on across parts. Leave --part out.",
+            ("sampling", "log"),
+        )
     dynamics = Dynamics(model.mechanism)
 
     def observed(name: str, recording: Recording | None, points: int | None) -> ComputedSet:
@@ -69,16 +88,41 @@ def sample(
 
     estimation = observed("estimation", recordings.estimation, sampling.points)
     validation = observed("validation", recordings.validation, sampling.validation_points)
+    if isinstance(estimation, ObservedSet) and isinstance(validation, ObservedSet):
+        estimation, validation = estimation.restricted(share), validation.restricted(share)
+    if not share.whole:
+        return _samples(model, None, None, estimation, validation)
+    scales = _nominal_torque(model, estimation), _nominal_acceleration(sampling, model, estimation)
+    return _samples(model, *scales, estimation, validation)
+
+
+def _samples(
+    model: Model,
+    nominal_torque: FloatArray | None,
+    nominal_acceleration: FloatArray | None,
+    estimation: SampleSet,
+    validation: SampleSet,
+) -> Samples:
     parameters = model.mechanism.parameters
     return Samples(
         names=model.mechanism.parameter_names,
         preference=np.array([parameter.preference for parameter in parameters]),
         values=model.values,
-        nominal_torque=_nominal_torque(model, estimation),
-        nominal_acceleration=_nominal_acceleration(sampling, model, estimation),
+        nominal_torque=nominal_torque,
+        nominal_acceleration=nominal_acceleration,
         estimation=estimation,
         validation=validation,
     )
+
+
+def _put_together(sampling: SamplingSection, model: Model, shares: Shares) -> Samples:
+    """The samples that several jobs have made; scales are those of all of them."""
+    estimation, validation = (
+        JoinedSet([getattr(found, name) for found in shares.found])
+        for name in ("estimation", "validation")
+    )
+    scales = _nominal_torque(model, estimation), _nominal_acceleration(sampling, model, estimation)
+    return _samples(model, *scales, estimation, validation)
 
 
 def _completed(
@@ -122,8 +166,8 @@ def _generated(
     points = points or trajectories.points
     finer = 1 if model.mechanism.loops is None else -(-FINER * trajectories.points // points)
     return ObservedSet(
-        lambda: _series_blocks(series, trajectories.period, points, finer),
-        len(series) * points,
+        spans([points] * len(series)),
+        _series_states(series, trajectories.period, points, finer),
         dynamics,
         model.values,
         f"{name} set",
@@ -145,8 +189,8 @@ def _recorded(
     if recording.tau is not None:
         recording = replace(recording, tau=_measured(model, recording.source, recording.tau))
     return ObservedSet(
-        lambda: _recorded_blocks(recording),
-        recording.time.size,
+        spans([recording.time.size]),
+        _recorded_states(recording),
         dynamics,
         model.values,
         recording.source,
@@ -189,9 +233,12 @@ def _simulated(
         except DataError as error:
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
     return ObservedSet(
-        lambda: _motion_blocks(motions), len(motions) * time.size, dynamics, model.values,
+        spans([time.size] * len(motions)),
+        _motion_states(motions),
+        dynamics,
+        model.values,
         f"{name} set",
-    )  # fmt: skip
+    )
 
 
 def _input(section: InputSection | None, rng: np.random.Generator) -> Input:
@@ -202,12 +249,13 @@ def _input(section: InputSection | None, rng: np.random.Generator) -> Input:
     return Input(phases=tuple(phases), **given)
 
 
-def _motion_blocks(motions: list[SimulatedMotion]) -> Iterator[StateBlock]:
-    for index, motion in enumerate(motions):
-        for start in range(0, motion.time.size, BLOCK_SAMPLES):
-            part = slice(start, start + BLOCK_SAMPLES)
-            states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
-            yield StateBlock(index, *states, motion.tau[part])
+def _motion_states(motions: list[SimulatedMotion]) -> StatesAt:
+    def at(span: Span) -> StateBlock:
+        motion, part = motions[span.trajectory], slice(span.start, span.stop)
+        states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
+        return StateBlock(span.trajectory, *states, motion.tau[part])
+
+    return at
 
 
 def _measured(model: Model, source: str, tau: FloatArray) -> FloatArray:
@@ -228,26 +276,29 @@ def _measured(model: Model, source: str, tau: FloatArray) -> FloatArray:
     return np.where(wanted, tau, 0.0)
 
 
-def _series_blocks(
-    series: list[FloatArray], period: float, points: int, finer: int
-) -> Iterator[StateBlock]:
-    """Blocks of every series, with positions on a finer grid on which loops are followed."""
+def _series_states(series: list[FloatArray], period: float, points: int, finer: int) -> StatesAt:
+    """States of every series, with positions on a finer grid on which loops are followed."""
     times, finer_times = sample_times(period, points), sample_times(period, finer * points)
-    for index, coefficients in enumerate(series):
+
+    def at(span: Span) -> StateBlock:
+        coefficients = series[span.trajectory]
         harmonics = (coefficients.shape[1] - 1) // 2
-        for start in range(0, points, BLOCK_SAMPLES):
-            stop = start + BLOCK_SAMPLES
-            states = fourier_basis(period, harmonics, times[start:stop]).states(coefficients)
-            between = fourier_basis(period, harmonics, finer_times[finer * start : finer * stop])
-            way = between.states(coefficients)[0] if finer > 1 else None
-            yield StateBlock(index, times[start:stop], *states, way=way)
+        start, stop = span.start, span.stop
+        states = fourier_basis(period, harmonics, times[start:stop]).states(coefficients)
+        between = fourier_basis(period, harmonics, finer_times[finer * start : finer * stop])
+        way = between.states(coefficients)[0] if finer > 1 else None
+        return StateBlock(span.trajectory, times[start:stop], *states, way=way)
+
+    return at
 
 
-def _recorded_blocks(r: Recording) -> Iterator[StateBlock]:
-    for start in range(0, r.time.size, BLOCK_SAMPLES):
-        part = slice(start, start + BLOCK_SAMPLES)
+def _recorded_states(r: Recording) -> StatesAt:
+    def at(span: Span) -> StateBlock:
+        part = slice(span.start, span.stop)
         tau = None if r.tau is None else r.tau[part]
-        yield StateBlock(0, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
+        return StateBlock(0, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
+
+    return at
 
 
 def _warn_of_still_joints(model: Model, recording: Recording) -> None:
@@ -261,14 +312,16 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
         )
 
 
-def _torques(computed: ComputedSet) -> Iterator[FloatArray]:
+def _torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
     """Those of the states where they were measured; else observation matrices are needed too."""
-    if all(block.tau is not None for block in itertools.islice(computed.states(), 1)):
-        return (block.tau for block in computed.states() if block.tau is not None)
-    return (block.tau for block in computed.blocks())
+    states: Iterator[StateBlock | Block] = iter(found.states())
+    first = next(states, None)
+    if first is None or first.tau is None:
+        return (block.tau for block in found.blocks())
+    return (block.tau for block in itertools.chain([first], states) if block.tau is not None)
 
 
-def _nominal_torque(model: Model, estimation: ComputedSet) -> FloatArray:
+def _nominal_torque(model: Model, estimation: ComputedSet | JoinedSet) -> FloatArray:
     if model.nominal_torque_given:
         return model.nominal_torque
     deviation = standard_deviation(_torques(estimation))
@@ -277,7 +330,7 @@ def _nominal_torque(model: Model, estimation: ComputedSet) -> FloatArray:
 
 
 def _nominal_acceleration(
-    sampling: SamplingSection, model: Model, estimation: ComputedSet
+    sampling: SamplingSection, model: Model, estimation: ComputedSet | JoinedSet
 ) -> FloatArray:
     given = sampling.nominal_acceleration
     if given != "standard-deviation":

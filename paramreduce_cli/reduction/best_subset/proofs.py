@@ -151,9 +151,10 @@ class ProofSearch:
 
     def _open(self) -> list[_Proof]:
         return [
-            p
-            for _, p in sorted(self._proofs.items())
-            if p.status == ProofStatus.BEST_FOUND and p.squared_error > FULL_PRECISION**2
+            proof
+            for n in self._task.share.dealt(sorted(self._proofs))
+            if (proof := self._proofs[n]).status == ProofStatus.BEST_FOUND
+            and proof.squared_error > FULL_PRECISION**2
         ]
 
     def _round(

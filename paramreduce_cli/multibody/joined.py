@@ -1,0 +1,46 @@
+"""Several stored sample sets as one."""
+
+from collections.abc import Iterator, Sequence
+from typing import Protocol
+
+from paramreduce_cli.multibody.observation import joined_factors
+from paramreduce_cli.records import Block, FloatArray, SampleSet
+
+
+class StoredStates(SampleSet, Protocol):
+    """A stored set that gives its states alone too."""
+
+    def states(self) -> Iterator[Block]:
+        """Yield the samples in order, with observation matrices of no rows."""
+
+
+class JoinedSet:
+    """Consecutive parts of a sample set that was computed from states, one after the other.
+
+    Args:
+        parts: In their order.
+    """
+
+    recomputable = True
+
+    def __init__(self, parts: Sequence[StoredStates]) -> None:
+        self._parts = parts
+
+    @property
+    def n_samples(self) -> int:
+        """How many samples it yields in all."""
+        return sum(part.n_samples for part in self._parts)
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+        for part in self._parts:
+            yield from part.blocks()
+
+    def states(self) -> Iterator[Block]:
+        """The same with observation matrices of no rows."""
+        for part in self._parts:
+            yield from part.states()
+
+    def factors(self) -> FloatArray:
+        """Triangular factors per trajectory and joint, from those of the parts."""
+        return joined_factors(part.factors() for part in self._parts)

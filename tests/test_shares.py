@@ -1,0 +1,177 @@
+"""Stages as several jobs: what they make is what one job makes, and what is missing is named."""
+
+import h5py
+import numpy as np
+import pytest
+from conftest import ONE_FORMAT, TWO_LINK, config_of
+
+from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.records import Reduction, Samples, Share, Trajectories
+from paramreduce_cli.runner import Runner
+
+STAGES = {stage.name: stage for stage in pipeline()}
+SHARED = ("optimize-trajectories", "sample", "reduce")
+
+
+def digest(folder, name):
+    with h5py.File(folder / name) as file:
+        return file.attrs["digest"]
+
+
+def run_in_parts(folder, count, *overrides, robot="two_link", backwards=False):
+    """Run everything, the stages that can be as several jobs of one process each."""
+    runner = Runner(config_of(robot, ONE_FORMAT, *overrides), Store(folder))
+    for stage in stages_to_run(runner.config):
+        if stage.in_shares:
+            numbers = range(1, count + 1)
+            for number in reversed(numbers) if backwards else numbers:
+                runner.run(stage, share=Share(number, count))
+        runner.run(stage)
+    return runner
+
+
+def test_stages_that_are_done_in_parts():
+    assert tuple(name for name, stage in STAGES.items() if stage.in_shares) == SHARED
+
+
+@pytest.mark.parametrize("count", [2, 3])
+def test_parts_make_what_one_job_makes(two_link_results, tmp_path, count):
+    """To the digest of all numbers, in whatever order the jobs are done."""
+    run_in_parts(tmp_path, count, backwards=count == 3)
+    for name in ("trajectories.h5", "samples.h5", "reduction.h5", "validation.h5"):
+        assert digest(tmp_path, name) == digest(two_link_results, name)
+    assert not list(tmp_path.glob("*.parts"))
+
+
+def test_parts_of_loops_are_whole_trajectories(tmp_path):
+    few = ["trajectories.count=2", "trajectories.starts=1", "trajectories.polished=1"]
+    run_in_parts(tmp_path / "parts", 2, *few, robot="four_bar")
+    whole = Runner(config_of("four_bar", ONE_FORMAT, *few), Store(tmp_path / "whole"))
+    for stage in stages_to_run(whole.config):
+        whole.run(stage)
+    for name in ("samples.h5", "reduction.h5"):
+        assert digest(tmp_path / "parts", name) == digest(tmp_path / "whole", name)
+
+
+def test_parts_of_one_recording(two_link_results, tmp_path):
+    """A recording is cut anywhere; its triangular factor is put together from those of the parts."""
+    with h5py.File(two_link_results / "samples.h5") as file:
+        found = file["estimation"]
+        z, dz, ddz, tau = (np.tile(found[key][:], (9, 1)) for key in ("z", "dz", "ddz", "tau"))
+    recording = tmp_path / "recording.h5"
+    with h5py.File(recording, "w") as file:
+        file["time"] = np.arange(len(z)) / 100
+        file["z"], file["dz"], file["ddz"], file["tau"] = z, dz, ddz, tau
+    given = [f"sampling.estimation_file={recording}", f"sampling.validation_file={recording}"]
+    runner = Runner(config_of("two_link", *given), Store(tmp_path / "r"))
+    runner.run(STAGES["build-model"])
+    runner.run(STAGES["sample"])
+    path = runner.store.path(Samples)
+    with h5py.File(path) as file:
+        whole = {name: file[f"estimation/{name}"][:] for name in ("W", "tau", "factors", "time")}
+    for number in range(1, 5):
+        runner.run(STAGES["sample"], share=Share(number, 4))
+    runner.run(STAGES["sample"], force=False)
+    path.unlink()
+    for number in range(1, 5):
+        runner.run(STAGES["sample"], share=Share(number, 4))
+    runner.run(STAGES["sample"])
+    with h5py.File(path) as file:
+        for name in ("W", "tau", "time"):
+            assert np.array_equal(file[f"estimation/{name}"][:], whole[name])
+        one, other = file["estimation/factors"][:], whole["factors"]
+    squared = [np.einsum("tjki,tjkl->tjil", factor, factor) for factor in (one, other)]
+    np.testing.assert_allclose(
+        squared[0], squared[1], rtol=0, atol=1e-12 * np.abs(other).max() ** 2
+    )
+
+
+@pytest.fixture
+def sampled(tmp_path):
+    """Both parts of the samples, and a runner to put them together."""
+    runner = Runner(config_of("two_link"), Store(tmp_path))
+    for name in ("build-model", "optimize-trajectories"):
+        runner.run(STAGES[name])
+    for number in (1, 2):
+        runner.run(STAGES["sample"], share=Share(number, 2))
+    return runner, tmp_path / "samples.h5.parts"
+
+
+def test_a_part_that_is_done_is_not_done_again(sampled):
+    runner, _ = sampled
+    assert runner.run(STAGES["sample"], share=Share(1, 2)).current
+    assert not runner.run(STAGES["sample"], share=Share(1, 2), force=True).current
+
+
+def test_a_missing_part_is_named(sampled):
+    runner, folder = sampled
+    (folder / "share-0002-of-0002.h5").unlink()
+    with pytest.raises(ArtifactError, match=r"part 2/2 is missing .*sample --part 2/2"):
+        runner.run(STAGES["sample"])
+    assert not runner.store.path(Samples).exists()
+    assert not runner.run(STAGES["sample"], force=True).current
+
+
+def test_a_damaged_part_is_named_and_made_again(sampled):
+    runner, folder = sampled
+    path = folder / "share-0001-of-0002.h5"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ArtifactError, match="part 1/2 is damaged"):
+        runner.run(STAGES["sample"])
+    assert not runner.run(STAGES["sample"], share=Share(1, 2)).current
+    runner.run(STAGES["sample"])
+    assert runner.store.path(Samples).exists()
+    assert not folder.exists()
+
+
+def test_parts_of_another_config_are_of_no_concern(sampled, tmp_path):
+    _, folder = sampled
+    other = Runner(config_of("two_link", "sampling.points=60"), Store(tmp_path))
+    other.run(STAGES["sample"])
+    with h5py.File(other.store.path(Samples)) as file:
+        assert len(file["estimation/tau"]) == 120
+    assert not folder.exists()
+
+
+def test_proofs_of_parts_are_those_of_their_sizes(two_link_results, tmp_path):
+    """Each part proves its own sizes alone; together all are proven."""
+    runner = Runner(config_of("two_link"), Store(tmp_path))
+    for name in ("build-model", "optimize-trajectories", "sample"):
+        runner.run(STAGES[name])
+    nodes = []
+    for number in (1, 2):
+        outcome = runner.run(STAGES["reduce"], share=Share(number, 2))
+        nodes.append(outcome.record.proofs.nodes)
+    assert not ((nodes[0] > 0) & (nodes[1] > 0)).any()
+    assert set(runner.run(STAGES["reduce"]).record.proofs.status) == {"optimal"}
+    assert runner.store.path(Reduction).exists()
+    assert runner.store.path(Trajectories).exists()
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [("3", "form 3/8"), ("a/b", "form 3/8"), ("0/4", "count from 1"), ("5/4", "count from 1")],
+)
+def test_what_is_no_part(invoke, tmp_path, text, says):
+    refused = invoke("sample", TWO_LINK, "--results", tmp_path, "--part", text, code=2)
+    assert says in refused.err
+
+
+def test_what_cannot_be_done_in_parts(invoke, tmp_path, measured_copy):
+    call = ("--results", tmp_path / "r", "--part", "1/2")
+    assert "No such option" in invoke("build-model", TWO_LINK, *call, code=2).err
+    log = (next(measured_copy.glob("*.yaml")), "--results", measured_copy / "results")
+    assert "sampled as a whole" in invoke("sample", *log, "--part", "1/2", "--force", code=2).err
+
+
+@pytest.mark.parametrize("count", [1, 3, 7, 12])
+def test_shares_are_everything_once(count):
+    items = list(range(10))
+    shares = [Share(number, count) for number in range(1, count + 1)]
+    assert [item for share in shares for item in share.cut(items)] == items
+    assert sorted(item for share in shares for item in share.dealt(items)) == items
+    assert all(Share.parse(str(share)) == share for share in shares)
