@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format regression reference benchmark robots identification controllers torture graph clean
+.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -19,6 +19,8 @@ help:
 	@echo "make all         both, and one table over them"
 	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr, delta"
 	@echo "make ur10        identify and reduce from a recording of the robot; also panda, tx40"
+	@echo "make sweep       all runs of pipelines/sweep.yaml; PROFILE=slurm on a cluster"
+	@echo "make test-cluster    sweeps here and on a Slurm of its own, with kills, against plain runs"
 	@echo "make test        run the tests"
 	@echo "make check       lint, format and types"
 	@echo "make regression  compare with the committed references"
@@ -51,6 +53,25 @@ $(VENV)/.installed-identify: $(VENV)/.installed
 
 $(MEASURED): $(VENV)/.installed-identify
 	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
+
+# Workflows over many runs are Snakemake's.
+$(VENV)/.installed-sweep: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[sweep]'
+	@touch $@
+
+# What pipelines/sweep.yaml lists; SWEEP=FILE another list, PROFILE=slurm on a cluster.
+SWEEP ?= pipelines/sweep.yaml
+PROFILE ?= local
+
+sweep: $(VENV)/.installed-sweep
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/snakemake --snakefile pipelines/Snakefile --quiet rules \
+	  --profile pipelines/profiles/$(PROFILE) --config sweep=$(SWEEP)
+
+# Everything takes half an hour; with Debian's slurm-wlm and munge, and as root, on a Slurm of its own too.
+CLUSTER ?=
+
+test-cluster: $(VENV)/.installed-sweep $(VENV)/.installed-dev
+	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH=tests $(BIN)/python -m tests.cluster $(CLUSTER)
 
 all: $(PAPER)
 	@$(PARAMREDUCE) table $(PAPER:%=results/%)

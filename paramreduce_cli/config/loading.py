@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import UnionType
-from typing import Any, Union, get_args, get_origin
+from typing import Any, TypeVar, Union, get_args, get_origin
 
 import yaml
 from pydantic import BaseModel, ValidationError
@@ -17,8 +17,10 @@ from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.errors import ConfigError, Key, keyed
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.numbers import read_constants
+from paramreduce_cli.fields.section import Section
 
 Problem = tuple[Key, str]
+S = TypeVar("S", bound=Section)
 _MOST_PROBLEMS = 30
 """That are listed at once."""
 
@@ -65,18 +67,41 @@ def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
         ConfigError: As for :func:`load_config`.
     """
     document = reading.read_yaml("{}", "settings") if path is None else _read(path)
-    if not isinstance(document.data, dict):
-        raise ConfigError(f"{path}: settings are a mapping of {', '.join(Settings.model_fields)}.")
     try:
-        for text in overrides:
+        for text in overrides if isinstance(document.data, dict) else ():
             reading.apply_override(document, text)
-        return Settings.model_validate(document.data, context={"constants": {}})
-    except ValidationError as error:
-        problems = _one_per_key([_describe(entry, document.data) for entry in error.errors()])
-        lines = [_line(document, problem) for problem in problems]
-        raise ConfigError("\n".join(dict.fromkeys(lines))) from error
     except ValueError as error:
         raise ConfigError(str(error)) from error
+    return _validated(document, Settings)
+
+
+def load_section(path: Path, kind: type[S]) -> S:
+    """Read a YAML that is no config, such as a list of runs.
+
+    Args:
+        path: The file.
+        kind: What it must be.
+
+    Raises:
+        ConfigError: As for :func:`load_config`.
+    """
+    return _validated(_read(path), kind)
+
+
+def _validated(document: Document, kind: type[S]) -> S:
+    if not isinstance(document.data, dict):
+        raise ConfigError(
+            f"{document.source}: must be a mapping of {', '.join(kind.model_fields)}."
+        )
+    lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
+    if lines:
+        raise ConfigError("\n".join(lines))
+    try:
+        return kind.model_validate(document.data, context={"constants": {}})
+    except ValidationError as error:
+        problems = _one_per_key([_describe(entry, document.data, kind) for entry in error.errors()])
+        lines = [_line(document, problem) for problem in problems]
+        raise ConfigError("\n".join(dict.fromkeys(lines))) from error
 
 
 def has_robot(path: Path) -> bool:
@@ -184,9 +209,9 @@ def _cut(data: Any, path: Key) -> None:
         data.pop(path[-1], None)
 
 
-def _describe(entry: Any, data: Any) -> Problem:
-    path = _real_path(entry["loc"], data)
-    owner, key = _model_at(path[:-1]), path[-1] if path else ""
+def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
+    path = _real_path(entry["loc"], data, kind)
+    owner, key = _model_at(path[:-1], kind), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
         return path, unknown("key", str(key), owner.model_fields)
     meaning = ""
@@ -205,14 +230,14 @@ def _describe(entry: Any, data: Any) -> Problem:
     return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
-def _real_path(location: Iterable[str | int], data: Any) -> Key:
+def _real_path(location: Iterable[str | int], data: Any, kind: type[Section]) -> Key:
     """Pydantic's location without the steps that name a member of a union."""
     path: list[str | int] = []
     steps = list(location)
     for k, step in enumerate(steps):
         last = k == len(steps) - 1
         if isinstance(data, dict) and (step in data or (last and isinstance(step, str))):
-            if step not in data and _model_at(tuple(path)) is None:
+            if step not in data and _model_at(tuple(path), kind) is None:
                 continue
             path.append(step)
             data = data.get(str(step))
@@ -222,9 +247,9 @@ def _real_path(location: Iterable[str | int], data: Any) -> Key:
     return tuple(path)
 
 
-def _model_at(path: Key) -> type[BaseModel] | None:
-    """The section of the schema that a path leads to."""
-    annotation: Any = Config
+def _model_at(path: Key, kind: type[Section]) -> type[BaseModel] | None:
+    """The section of a schema that a path leads to."""
+    annotation: Any = kind
     for step in path:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
             field = annotation.model_fields.get(str(step))

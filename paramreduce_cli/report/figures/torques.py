@@ -10,7 +10,7 @@ from paramreduce_cli.report.style import joint_label, joint_style
 
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
-    """Torques, of the full model, measured or brought, and those of the selected model over the nominal ones, along the validation set."""
+    """Torques as they were given or measured, and those of the selected model over the nominal ones, along the validation set."""
     modelled = data.identification is None
     label = ("full" if data.known_model is not None else "given") if modelled else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()

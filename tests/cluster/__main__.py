@@ -1,0 +1,117 @@
+"""Sweeps through Snakemake here and on a Slurm of its own, and with kills, against plain runs."""
+
+import argparse
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import rich.console
+import rich.table
+
+from tests.cluster.slurm import Slurm, missing
+from tests.cluster.sweeps import (
+    ROBOTS,
+    command,
+    different,
+    killed_at_random,
+    plain_runs,
+    random_generator,
+    write_list,
+)
+
+_LONGEST = 40.0
+"""Before a kill, s."""
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--robots", type=int, default=len(ROBOTS))
+    parser.add_argument("--seeds", type=int, default=5)
+    parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--seed", type=int, default=0, help="Of the kills.")
+    parser.add_argument("--without-slurm", action="store_true")
+    given = parser.parse_args()
+    robots = ROBOTS[: given.robots]
+    table = rich.table.Table("what", "runs", "equal to plain runs", "otherwise")
+    lost = 0
+
+    def tell(what, found, expected):
+        nonlocal lost
+        bad = different(found, expected)
+        lost += bool(bad)
+        runs = len({name.partition("/")[0] for name in bad})
+        table.add_row(what, str(len(expected)), str(len(expected) - runs), ", ".join(bad[:3]))
+
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        expected = plain_runs(folder / "plain", robots, given.seeds)
+
+        def fresh(what):
+            (folder / what).mkdir()
+            return write_list(folder / what, robots, given.seeds), folder / what / "results"
+
+        listed, results = fresh("local")
+        subprocess.run(command(listed), check=True, stdout=subprocess.DEVNULL)
+        tell("Snakemake on this machine", results, expected)
+        if given.kills:
+            lost += kills(fresh, given, expected, tell)
+        if not given.without_slurm:
+            lost += on_slurm(folder, fresh, expected, tell, table)
+    rich.console.Console(width=110).print(table)
+    sys.exit(lost > 0)
+
+
+def kills(fresh, given, expected, tell):
+    """Kill a job, Snakemake or everything; then the same command again, until all is done."""
+    rng = random_generator(given.seed)
+    failed = count = sweeps = 0
+    while count < given.kills:
+        listed, results = fresh(f"killed-{sweeps}")
+        sweeps += 1
+        words = command(listed)
+        # A sweep is killed a few times before it is left to end.
+        for _ in range(min(5, given.kills - count)):
+            killed_at_random(words, listed.parent, _LONGEST, rng)
+            count += 1
+        with (listed.parent / "last.log").open("w") as log:
+            done = subprocess.run(words, stdout=log, stderr=log, check=False)
+        failed += done.returncode != 0
+        tell(f"killed at random moments, then ended ({count} kills so far)", results, expected)
+    return failed
+
+
+def on_slurm(folder, fresh, expected, tell, table):
+    """The same on a Slurm of one node, whose controller is killed on the way."""
+    needed = missing()
+    if needed:
+        table.add_row(f"Slurm: left out, {needed} is not there", "", "", "")
+        return 0
+    listed, results = fresh("slurm")
+    slurm = Slurm(folder / "daemons")
+    try:
+        words = command(
+            listed, "slurm", slurm_status_command="squeue", slurm_init_seconds_before_status_checks=5,
+            latency_wait=20,
+        )  # fmt: skip
+        words.insert(words.index("--quiet"), "--slurm-no-account")
+        with (listed.parent / "snakemake.log").open("w") as log:
+            process = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
+            try:
+                process.wait(timeout=45)
+            except subprocess.TimeoutExpired:
+                slurm.controller.kill()
+                slurm.controller.wait()
+                slurm.start_controller()
+            process.wait()
+        if process.returncode != 0:
+            print((listed.parent / "snakemake.log").read_text()[-3000:])
+            return 1
+        tell("Snakemake on a Slurm of one node, controller killed once", results, expected)
+        return 0
+    finally:
+        slurm.stop()
+
+
+if __name__ == "__main__":
+    main()

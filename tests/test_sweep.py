@@ -1,0 +1,77 @@
+"""Lists of runs, and the commands that they stand for."""
+
+import shlex
+from pathlib import Path
+
+import pytest
+from conftest import CONFIGS
+
+from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.pipeline import pipeline
+from paramreduce_cli.records import Share
+from paramreduce_cli.sweep import load_sweep
+
+STAGES = {stage.name: stage for stage in pipeline()}
+
+
+def listed(folder, text):
+    path = folder / "sweep.yaml"
+    path.write_text(text)
+    return path
+
+
+def test_every_robot_with_every_seed_and_every_variant(tmp_path):
+    sweep = load_sweep(
+        listed(
+            tmp_path,
+            f"robots: [{CONFIGS / 'two_link.yaml'}, {CONFIGS / 'four_bar.yaml'}]\n"
+            "seeds: [3, 5]\n"
+            "variants: {long: ['trajectories.points=200'], plain: []}\n"
+            "parts: {reduce: 3}\n"
+            "results: here\n",
+        )
+    )
+    assert list(sweep.runs)[:4] == [
+        "two_link-3-long", "two_link-3-plain", "two_link-5-long", "two_link-5-plain",
+    ]  # fmt: skip
+    assert len(sweep.runs) == 8
+    run = sweep.runs["two_link-5-long"]
+    assert run.config.trajectories.seed == 5
+    assert run.config.trajectories.points == 200
+    assert run.folder == tmp_path / "here" / "two_link-5-long"
+    assert sweep.shares(STAGES["reduce"]) == [Share(1, 3), Share(2, 3), Share(3, 3)]
+    assert sweep.shares(STAGES["sample"]) == []
+    assert sweep.shares(STAGES["validate"]) == []
+
+
+def test_commands_are_those_of_the_shell(tmp_path):
+    config = CONFIGS / "two_link.yaml"
+    sweep = load_sweep(listed(tmp_path, f"robots: [{config}]\nresults: r\n"))
+    (run,) = sweep.runs.values()
+    text = run.command(STAGES["reduce"], Share(2, 3), jobs="4")
+    words = shlex.split(text)
+    assert words[2:4] == ["paramreduce_cli", "reduce"]
+    assert words[-3:] == ["--quiet", "--jobs", "4"]
+    assert words[-5:-3] == ["--part", "2/3"]
+    assert run.command(STAGES["validate"]).endswith("|| [ $? -eq 1 ]")
+    for stage in run.stages:
+        assert Path(run.needs(stage)[0]).resolve() == config
+    needed = [name.rpartition("/")[2] for name in run.needs(STAGES["report"])]
+    assert needed == ["two_link.yaml", "model.h5", "trajectories.h5", "samples.h5", "reduction.h5",
+                      "validation.h5"]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("robots: []", "robots"),
+        ("seeds: [1]", "robots"),
+        ("robots: [a.yaml]\nseed: [1]", "did you mean seeds"),
+        ("robots: [a.yaml]\nparts: {reduce: 0}", "parts.reduce"),
+        ("robots: [a.yaml, b/a.yaml]", "two runs are called a"),
+        ("- a.yaml", "must be a mapping"),
+    ],
+)
+def test_lists_that_cannot_be(tmp_path, text, says):
+    with pytest.raises(ConfigError, match=says):
+        load_sweep(listed(tmp_path, text))
