@@ -173,7 +173,8 @@ class Runner:
         inputs = _Inputs(self.config)
         inputs.digests |= self._input_digests(stage)
         path = shares.path(share)
-        if not force and shares.is_current(share, self._stamp(stage, inputs, started)):
+        stamp = self._stamp(stage, inputs, started)
+        if not force and (self.is_current(stage) or shares.is_current(share, stamp)):
             return Outcome(stage.name, path, True, 0.0)
         lent = (Run, stage.output, Share, Shares)
         inputs = _Inputs(self.config)

@@ -18,7 +18,7 @@ from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.config.loading import load_section
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.section import Section
-from paramreduce_cli.pipeline import Stage, stages_to_run
+from paramreduce_cli.pipeline import Stage, pipeline, stages_to_run
 from paramreduce_cli.records import Report, Share, Validation
 
 _SEED = "trajectories.seed"
@@ -105,6 +105,34 @@ class Sweep:
         """The jobs that a stage is done as; none where it is one."""
         count = self.parts.get(stage.name, 1) if stage.in_shares else 1
         return [Share(number, count) for number in range(1, count + 1)] if count > 1 else []
+
+    def phases(self) -> list[list[str]]:
+        """Commands that can run side by side, in phases of which each waits for the one before.
+
+        What needs no other job than its own run is one command; so there are no more than two phases for
+        every stage that is done as several jobs, and one.
+        """
+        found: list[list[str]] = []
+        waiting: dict[str, list[str]] = {name: [] for name in self.runs}
+
+        def close() -> None:
+            found.append([" && ".join(lines) for lines in waiting.values() if lines])
+            for lines in waiting.values():
+                lines.clear()
+
+        for stage in pipeline():
+            having = {name: run for name, run in self.runs.items() if stage in run.stages}
+            shares = self.shares(stage)
+            if shares:
+                close()
+                found.append(
+                    [run.command(stage, share, "1") for run in having.values() for share in shares]
+                )
+            for name, run in having.items():
+                text = run.command(stage, jobs="${SLURM_CPUS_PER_TASK:-1}")
+                waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
+        close()
+        return [commands for commands in found if commands]
 
 
 def load_sweep(path: Path) -> Sweep:

@@ -1,8 +1,12 @@
 """The declared stages as rules for other tools."""
 
+import shlex
+from pathlib import Path
+
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.pipeline import Stage, pipeline
 from paramreduce_cli.records import Identification, MeasuredLog, TermReduction, Trajectories
+from paramreduce_cli.sweep import Sweep
 
 
 def make_rules() -> str:
@@ -59,6 +63,46 @@ def outline() -> str:
 def _line(stage: Stage) -> str:
     needs = ", ".join(file_of(entry.type) for entry in stage.artifacts)
     return f"{stage.name}: {needs or 'the config'} -> {file_of(stage.output)}"
+
+
+_SLURM = """\
+#!/usr/bin/env bash
+# Written by `paramreduce graph --format slurm`: submits {count} arrays of jobs, each of which waits for the one
+# before; {jobs} jobs in all. Run it with bash where sbatch is. What is done is skipped, so jobs may be requeued, and the
+# same script may be run again. Further options of sbatch: SBATCH_OPTIONS="--partition=... --time=...".
+set -euo pipefail
+cd {folder}
+logs={logs}
+mkdir -p "$logs"
+after=""
+
+submit() {{  # NAME COUNT, and a command a line
+  cat > "$logs/$1.commands"
+  after=$(sbatch --parsable --requeue --job-name="$1" --array="1-$2" --output="$logs/$1-%a.log" \\
+    ${{after:+--dependency=afterany:$after}} ${{SBATCH_OPTIONS:-}} \\
+    --wrap "eval \\"\\$(sed -n \\${{SLURM_ARRAY_TASK_ID}}p '$logs/$1.commands')\\"")
+  echo "$1: job $after, $2 tasks"
+}}
+"""
+
+
+def slurm_script(sweep: Sweep) -> str:
+    """A script that submits a whole list of runs, for sites without Snakemake.
+
+    Args:
+        sweep: The list.
+    """
+    phases = sweep.phases()
+    text = _SLURM.format(
+        count=len(phases),
+        jobs=sum(map(len, phases)),
+        folder=shlex.quote(str(Path.cwd())),
+        logs=shlex.quote(str(sweep.folder / ".slurm")),
+    )
+    for number, commands in enumerate(phases, 1):
+        lines = "\n".join(commands)
+        text += f"\nsubmit paramreduce-{number} {len(commands)} <<'COMMANDS'\n{lines}\nCOMMANDS\n"
+    return text
 
 
 FORMATS = {"make": make_rules, "text": outline}

@@ -14,7 +14,8 @@ import paramreduce_cli
 PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
     {"cli", "__main__"},
-    {"workflow", "runner", "sweep"},
+    {"workflow", "runner"},
+    {"sweep"},
     {"pipeline"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},
