@@ -101,6 +101,12 @@ class Sweep:
         """What all runs end with."""
         return [str(run.folder / file_of(Report)) for run in self.runs.values()]
 
+    def table_command(self) -> str:
+        """What sets all runs beside each other, at the shell."""
+        words = [sys.executable, "-m", "paramreduce_cli", "table"]
+        words += [str(run.folder) for run in self.runs.values()]
+        return shlex.join([*words, "--output", str(self.folder / "table")])
+
     def shares(self, stage: Stage) -> list[Share]:
         """The jobs that a stage is done as; none where it is one."""
         count = self.parts.get(stage.name, 1) if stage.in_shares else 1
@@ -132,7 +138,7 @@ class Sweep:
                 text = run.command(stage, jobs="${SLURM_CPUS_PER_TASK:-1}")
                 waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
         close()
-        return [commands for commands in found if commands]
+        return [*(commands for commands in found if commands), [self.table_command()]]
 
 
 def load_sweep(path: Path) -> Sweep:

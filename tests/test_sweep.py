@@ -1,13 +1,11 @@
 """Lists of runs, and the commands that they stand for."""
 
-import os
 import shlex
-import subprocess
 from pathlib import Path
 
-import h5py
 import pytest
-from conftest import CONFIGS, ONE_FORMAT, TWO_LINK
+from cluster.scripted import scheduled
+from conftest import CONFIGS, TWO_LINK
 
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import pipeline
@@ -81,52 +79,21 @@ def test_lists_that_cannot_be(tmp_path, text, says):
         load_sweep(listed(tmp_path, text))
 
 
-_SBATCH = """#!/usr/bin/env bash
-echo "$@" >> {folder}/calls
-for word; do
-  case "$word" in
-    --array=1-*) count=${{word#--array=1-}};;
-    --wrap) ;;
-    *) command="$word";;
-  esac
-done
-for task in $(seq "$count"); do SLURM_ARRAY_TASK_ID=$task bash -c "$command"; done
-wc -l < {folder}/calls
-"""
-"""Does what it is given at once, and counts."""
-
-
-def scheduled(folder, text):
-    """Run a script with this sbatch; returns the calls of it."""
-    (folder / "bin").mkdir(exist_ok=True)
-    sbatch = folder / "bin" / "sbatch"
-    sbatch.write_text(_SBATCH.format(folder=folder))
-    sbatch.chmod(0o755)
-    (folder / "sweep.sh").write_text(text)
-    environment = {**os.environ, "PATH": f"{folder / 'bin'}:{os.environ['PATH']}"}
-    subprocess.run(
-        ["bash", folder / "sweep.sh"], check=True, env=environment, stdout=subprocess.DEVNULL
-    )
-    return (folder / "calls").read_text().splitlines()
-
-
-def test_a_script_for_slurm_makes_what_a_plain_run_makes(tmp_path, two_link_results, invoke):
-    path = listed(
-        tmp_path, f"robots: [{TWO_LINK}]\nvariants: {{a: ['{ONE_FORMAT}']}}\nresults: r\n"
-        "parts: {optimize-trajectories: 2, reduce: 3}\n",
-    )  # fmt: skip
-    text = invoke("graph", "--format", "slurm", "--sweep", path).out
-    calls = scheduled(tmp_path, text)
-    assert len(calls) == 5
-    assert ["--dependency" in call for call in calls] == [False, True, True, True, True]
-    folder = tmp_path / "r" / "two_link-a"
-    for name in ("trajectories.h5", "samples.h5", "reduction.h5", "validation.h5"):
-        with h5py.File(folder / name) as one, h5py.File(two_link_results / name) as other:
-            assert one.attrs["digest"] == other.attrs["digest"]
-    before = {path: path.read_bytes() for path in folder.glob("*.h5")}
-    scheduled(tmp_path, text)
-    assert {path: path.read_bytes() for path in folder.glob("*.h5")} == before
-    assert not list(folder.glob("*.parts"))
+def test_a_script_for_slurm_submits_phases_that_wait_for_each_other(tmp_path):
+    path = listed(tmp_path, f"robots: [{TWO_LINK}]\nresults: r\nparts: {{sample: 2, reduce: 3}}\n")
+    calls = scheduled(tmp_path, slurm_script(load_sweep(path)), run=False)
+    assert ["--dependency=afterany:" in call for call in calls] == [
+        False,
+        True,
+        True,
+        True,
+        True,
+        True,
+    ]
+    assert ["--array=1-2" in call for call in calls] == [False, True, False, False, False, False]
+    assert all("--requeue" in call for call in calls)
+    lines = (tmp_path / "r" / ".slurm" / "paramreduce-4.commands").read_text().splitlines()
+    assert [line.split()[-4] for line in lines] == ["1/3", "2/3", "3/3"]
 
 
 def test_a_thousand_parts_take_few_calls(tmp_path):
@@ -138,5 +105,5 @@ def test_a_thousand_parts_take_few_calls(tmp_path):
         )
     )  # fmt: skip
     text = slurm_script(sweep)
-    assert text.count("\nsubmit ") == 7
-    assert [len(phase) for phase in sweep.phases()] == [4, 1000, 4, 1000, 4, 1000, 4]
+    assert text.count("\nsubmit ") == 8
+    assert [len(phase) for phase in sweep.phases()] == [4, 1000, 4, 1000, 4, 1000, 4, 1]

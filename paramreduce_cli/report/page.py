@@ -1,7 +1,7 @@
 """The self-contained page for people."""
 
 import base64
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
 from typing import Any
@@ -59,8 +59,27 @@ def render_page(
         for section in PageSection
         if items[section]
     ]
-    text = resources.files("paramreduce_cli.report").joinpath("page.html").read_text("utf-8")
-    return environment.from_string(text).render(title=data.title, sections=sections, **context)
+    page = environment.from_string(_text("page.html"))
+    return page.render(title=data.title, style=_text("page.css"), sections=sections, **context)
+
+
+def render_sweep(title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table]) -> str:
+    """Many runs as one HTML page.
+
+    Args:
+        title: Its heading.
+        records: Of the runs.
+        tables: What is shown of them.
+    """
+    environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
+    robots = list(dict.fromkeys(record["robot"] for record in records))
+    return environment.from_string(_text("sweep.html")).render(
+        title=title, style=_text("page.css"), count=len(records), robots=robots, tables=tables
+    )
+
+
+def _text(name: str) -> str:
+    return resources.files("paramreduce_cli.report").joinpath(name).read_text("utf-8")
 
 
 def _items(

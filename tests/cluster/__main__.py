@@ -9,6 +9,7 @@ from pathlib import Path
 import rich.console
 import rich.table
 
+from tests.cluster.scripted import scheduled, script_of
 from tests.cluster.slurm import Slurm, missing
 from tests.cluster.sweeps import (
     ROBOTS,
@@ -54,6 +55,11 @@ def main():
         listed, results = fresh("local")
         subprocess.run(command(listed), check=True, stdout=subprocess.DEVNULL)
         tell("Snakemake on this machine", results, expected)
+        listed, results = fresh("script")
+        text = script_of(listed)
+        for again in ("", ", and again"):
+            calls = len(scheduled(listed.parent, text))
+            tell(f"script for sbatch, {calls} calls{again}", results, expected)
         if given.kills:
             lost += kills(fresh, given, expected, tell)
         if not given.without_slurm:
