@@ -130,8 +130,9 @@ class StoredSet:
                     raise ArtifactError(
                         f"{path}: /{name}/q, dq and ddq must have one shape, (n_samples, n_q)."
                     )
-            for key in ("time", "trajectory"):
-                self._column(reader, key)
+            self._column(reader, "time")
+            self.first = int(self._column(reader, "trajectory")[0])
+            """Number of its first trajectory."""
 
     def _check_matrix(self, W: tuple[int, ...], tau: tuple[int, ...], n_parameters: int) -> None:
         place = f"{self._path}: /{self._name}/"

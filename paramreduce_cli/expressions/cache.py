@@ -5,6 +5,7 @@ A library is kept with its SHA-256 behind it, which a loader of programs does no
 
 import hashlib
 import os
+import platform
 import stat
 import tempfile
 import time
@@ -44,6 +45,21 @@ def cache_folder() -> Path:
         )
         return Path(_temporary_folder().name)
     return folder
+
+
+@cache
+def machine_type() -> str:
+    """What a library that is compiled for the machine at hand runs on: its architecture and what its processor can do.
+
+    So machines that share a folder take none that would stop them.
+    """
+    able = platform.processor()
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
+        able = next(line for line in lines if line.startswith(("flags", "Features")))
+    except (OSError, StopIteration):
+        pass
+    return "\n".join([platform.system(), platform.machine(), *platform.libc_ver(), able])
 
 
 def _wanted_folder() -> Path:

@@ -21,7 +21,7 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.expressions.cache import cache_folder, keep, kept
+from paramreduce_cli.expressions.cache import cache_folder, keep, kept, machine_type
 from paramreduce_cli.records import FloatArray
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
@@ -143,7 +143,7 @@ def load(text: str) -> ctypes.CDLL | None:
     if cc is None:
         return None
     digest = hashlib.sha256(
-        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version()]).encode()
+        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version(), machine_type()]).encode()
     ).hexdigest()
     library = cache_folder() / f"{digest[:32]}.so"
     try:

@@ -10,6 +10,10 @@ from paramreduce_cli.records import Block, FloatArray, SampleSet
 class StoredStates(SampleSet, Protocol):
     """A stored set that gives its states alone too."""
 
+    @property
+    def first(self) -> int:
+        """Number of its first trajectory."""
+
     def states(self) -> Iterator[Block]:
         """Yield the samples in order, with observation matrices of no rows."""
 
@@ -22,6 +26,7 @@ class JoinedSet:
     """
 
     recomputable = True
+    first = 0
 
     def __init__(self, parts: Sequence[StoredStates]) -> None:
         self._parts = parts
@@ -43,4 +48,4 @@ class JoinedSet:
 
     def factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint, from those of the parts."""
-        return joined_factors(part.factors() for part in self._parts)
+        return joined_factors((part.first, part.factors()) for part in self._parts)

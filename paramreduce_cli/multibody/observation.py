@@ -137,7 +137,7 @@ class FactorAccumulator:
     """Collects the triangular factors of blocks as they pass by."""
 
     def __init__(self) -> None:
-        self._factors: list[list[FloatArray]] = []
+        self._factors: dict[int, list[FloatArray]] = {}
         self._waiting: list[Block] = []
 
     def add(self, block: Block) -> None:
@@ -151,9 +151,7 @@ class FactorAccumulator:
     def _factorise(self) -> None:
         first = self._waiting[0]
         n_dof, n = first.tau.shape[1], first.W.shape[1]
-        while len(self._factors) <= first.trajectory:
-            self._factors.append([np.zeros((0, n + 1))] * n_dof)
-        factors = self._factors[first.trajectory]
+        factors = self._factors.setdefault(first.trajectory, [np.zeros((0, n + 1))] * n_dof)
         W = [block.W.reshape(-1, n_dof, n) for block in self._waiting]
         for j, factor in enumerate(factors):
             new = [
@@ -164,12 +162,19 @@ class FactorAccumulator:
         self._waiting = []
 
     def result(self) -> FloatArray:
-        """(n_trajectories, n_dof, n + 1, n + 1), padded with zero rows; without trajectories for no blocks."""
+        """(n_trajectories, n_dof, n + 1, n + 1) from the first trajectory that there is to the last, padded with zero
+        rows; without trajectories for no blocks.
+        """
         if self._waiting:
             self._factorise()
         if not self._factors:
             return np.zeros((0, 0, 0, 0))
-        return np.array([[_square(factor) for factor in factors] for factors in self._factors])
+        some = next(iter(self._factors.values()))
+        none = [np.zeros((0, factor.shape[1])) for factor in some]
+        numbers = range(min(self._factors), max(self._factors) + 1)
+        return np.array(
+            [[_square(factor) for factor in self._factors.get(k, none)] for k in numbers]
+        )
 
 
 def joint_factors(blocks: Iterable[Block]) -> FloatArray:
@@ -184,26 +189,29 @@ def joint_factors(blocks: Iterable[Block]) -> FloatArray:
     return accumulator.result()
 
 
-def joined_factors(parts: Iterable[FloatArray]) -> FloatArray:
+def joined_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
     """Triangular factors of all rows, from those of parts of them.
 
     Args:
-        parts: Of consecutive parts of the samples, (n_trajectories, n_dof, k, k) each, where later trajectories
-            may be missing.
+        parts: Of consecutive parts of the samples: the number of the first trajectory in it, and the factors from
+            that one on, (n_trajectories, n_dof, k, k).
 
     Returns:
         (n_trajectories, n_dof, k, k); what only one part holds is what it was there.
     """
-    found = [part for part in parts if part.size]
-    if not found:
-        return np.zeros((0, 0, 0, 0))
-    _, n_dof, k, _ = found[0].shape
-    result = np.zeros((max(part.shape[0] for part in found), n_dof, k, k))
-    for part in found:
-        for own, more in zip(result, part, strict=False):
-            for j in np.flatnonzero(more.any(axis=(1, 2))):
-                own[j] = _square(np.vstack([own[j], more[j]])) if own[j].any() else more[j]
-    return result
+    found: dict[int, FloatArray] = {}
+    for first, factors in parts:
+        for number, more in enumerate(factors, first):
+            own = found.get(number)
+            if own is None:
+                found[number] = more
+            else:
+                found[number] = np.array(
+                    [_square(np.vstack(rows)) for rows in zip(own, more, strict=True)]
+                )
+    return (
+        np.array([found[number] for number in sorted(found)]) if found else np.zeros((0, 0, 0, 0))
+    )
 
 
 def append_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:

@@ -18,6 +18,7 @@ from tests.cluster.sweeps import (
     killed_at_random,
     plain_runs,
     random_generator,
+    started_at_once,
     write_list,
 )
 
@@ -31,6 +32,7 @@ def main():
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0, help="Of the kills.")
+    parser.add_argument("--starts", type=int, default=100, help="At once, with an empty cache.")
     parser.add_argument("--without-slurm", action="store_true")
     given = parser.parse_args()
     robots = ROBOTS[: given.robots]
@@ -60,6 +62,14 @@ def main():
         for again in ("", ", and again"):
             calls = len(scheduled(listed.parent, text))
             tell(f"script for sbatch, {calls} calls{again}", results, expected)
+        wrong = started_at_once(folder, given.starts)
+        lost += wrong
+        table.add_row(
+            f"{given.starts} starts at once, empty cache",
+            str(given.starts),
+            str(given.starts - wrong),
+            "",
+        )
         if given.kills:
             lost += kills(fresh, given, expected, tell)
         if not given.without_slurm:

@@ -135,6 +135,23 @@ def _wait_for_jobs(pids, limit=120):
         time.sleep(0.2)
 
 
+def started_at_once(folder, count):
+    """Start many jobs together that share an empty cache; returns how many of them fail or differ."""
+    environment = {**os.environ, "PARAMREDUCE_CACHE": str(folder / "cache")}
+    config = ROOT / "configs" / "two_link.yaml"
+    words = [sys.executable, "-m", "paramreduce_cli", "build-model", str(config), "--quiet"]
+    jobs = [
+        subprocess.Popen([*words, "--results", str(folder / "starts" / str(k))], env=environment)
+        for k in range(count)
+    ]
+    failed = sum(job.wait() != 0 for job in jobs)
+    found = set()
+    for path in (folder / "starts").glob("*/model.h5"):
+        with h5py.File(path) as file:
+            found.add(file.attrs["digest"])
+    return failed + len(found) - 1
+
+
 def random_generator(seed):
     """For moments and victims."""
     return random.Random(seed)
