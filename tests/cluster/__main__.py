@@ -33,7 +33,10 @@ def main():
     parser.add_argument("--kills", type=int, default=50)
     parser.add_argument("--seed", type=int, default=0, help="Of the kills.")
     parser.add_argument("--starts", type=int, default=100, help="At once, with an empty cache.")
-    parser.add_argument("--without-slurm", action="store_true")
+    parser.add_argument(
+        "--slurm", choices=["no", "script", "all"], default="all",
+        help="On a Slurm of one node: nothing, the script alone, or Snakemake too.",
+    )  # fmt: skip
     given = parser.parse_args()
     robots = ROBOTS[: given.robots]
     table = rich.table.Table("what", "runs", "equal to plain runs", "otherwise")
@@ -72,8 +75,8 @@ def main():
         )
         if given.kills:
             lost += kills(fresh, given, expected, tell)
-        if not given.without_slurm:
-            lost += on_slurm(folder, fresh, expected, tell, table)
+        if given.slurm != "no":
+            lost += on_slurm(folder, fresh, given.slurm == "all", tell_of(tell, expected), table)
     rich.console.Console(width=110).print(table)
     sys.exit(lost > 0)
 
@@ -97,36 +100,47 @@ def kills(fresh, given, expected, tell):
     return failed
 
 
-def on_slurm(folder, fresh, expected, tell, table):
+def on_slurm(folder, fresh, whole, tell, table):
     """The same on a Slurm of one node, whose controller is killed on the way."""
     needed = missing()
     if needed:
         table.add_row(f"Slurm: left out, {needed} is not there", "", "", "")
         return 0
-    listed, results = fresh("slurm")
     slurm = Slurm(folder / "daemons")
     try:
-        words = command(
-            listed, "slurm", slurm_status_command="squeue", slurm_init_seconds_before_status_checks=5,
-            latency_wait=20,
-        )  # fmt: skip
-        words.insert(words.index("--quiet"), "--slurm-no-account")
-        with (listed.parent / "snakemake.log").open("w") as log:
-            process = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
-            try:
-                process.wait(timeout=45)
-            except subprocess.TimeoutExpired:
-                slurm.controller.kill()
-                slurm.controller.wait()
-                slurm.start_controller()
-            process.wait()
-        if process.returncode != 0:
-            print((listed.parent / "snakemake.log").read_text()[-3000:])
-            return 1
-        tell("Snakemake on a Slurm of one node, controller killed once", results, expected)
-        return 0
+        listed, results = fresh("slurm-script")
+        (listed.parent / "sweep.sh").write_text(script_of(listed))
+        slurm.run("bash", listed.parent / "sweep.sh")
+        slurm.kill_controller(after=10)
+        slurm.wait_until_idle()
+        tell("script on a Slurm of one node, controller killed once", results)
+        return snakemake_on(slurm, fresh, tell) if whole else 0
     finally:
         slurm.stop()
+
+
+def snakemake_on(slurm, fresh, tell):
+    """Snakemake's jobs on this Slurm."""
+    listed, results = fresh("slurm")
+    words = command(
+        listed, "slurm", slurm_status_command="squeue", slurm_init_seconds_before_status_checks=5,
+        latency_wait=20,
+    )  # fmt: skip
+    words.insert(words.index("--quiet"), "--slurm-no-account")
+    with (listed.parent / "snakemake.log").open("w") as log:
+        process = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
+        slurm.kill_controller(after=45)
+        process.wait()
+    if process.returncode != 0:
+        print((listed.parent / "snakemake.log").read_text()[-3000:])
+        return 1
+    tell("Snakemake on a Slurm of one node, controller killed once", results)
+    return 0
+
+
+def tell_of(tell, expected):
+    """The same for one set of runs."""
+    return lambda what, results: tell(what, results, expected)
 
 
 if __name__ == "__main__":

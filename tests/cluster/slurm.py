@@ -95,6 +95,31 @@ class Slurm:
         """Start the controller, or start it again."""
         self.controller = self._started("slurmctld", "-D")
 
+    def kill_controller(self, after):
+        """Kill the controller some seconds from now, and start it again."""
+        time.sleep(after)
+        self.controller.kill()
+        self.controller.wait()
+        self.start_controller()
+
+    def run(self, *words):
+        """Call one of its commands; returns what it prints."""
+        return subprocess.run(
+            list(map(str, words)), env=self.environment, check=True, capture_output=True, text=True
+        ).stdout
+
+    def wait_until_idle(self, limit=1800):
+        """Wait until no job is left."""
+        until = time.monotonic() + limit
+        while time.monotonic() < until:
+            time.sleep(2)
+            try:
+                if not self.run("squeue", "-h").strip():
+                    return
+            except subprocess.CalledProcessError:  # the controller is not there yet
+                continue
+        raise RuntimeError(f"jobs do not end; see {self.folder}")
+
     def _started(self, name, *words):
         with (self.folder / f"{name}.out").open("ab") as out:
             return subprocess.Popen(
