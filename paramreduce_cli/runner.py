@@ -34,6 +34,7 @@ from paramreduce_cli.pipeline import (
     stages_to_run,
 )
 from paramreduce_cli.records import (
+    UNSHARED,
     WHOLE,
     Coefficients,
     Progress,
@@ -151,14 +152,12 @@ class Runner:
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
         inputs = _Inputs(self.config)
-        lent = (Run, stage.output, Share, Shares)
-        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
-        if stage.previous is not None:
-            arguments[stage.previous.name] = previous
+        arguments = self._arguments(stage, inputs)
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
         shares = StoredShares(path)
-        self._hand_shares(stage, arguments, [] if force else self._shares(stage, inputs, shares))
+        found = () if force else self._shares(stage, inputs, shares)
+        self._hand(stage, arguments, {stage.output: previous, Share: WHOLE, Shares: Shares(found)})
         record = _called(stage, arguments)
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
@@ -176,29 +175,29 @@ class Runner:
         stamp = self._stamp(stage, inputs, started)
         if not force and (self.is_current(stage) or shares.is_current(share, stamp)):
             return Outcome(stage.name, path, True, 0.0)
-        lent = (Run, stage.output, Share, Shares)
         inputs = _Inputs(self.config)
-        arguments = {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
-        if stage.previous is not None:
-            arguments[stage.previous.name] = None
+        arguments = self._arguments(stage, inputs)
         self._lend_run(stage, arguments, inputs, frozenset())
-        self._hand_shares(stage, arguments, [], share)
+        self._hand(stage, arguments, {stage.output: None, Share: share, Shares: UNSHARED})
         record = _called(stage, arguments)
         self.store.save(record, self._stamp(stage, inputs, started), path)
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 
-    def _shares(self, stage: Stage, inputs: _Inputs, shares: StoredShares) -> list[Any]:
+    def _arguments(self, stage: Stage, inputs: _Inputs) -> dict[str, Any]:
+        """What a stage takes from the config and from files, by name."""
+        lent = (Run, stage.output, Share, Shares)
+        return {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
+
+    def _hand(self, stage: Stage, arguments: dict[str, Any], values: dict[type, Any]) -> None:
+        """Add what is lent, by its type, where the stage asks for it."""
+        arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
+
+    def _shares(self, stage: Stage, inputs: _Inputs, shares: StoredShares) -> tuple[Any, ...]:
         """Records of all shares of a stage that were made from the same; none where it is done as a whole."""
         if not stage.in_shares:
-            return []
+            return ()
         paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), stage.name)
-        return [load_file(path, stage.output, self._robot, stage.name)[0] for path in paths]
-
-    def _hand_shares(
-        self, stage: Stage, arguments: dict[str, Any], found: list[Any], share: Share = WHOLE
-    ) -> None:
-        values = {Share: share, Shares: Shares(tuple(found))}
-        arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
+        return tuple(load_file(path, stage.output, self._robot, stage.name)[0] for path in paths)
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""

@@ -10,6 +10,7 @@ from paramreduce_cli.excitation.optimiser import Settings, describe
 from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import (
+    WHOLE,
     Coefficients,
     Constraint,
     FloatArray,
@@ -31,8 +32,8 @@ def optimize_trajectories(
     trajectories: TrajectoriesSection,
     model: Model,
     coefficients: Coefficients | None,
-    share: Share,
     run: Run,
+    share: Share = WHOLE,
 ) -> Trajectories:
     """Find exciting trajectories, or take the Fourier coefficients that the config names.
 

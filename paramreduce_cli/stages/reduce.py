@@ -20,6 +20,8 @@ from paramreduce_cli.multibody.observation import (
 )
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import (
+    UNSHARED,
+    WHOLE,
     Columns,
     CountedDynamics,
     FloatArray,
@@ -56,9 +58,9 @@ def reduce(
     model: Model | None,
     samples: Samples,
     previous: Reduction | None,
-    share: Share,
-    shares: Shares,
     run: Run,
+    share: Share = WHOLE,
+    shares: Shares = UNSHARED,
 ) -> Reduction:
     """Select parameters with each heuristic, for every number of them.
 

@@ -5,12 +5,13 @@ import warnings
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
 from paramreduce_cli.config.schema import InputSection, SamplingSection, SimulationSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
@@ -45,6 +46,8 @@ from paramreduce_cli.records import (
 ComputedSet = ObservedSet | LoggedSet
 StatesAt = Callable[[Span], StateBlock]
 
+_BASES = 128
+"""Spans whose Fourier functions are kept, as all trajectories need them: 40 kB each for five harmonics."""
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
 
@@ -280,14 +283,19 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
     """States of every series, with positions on a finer grid on which loops are followed."""
     times, finer_times = sample_times(period, points), sample_times(period, finer * points)
 
+    @lru_cache(_BASES)
+    def basis(harmonics: int, start: int, stop: int) -> tuple[FourierBasis, FourierBasis | None]:
+        between = finer_times[finer * start : finer * stop]
+        return (
+            fourier_basis(period, harmonics, times[start:stop]),
+            fourier_basis(period, harmonics, between) if finer > 1 else None,
+        )
+
     def at(span: Span) -> StateBlock:
         coefficients = series[span.trajectory]
-        harmonics = (coefficients.shape[1] - 1) // 2
-        start, stop = span.start, span.stop
-        states = fourier_basis(period, harmonics, times[start:stop]).states(coefficients)
-        between = fourier_basis(period, harmonics, finer_times[finer * start : finer * stop])
-        way = between.states(coefficients)[0] if finer > 1 else None
-        return StateBlock(span.trajectory, times[start:stop], *states, way=way)
+        own, between = basis((coefficients.shape[1] - 1) // 2, span.start, span.stop)
+        way = None if between is None else between.states(coefficients)[0]
+        return StateBlock(span.trajectory, own.time, *own.states(coefficients), way=way)
 
     return at
 

@@ -40,6 +40,16 @@ def test_compiled_loop():
     assert len(list(compiled.cache_folder().glob("*.so"))) == 1
 
 
+def test_machines_of_two_kinds_share_a_folder(monkeypatch):
+    """Each takes what was compiled for its own processor."""
+    if compiled.compiler() is None:
+        pytest.skip("there is no C compiler")
+    check(example())
+    monkeypatch.setattr(compiled, "machine_type", lambda: "another processor")
+    check(example())
+    assert len(list(compiled.cache_folder().glob("*.so"))) == 2
+
+
 def test_without_a_compiler_the_result_is_the_same_and_it_is_said_once(monkeypatch):
     monkeypatch.delenv("CC", raising=False)
     monkeypatch.setattr(compiled.shutil, "which", lambda name: None)
