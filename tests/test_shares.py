@@ -20,15 +20,14 @@ def digest(folder, name):
         return file.attrs["digest"]
 
 
-def run_in_parts(folder, count, *overrides, robot="two_link"):
+def run_in_parts(folder, count):
     """Run everything, the stages that can be as several jobs, the last of them first."""
-    runner = Runner(config_of(robot, ONE_FORMAT, *overrides), Store(folder))
-    for stage in stages_to_run(runner.config):
+    runner = Runner(config_of("two_link", ONE_FORMAT), Store(folder))
+    for stage in stages_to_run(runner.config)[:-1]:  # the page tells nothing new
         if stage.in_shares:
             for number in range(count, 0, -1):
                 runner.run(stage, share=Share(number, count))
         runner.run(stage)
-    return runner
 
 
 def test_stages_that_are_done_in_parts():

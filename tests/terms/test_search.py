@@ -101,8 +101,7 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
     assert expected <= 0.1
 
 
-@pytest.mark.parametrize("budget", [2.0, 4.0])
-def test_nothing_leaner_can_be_had_on_a_small_arm(arm, budget):
+def test_nothing_leaner_can_be_had_on_a_small_arm(arm):
     """All ways to leave addends out of the inverse dynamics are tried."""
     base = base_model(arm)
     kept = ["Izz_upper", "mx_upper", "Izz_fore", "mx_fore"]
@@ -114,7 +113,7 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, budget):
     reduced = ReducedModel(tuple(kept), values, position)
     whole, *_ = fitting_of(arm, False, Budget(1.0, np.inf), 25, reduced)
     error = whole.fit(whole.tape.everything(), values).torque_error
-    fitting, *_ = fitting_of(arm, False, Budget(budget * error, np.inf), 25, reduced)
+    fitting, *_ = fitting_of(arm, False, Budget(4 * error, np.inf), 25, reduced)
 
     tape = fitting.tape
     sums = sorted({k for k, what in tape.candidates().tolist() if what < 2})
