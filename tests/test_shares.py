@@ -72,9 +72,6 @@ def test_parts_of_one_recording(two_link_results, tmp_path):
     path = runner.store.path(Samples)
     with h5py.File(path) as file:
         whole = {name: file[f"estimation/{name}"][:] for name in ("W", "tau", "factors", "time")}
-    for number in range(1, 5):
-        runner.run(STAGES["sample"], share=Share(number, 4))
-    runner.run(STAGES["sample"], force=False)
     path.unlink()
     for number in range(1, 5):
         runner.run(STAGES["sample"], share=Share(number, 4))
