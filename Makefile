@@ -67,7 +67,8 @@ sweep: $(VENV)/.installed-sweep
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/snakemake --snakefile pipelines/Snakefile --quiet rules \
 	  --profile pipelines/profiles/$(PROFILE) --config sweep=$(SWEEP)
 
-# Everything takes half an hour; with Debian's slurm-wlm and munge, and as root, on a Slurm of its own too.
+# Everything takes more than an hour, CLUSTER="--robots 1 --seeds 3" half of one; with Debian's
+# slurm-wlm and munge, and as root, on a Slurm of its own too.
 CLUSTER ?=
 
 test-cluster: $(VENV)/.installed-sweep $(VENV)/.installed-dev

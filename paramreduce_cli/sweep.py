@@ -112,11 +112,14 @@ class Sweep:
         count = self.parts.get(stage.name, 1) if stage.in_shares else 1
         return [Share(number, count) for number in range(1, count + 1)] if count > 1 else []
 
-    def phases(self) -> list[list[str]]:
+    def phases(self, jobs: str) -> list[list[str]]:
         """Commands that can run side by side, in phases of which each waits for the one before.
 
         What needs no other job than its own run is one command; so there are no more than two phases for
-        every stage that is done as several jobs, and one.
+        every stage that is done as several jobs, and two.
+
+        Args:
+            jobs: How many processes a stage may have, as the shell is to understand it.
         """
         found: list[list[str]] = []
         waiting: dict[str, list[str]] = {name: [] for name in self.runs}
@@ -135,7 +138,7 @@ class Sweep:
                     [run.command(stage, share, "1") for run in having.values() for share in shares]
                 )
             for name, run in having.items():
-                text = run.command(stage, jobs="${SLURM_CPUS_PER_TASK:-1}")
+                text = run.command(stage, jobs=jobs)
                 waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
         close()
         return [*(commands for commands in found if commands), [self.table_command()]]

@@ -92,7 +92,7 @@ def slurm_script(sweep: Sweep) -> str:
     Args:
         sweep: The list.
     """
-    phases = sweep.phases()
+    phases = sweep.phases("${SLURM_CPUS_PER_TASK:-1}")
     text = _SLURM.format(
         count=len(phases),
         jobs=sum(map(len, phases)),

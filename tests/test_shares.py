@@ -135,7 +135,7 @@ def test_parts_of_another_config_are_of_no_concern(sampled, tmp_path):
     assert not folder.exists()
 
 
-def test_proofs_of_parts_are_those_of_their_sizes(two_link_results, tmp_path):
+def test_proofs_of_parts_are_those_of_their_sizes(tmp_path):
     """Each part proves its own sizes alone; together all are proven."""
     runner = Runner(config_of("two_link"), Store(tmp_path))
     for name in ("build-model", "optimize-trajectories", "sample"):

@@ -106,4 +106,4 @@ def test_a_thousand_parts_take_few_calls(tmp_path):
     )  # fmt: skip
     text = slurm_script(sweep)
     assert text.count("\nsubmit ") == 8
-    assert [len(phase) for phase in sweep.phases()] == [4, 1000, 4, 1000, 4, 1000, 4, 1]
+    assert [len(phase) for phase in sweep.phases("1")] == [4, 1000, 4, 1000, 4, 1000, 4, 1]

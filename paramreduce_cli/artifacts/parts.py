@@ -11,6 +11,9 @@ from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp, reading, write
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Share, Trajectory
 
+_SHARE = "share-"
+"""What names of their files begin with."""
+
 
 class Parts(MutableMapping[str, Trajectory]):
     """Finished trajectories of an artifact that is not whole yet, a file each.
@@ -56,7 +59,7 @@ class Parts(MutableMapping[str, Trajectory]):
 
     def __iter__(self) -> Iterator[str]:
         names = (path.stem for path in self._folder.glob("*.h5"))
-        return iter(sorted(name for name in names if not name.startswith("share-")))
+        return iter(sorted(name for name in names if not name.startswith(_SHARE)))
 
     def __len__(self) -> int:
         return sum(1 for _ in self)
@@ -77,12 +80,11 @@ class StoredShares:
     """
 
     def __init__(self, path: Path) -> None:
-        self._artifact = path
         self.folder = path.with_name(f"{path.name}{SHARES}")
 
     def path(self, share: Share) -> Path:
         """Where a share is kept."""
-        return self.folder / f"share-{share.number:04d}-of-{share.count:04d}.h5"
+        return self.folder / f"{_SHARE}{share.number:04d}-of-{share.count:04d}.h5"
 
     def is_current(self, share: Share, stamp: Stamp) -> bool:
         """Whether a share was made from just this, and is whole."""
@@ -108,7 +110,7 @@ class StoredShares:
             ArtifactError: Some are missing or damaged.
         """
         counts: dict[int, int] = {}
-        for path in self.folder.glob("share-*-of-*.h5"):
+        for path in self.folder.glob(f"{_SHARE}*-of-*.h5"):
             number = int(path.stem.rpartition("-")[2])
             counts[number] = max(counts.get(number, 0), path.stat().st_mtime_ns)
         for count in sorted(counts, key=lambda n: -counts[n]):
@@ -128,7 +130,7 @@ class StoredShares:
 
     def clear(self) -> None:
         """Remove all shares, what was left of killed jobs, and the folder if nothing else is in it."""
-        for path in [*self.folder.glob("share-*"), *self.folder.glob(".*")]:
+        for path in [*self.folder.glob(f"{_SHARE}*"), *self.folder.glob(".*")]:
             path.unlink(missing_ok=True)
         with contextlib.suppress(OSError):
             self.folder.rmdir()

@@ -218,7 +218,7 @@ class Program:
             inputs: One per position, all of one shape or scalar; in their precision all is calculated.
         """
         values: list[FloatArray] = []
-        precision = np.result_type(*inputs) if len(inputs) else np.float64
+        precision = np.result_type(np.float32, *inputs)
         for operation, operands, number in self.nodes:
             if operation == "constant":
                 value = np.array(number, precision)

@@ -1,6 +1,7 @@
 """Sweeps through Snakemake here and on a Slurm of its own, and with kills, against plain runs."""
 
 import argparse
+import random
 import subprocess
 import sys
 import tempfile
@@ -17,7 +18,6 @@ from tests.cluster.sweeps import (
     different,
     killed_at_random,
     plain_runs,
-    random_generator,
     started_at_once,
     write_list,
 )
@@ -76,14 +76,14 @@ def main():
         if given.kills:
             lost += kills(fresh, given, expected, tell)
         if given.slurm != "no":
-            lost += on_slurm(folder, fresh, given.slurm == "all", tell_of(tell, expected), table)
+            lost += on_slurm(folder, fresh, given.slurm == "all", expected, tell, table)
     rich.console.Console(width=110).print(table)
     sys.exit(lost > 0)
 
 
 def kills(fresh, given, expected, tell):
     """Kill a job, Snakemake or everything; then the same command again, until all is done."""
-    rng = random_generator(given.seed)
+    rng = random.Random(given.seed)
     failed = count = sweeps = 0
     while count < given.kills:
         listed, results = fresh(f"killed-{sweeps}")
@@ -91,7 +91,8 @@ def kills(fresh, given, expected, tell):
         words = command(listed)
         # A sweep is killed a few times before it is left to end.
         for _ in range(min(5, given.kills - count)):
-            killed_at_random(words, listed.parent, _LONGEST, rng)
+            if not killed_at_random(words, listed.parent, _LONGEST, rng):
+                break
             count += 1
         with (listed.parent / "last.log").open("w") as log:
             done = subprocess.run(words, stdout=log, stderr=log, check=False)
@@ -100,7 +101,7 @@ def kills(fresh, given, expected, tell):
     return failed
 
 
-def on_slurm(folder, fresh, whole, tell, table):
+def on_slurm(folder, fresh, whole, expected, tell, table):
     """The same on a Slurm of one node, whose controller is killed on the way."""
     needed = missing()
     if needed:
@@ -113,13 +114,13 @@ def on_slurm(folder, fresh, whole, tell, table):
         slurm.run("bash", listed.parent / "sweep.sh")
         slurm.kill_controller(after=10)
         slurm.wait_until_idle()
-        tell("script on a Slurm of one node, controller killed once", results)
-        return snakemake_on(slurm, fresh, tell) if whole else 0
+        tell("script on a Slurm of one node, controller killed once", results, expected)
+        return snakemake_on(slurm, fresh, expected, tell) if whole else 0
     finally:
         slurm.stop()
 
 
-def snakemake_on(slurm, fresh, tell):
+def snakemake_on(slurm, fresh, expected, tell):
     """Snakemake's jobs on this Slurm."""
     listed, results = fresh("slurm")
     words = command(
@@ -134,13 +135,8 @@ def snakemake_on(slurm, fresh, tell):
     if process.returncode != 0:
         print((listed.parent / "snakemake.log").read_text()[-3000:])
         return 1
-    tell("Snakemake on a Slurm of one node, controller killed once", results)
+    tell("Snakemake on a Slurm of one node, controller killed once", results, expected)
     return 0
-
-
-def tell_of(tell, expected):
-    """The same for one set of runs."""
-    return lambda what, results: tell(what, results, expected)
 
 
 if __name__ == "__main__":

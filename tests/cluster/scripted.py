@@ -21,16 +21,8 @@ wc -l < {folder}/calls
 
 def script_of(listed):
     """What is printed for a list of runs."""
-    words = [
-        sys.executable,
-        "-m",
-        "paramreduce_cli",
-        "graph",
-        "--format",
-        "slurm",
-        "--sweep",
-        listed,
-    ]
+    words = [sys.executable, "-m", "paramreduce_cli", "graph"]
+    words += ["--format", "slurm", "--sweep", listed]
     return subprocess.run(words, check=True, capture_output=True, text=True).stdout
 
 

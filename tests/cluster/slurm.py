@@ -10,7 +10,7 @@ from pathlib import Path
 
 _CONFIGURATION = Path("/etc/slurm/slurm.conf")
 """Where Slurm looks: Snakemake takes all of its variables out of the environment of jobs."""
-_NEEDED = ("slurmctld", "slurmd", "munged", "sbatch", "squeue", "scancel")
+_NEEDED = ("slurmctld", "slurmd", "munged", "sbatch", "squeue", "sinfo")
 _CONF = """
 ClusterName=test
 SlurmctldHost={host}

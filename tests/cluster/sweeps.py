@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import random
 import signal
 import subprocess
 import sys
@@ -82,10 +81,12 @@ def different(found, expected):
 
 
 def killed_at_random(words, folder, longest, rng):
-    """Start a sweep and kill it, or one of its jobs, at a random moment; says which."""
+    """Start a sweep and kill it, or one of its jobs, at a random moment; False where it ended before."""
     with (folder / "killed.log").open("a") as log:
         process = subprocess.Popen(words, stdout=log, stderr=log, start_new_session=True)
-        time.sleep(rng.uniform(0, longest))
+        with contextlib.suppress(subprocess.TimeoutExpired):
+            process.wait(rng.uniform(0, longest))
+            return False
         below = _below(process.pid)
         jobs = [
             pid for pid, text in below.items() if "paramreduce" in text and "snakemake" not in text
@@ -104,7 +105,7 @@ def killed_at_random(words, folder, longest, rng):
             process.poll()
             _wait_for_jobs(below)
             process.wait()
-    return victim
+    return True
 
 
 def _kill(pid):
@@ -150,8 +151,3 @@ def started_at_once(folder, count):
         with h5py.File(path) as file:
             found.add(file.attrs["digest"])
     return failed + len(found) - 1
-
-
-def random_generator(seed):
-    """For moments and victims."""
-    return random.Random(seed)

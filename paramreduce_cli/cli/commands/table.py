@@ -28,7 +28,7 @@ def table(results: tuple[Path, ...], output: Path | None, parquet: bool) -> None
     full one; of several runs of a robot how they spread, and which parameters all of them select.
     PREFIX-runs.csv has a row of numbers for every run.
 
-    Example: paramreduce table results/sweep/*
+    Example: paramreduce table results/sweep/*/
     """
     rows, records = [], []
     for path in results:
