@@ -112,6 +112,7 @@ class Runner:
         settings: What is asked where there is no config.
         remark: Told of things the user should know.
         interrupted: Told that a stage has met Ctrl-C and ends early, but whole.
+        asked: Config and options that name the run at the shell.
     """
 
     config: Config | None
@@ -122,6 +123,7 @@ class Runner:
     settings: Settings | None = None
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
+    asked: str = ""
 
     def run(
         self, stage: Stage, *, force: bool = False, go_on: bool = False, share: Share = WHOLE
@@ -378,4 +380,5 @@ class Runner:
         asked = self.config or self.settings or Settings()
         text = json.dumps(asked.model_dump(mode="json"), sort_keys=True)
         digest = hashlib.sha256(text.encode()).hexdigest()
-        return Provenance(self._robot, digest, versions(), seconds)
+        changed = asked.model_dump(mode="json", exclude_defaults=True)
+        return Provenance(self._robot, digest, versions(), seconds, self.asked, changed)

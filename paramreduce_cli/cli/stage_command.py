@@ -7,7 +7,17 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import file_of, load_file
-from paramreduce_cli.cli.options import FORCE, JOBS, PART, QUIET, RESULTS, SET, cores, results_store
+from paramreduce_cli.cli.options import (
+    FORCE,
+    JOBS,
+    PART,
+    QUIET,
+    RESULTS,
+    SET,
+    asked,
+    cores,
+    results_store,
+)
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
@@ -51,6 +61,7 @@ def stage_command(name: str) -> click.Command:
                 settings,
                 remark,
                 interruption.heeded,
+                asked(config, results, overrides),
             )
             outcome = runner.run(stage, force=force, go_on=True, share=share or WHOLE)
         if not quiet:

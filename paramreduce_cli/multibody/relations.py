@@ -13,8 +13,8 @@ from paramreduce_cli.records import FloatArray, IntArray
 
 _MATCH = 1e-8
 _IGNORED = 1e-10
-_PRINTED = 1e-6
-"""Share of a sum below which a term does not change its printed digits."""
+_COUNTED = 1e-2
+"""Share of a sum below which its smallest terms are together counted instead of printed."""
 
 Lengths = Mapping[str, float]
 
@@ -94,19 +94,50 @@ def approximate_expressions(
 ) -> list[str]:
     """Approximate base parameters in terms of standard ones, with plain numbers.
 
+    All terms of one stand before the same column of the observation matrix, so that their shares of the
+    value are their shares of the torque: the largest come first, and the smallest are counted.
+
     Args:
         names: Of all parameters, (n,).
         kept: Columns of the approximate base parameters, (n_kept,).
         beta: Coefficients of the others in ascending order, (n_kept, n - n_kept).
-        known: Values of all parameters; terms that do not show in six digits are left out.
+        known: Values of all parameters; without them all terms are printed, in the order of the names.
     """
-    shown = beta
-    if known is not None:
-        others = np.setdiff1d(np.arange(len(names)), kept)
-        parts = np.abs(beta * known[others])
-        whole = np.abs(known[kept]) + parts.sum(axis=1)
-        shown = np.where(parts > _PRINTED * whole[:, None], beta, 0.0)
-    return _expressions(names, kept, shown, lambda i, j: signed_number(float(shown[i, j])))
+
+    def term(i: int, j: int) -> str:
+        return signed_number(float(beta[i, j]))
+
+    if known is None:
+        return _expressions(names, kept, beta, term)
+    others = np.setdiff1d(np.arange(len(names)), kept)
+    parts = np.abs(beta * known[others])
+    wholes = np.abs(known[kept]) + parts.sum(axis=1)
+    shares = parts / np.maximum(wholes, np.finfo(float).tiny)[:, None]
+    return [
+        _largest_first(
+            [f"{term(i, j)} {names[k]}" for j, k in enumerate(others)], own, names[column]
+        )
+        for i, (column, own) in enumerate(zip(kept, shares, strict=True))
+    ]
+
+
+def _largest_first(terms: Sequence[str], shares: FloatArray, first: str) -> str:
+    """A sum whose smallest terms are counted.
+
+    Args:
+        terms: With their signs.
+        shares: Of the whole that they are, (n_terms,).
+        first: What they are added to.
+    """
+    order = np.argsort(-shares, kind="stable")
+    remaining = shares[order][::-1].cumsum()[::-1]
+    printed = int((remaining >= _COUNTED).sum())
+    text = " ".join([first, *(terms[k] for k in order[:printed])])
+    small = int((shares[order[printed:]] > _IGNORED).sum())
+    if not small:
+        return text
+    them = "1 smaller term" if small == 1 else f"{small} smaller terms, together"
+    return f"{text} and {them} {100 * remaining[printed]:.1g} %"
 
 
 def signed_number(value: float) -> str:

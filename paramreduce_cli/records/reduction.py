@@ -217,9 +217,10 @@ class Reduction:
         return self.proofs is not None and ProofStatus.BEST_FOUND in self.proofs.status
 
     def model(self, heuristic: str, row: int) -> ReducedModel:
-        """The model of a heuristic's subset, by the row it stands in."""
+        """The model of a heuristic's subset, by the row it stands in; parameters as in the columns."""
         found = self.heuristics[heuristic]
-        return self.columns.model(found.subsets[row], found.parameters[row])
+        order = np.argsort(found.subsets[row])
+        return self.columns.model(found.subsets[row][order], found.parameters[row][order])
 
 
 @dataclass(frozen=True)

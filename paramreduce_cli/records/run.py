@@ -33,6 +33,10 @@ class Provenance:
     config_sha256: str
     versions: Mapping[str, str]
     seconds: Mapping[str, float]
+    asked: str
+    """The config and options that name the run at the shell; empty where it was not started there."""
+    settings: Mapping[str, Any]
+    """What the config says that is not so by default."""
 
 
 @dataclass(frozen=True)

@@ -92,9 +92,11 @@ def reduced_model(
         reduction: Where it was found.
         heuristic: By which one.
         row: In which it stands.
-        known: Standard parameters, (n_standard,); terms that do not show beside them are left out.
+        known: Standard parameters, (n_standard,), by which terms are ordered and the small ones counted.
     """
     found, columns = reduction.heuristics[heuristic], reduction.columns
     whole = None if known is None else np.linalg.pinv(columns.expansion) @ known
-    expressions = approximate_expressions(columns.names, found.subsets[row], found.beta[row], whole)
+    order = np.argsort(found.subsets[row])
+    kept, beta = found.subsets[row][order], found.beta[row][order]
+    expressions = approximate_expressions(columns.names, kept, beta, whole)
     return replace(reduction.model(heuristic, row), expressions=tuple(expressions))

@@ -1,6 +1,6 @@
 """Everything a figure or a table may show, gathered once."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +18,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.report.skeleton import Skeleton
+from paramreduce_cli.report.skeleton import Animation, Skeleton
 
 
 @dataclass(frozen=True)
@@ -33,6 +33,10 @@ class ShownMotion:
     ddz: FloatArray
     q: FloatArray
     """Generalised coordinates, (n_samples, n_q)."""
+    tau: FloatArray
+    """Torques of the full model or measured ones, (n_samples, n_dof), N m or N."""
+    W: FloatArray
+    """Observation matrix, (n_samples, n_dof, n_parameters)."""
     full: FloatArray
     """Full model, (n_samples, n_dof)."""
     reduced: FloatArray
@@ -51,8 +55,12 @@ class ReportData:
     """How many symmetries complete the estimation set."""
     reduction: Reduction
     validation: Validation
+    rms_torque: Mapping[str, FloatArray]
+    """Root mean square of each joint's torque by set, (n_dof,), N m or N."""
     motion: ShownMotion
     skeletons: tuple[Skeleton, ...]
+    animation: Animation | None
+    """Of the motion, where there is a mechanism."""
     tracking: Tracking | None
     """Where it was asked for."""
     log: MeasuredLog | None
@@ -68,6 +76,20 @@ class ReportData:
         if self.known_model is None:
             return self.reduction.n_affecting
         return int(self.known_model.affecting.sum())
+
+    def unit(self, parameter: int) -> str:
+        """Of a standard parameter; empty for columns that were brought without a robot."""
+        if self.known_model is None:
+            return ""
+        return self.known_model.mechanism.parameters[parameter].unit
+
+    def force_unit(self, joint: int) -> str:
+        """Of what acts on a joint; nothing is known of those that were brought without a robot."""
+        if self.known_model is None:
+            return ""
+        mechanism = self.known_model.mechanism
+        kind = mechanism.bodies[mechanism.independent[joint]].joint
+        return "N m" if kind == "revolute" else "N"
 
     @property
     def model(self) -> Model:
@@ -102,8 +124,8 @@ def first_motion(
     phi = model.standard
     time = np.concatenate([p.time for p in parts])
     timed = bool(np.ptp(time) > 0)
-    full = np.concatenate([p.tau for p in parts])
-    reduced = np.concatenate([(p.W @ phi).reshape(p.tau.shape) for p in parts])
+    tau = np.concatenate([p.tau for p in parts])
+    W = np.concatenate([p.W for p in parts]).reshape(*tau.shape, -1)
     return ShownMotion(
         time=time if timed else np.arange(float(time.size)),
         timed=timed,
@@ -111,6 +133,8 @@ def first_motion(
         dz=np.concatenate([p.dz for p in parts]),
         ddz=np.concatenate([p.ddz for p in parts]),
         q=np.concatenate([p.q for p in parts]),
-        full=full / nominal_torque,
-        reduced=reduced / nominal_torque,
+        tau=tau,
+        W=W,
+        full=tau / nominal_torque,
+        reduced=W @ phi / nominal_torque,
     )

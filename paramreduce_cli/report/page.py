@@ -1,21 +1,49 @@
 """The self-contained page for people."""
 
 import base64
+import importlib.metadata
+import io
+import json
+import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from pathlib import Path
 from typing import Any
 
 import jinja2
 
+from paramreduce_cli.records import Provenance
+from paramreduce_cli.report.answer import answer
 from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.explorer import explorer
 from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.methods import methods
 from paramreduce_cli.report.sections import PageSection, place_of
 from paramreduce_cli.report.table import Table
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import share
 
 _FIGURE_MIME = "image/svg+xml"
+_PLOTTING = ("uplot-python", "uplot/static/uPlot.iife.js", "uplot/static/uPlot.min.css")
+"""The distribution that carries uPlot, its script and its style."""
+
+_SYMBOLS = {
+    "n": "number of parameters of the reduced model",
+    "n_φ": "standard parameters that act on the torques",
+    "r": "base parameters: the rank of the observation matrix",
+    "d": "sums, products and function calls of the inverse dynamics with all parameters",
+    "d, n": "the same with n parameters",
+    "M, δ": "sums, products and function calls of mass matrix and remainder, gravity included, with all parameters",
+    "M, δ, n": "the same with n parameters",
+    "ε_τ E": "weighted torque error on the estimation set, of the torques' norm",
+    "ε_τ V": "weighted torque error on the validation set",
+    "ε_z̈ E": "weighted error of the accelerations on the estimation set",
+    "ε_z̈ V": "weighted error of the accelerations on the validation set",
+    "κ": "condition number of the observation matrix",
+    "φ' value": "value of the parameter, which stands for those that were dropped too",
+}
+"""What headings of tables mean, shown where they stand."""
 
 
 @dataclass(frozen=True)
@@ -35,24 +63,29 @@ def render_page(
     summary: Mapping[str, Any],
     images: Mapping[str, bytes],
     made: Mapping[str, Table],
+    provenance: Provenance,
+    code: Mapping[str, bytes],
 ) -> str:
-    """The report as one HTML page with its figures inside.
+    """The report as one HTML page with its figures and its explorer inside.
 
     Args:
         data: What the report is made from.
         summary: As in summary.json.
         images: SVG of the figures that there are, by name.
         made: Tables by name.
+        provenance: Of the run.
+        code: Files of the selected model as code, by name; empty where there is none.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["percent"] = share
     model = data.known_model
     loops = model is not None and model.mechanism.loops is not None
-    context = {"s": summary, "loops": loops}
+    context = {"s": summary, "loops": loops, "answer": answer(data, provenance.asked)}
     items = _items(images, made)
     sections = [
         {
             "title": section.title,
+            "anchor": section.name.lower(),
             "text": environment.from_string(section.text).render(context),
             "items": items[section],
         }
@@ -60,7 +93,39 @@ def render_page(
         if items[section]
     ]
     page = environment.from_string(_text("page.html"))
-    return page.render(title=data.title, style=_text("page.css"), sections=sections, **context)
+    script, style = _plotting()
+    told, bibtex = methods(data)
+    return page.render(
+        title=data.title,
+        style=style + _text("page.css"),
+        script=script + _text("explorer.js"),
+        # Inside a script nothing may look like the end of it.
+        explored=json.dumps(explorer(data), separators=(",", ":")).replace("<", "\\u003c"),
+        sections=sections,
+        settings=json.dumps(provenance.settings, indent=2, ensure_ascii=False),
+        symbols=_SYMBOLS,
+        methods=told,
+        bibtex=bibtex,
+        code=_archive(code) if code else "",
+        **context,
+    )
+
+
+def _archive(files: Mapping[str, bytes]) -> str:
+    """Files as a ZIP archive in base64, the same whenever it is made."""
+    buffer = io.BytesIO()
+    with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
+        for name, content in files.items():
+            archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
+    return base64.b64encode(buffer.getvalue()).decode()
+
+
+def _plotting() -> tuple[str, str]:
+    """Script and style of uPlot, from where it is installed; to import its package would take a second."""
+    name, *files = _PLOTTING
+    found = importlib.metadata.distribution(name)
+    script, style = (Path(str(found.locate_file(file))).read_text("utf-8") for file in files)
+    return script, style
 
 
 def render_sweep(title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table]) -> str:

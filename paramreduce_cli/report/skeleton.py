@@ -45,6 +45,48 @@ def skeleton(model: Model, q: FloatArray) -> Skeleton:
     )
 
 
+@dataclass(frozen=True)
+class Animation:
+    """A mechanism along a motion, for drawing: points that move, and lines between them."""
+
+    points: FloatArray
+    """In the base frame, NaN where a body has no mass, (n_samples, n_points, 3), m."""
+    lines: tuple[tuple[int, int, int, str], ...]
+    """From point to point, of which body, and as what: link, rail, mass or loop."""
+    owners: tuple[str, ...]
+    """Names of the bodies."""
+
+
+def animation(model: Model, q: FloatArray) -> Animation:
+    """The mechanism at some generalised coordinates, (n_samples, n_q)."""
+    frames = [skeleton(model, row) for row in q]
+    points = [
+        np.vstack([np.zeros((1, 3)), one.joints[:, :3, 3], one.poses[:, :3, 3], one.masses, *one.closures])
+        for one in frames
+    ]  # fmt: skip
+    names = tuple(body.name for body in model.mechanism.bodies)
+    return Animation(np.array(points), tuple(_lines(frames[0])), names)
+
+
+def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
+    """Base first, then frames of joints, of bodies, centres of mass, and points of closures."""
+    count = len(shown.parents)
+    for body, parent in enumerate(shown.parents):
+        before, joint, end = (0 if parent < 0 else 1 + count + parent), 1 + body, 1 + count + body
+        sliding = bool(shown.closures) and shown.kinds[body] != "revolute"
+        if not sliding and (parent >= 0 or not shown.closures):
+            yield before, joint, body, "link"
+        if shown.kinds[body] != "hidden":
+            yield joint, end, body, "rail" if sliding else "link"
+        if body not in shown.parents and np.isfinite(shown.masses[body]).all():
+            yield end, 1 + 2 * count + body, body, "mass"
+    first = 1 + 3 * count
+    for path in shown.closures:
+        for k in range(first, first + len(path) - 1):
+            yield k, k + 1, -1, "loop"
+        first += len(path)
+
+
 def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
     """Centre of mass in the base frame, not a number for a body without mass, (3,), m."""
     whole = np.zeros(4)

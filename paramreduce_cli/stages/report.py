@@ -1,12 +1,16 @@
 """report: figures, tables, the page and summary.json."""
 
+import warnings
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from paramreduce_cli.config.schema import ReportSection, SamplingSection
-from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
+from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.running import RunningModel
+from paramreduce_cli.export.writing import export
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
@@ -29,12 +33,14 @@ from paramreduce_cli.registry import Registry
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.sections import place_of
-from paramreduce_cli.report.skeleton import Skeleton, skeleton
+from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.tracking.demonstration import tracked
 
 _POSES = 3
+_FRAMES = 120
+"""Most poses of the animation."""
 
 
 def report(
@@ -69,8 +75,10 @@ def report(
         symmetries=len(sampling.symmetries),
         reduction=reduction,
         validation=validation,
+        rms_torque=_rms_torque(samples),
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
+        animation=None if model is None else _animation(model, motion),
         tracking=None if model is None else _tracking(section, model, selected, motion),
         log=log,
         identification=identification,
@@ -92,7 +100,9 @@ def report(
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
         files[f"tables/{name}.tex"] = table.to_latex(symbols).encode()
-    files["index.html"] = render_page(data, summary, images, made).encode()
+    files["index.html"] = render_page(
+        data, summary, images, made, provenance, _code(model, reduction, validation)
+    ).encode()
     return Report(summary, files)
 
 
@@ -114,6 +124,31 @@ def _tracking(
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
     controllers = {title: RunningModel(model, chosen) for title, chosen in models.items()}
     return tracked(section.tracking, model, controllers, motion.z, motion.dz)
+
+
+def _code(model: Model | None, reduction: Reduction, validation: Validation) -> Mapping[str, bytes]:
+    """The selected model in C, checked; none without a mechanism."""
+    if model is None:
+        return {}
+    chosen, title = chosen_model(None, model, reduction, validation)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
+        return export(model, chosen, title=title, language="c")
+
+
+def _rms_torque(samples: Samples) -> dict[str, FloatArray]:
+    """By set and joint, N m or N."""
+    sets = {"estimation": samples.estimation, "validation": samples.validation}
+    return {
+        name: np.sqrt((one.factors()[..., -1] ** 2).sum(axis=(0, 2)) / one.n_samples)
+        for name, one in sets.items()
+        if one is not None
+    }
+
+
+def _animation(model: Model, motion: ShownMotion) -> Animation:
+    step = max(1, -(-motion.time.size // _FRAMES))
+    return animation(model, motion.q[::step])
 
 
 def _skeletons(section: ReportSection, model: Model, motion: ShownMotion) -> tuple[Skeleton, ...]:

@@ -29,8 +29,11 @@ def test_what_fits_one_geometry_only_is_no_function_of_it():
     assert name(lambda a, d: a**3) is None
 
 
-def test_parameters_that_are_zero_are_left_out_of_approximate_expressions():
-    beta = np.array([[2.0, -0.5, 0.0]])
-    known = np.array([1, 1, 0, 1.0])
-    texts = approximate_expressions(["p", "q", "r", "s"], np.array([0]), beta, known)
-    assert texts == ["p + 2 q"]
+def test_large_terms_come_first_and_small_ones_are_counted():
+    """Parameters that are zero are not even counted; without values all terms stay in their order."""
+    beta = np.array([[0.001, -0.001, 2.0, -0.5, 3.0, 0.0]])
+    names, kept = ["p", "a", "b", "q", "r", "s", "t"], np.array([0])
+    texts = approximate_expressions(names, kept, beta, np.array([1, 1, 1, 1, 0, 2.0, 1]))
+    assert texts == ["p + 3 s + 2 q and 2 smaller terms, together 0.02 %"]
+    texts = approximate_expressions(names, kept, beta)
+    assert texts == ["p + 0.001 a - 0.001 b + 2 q - 0.5 r + 3 s"]

@@ -36,8 +36,8 @@ def grouped_reduction():
 
 def test_tied_parameters_have_one_value():
     model = grouped_reduction().model("swap", 1)
-    assert model.names == ("d", "a", "both")
-    assert model.position.tolist() == [1, 2, 2, 0]
+    assert model.names == ("a", "both", "d")  # as in the columns, not as they were taken
+    assert model.position.tolist() == [0, 1, 1, 2]
     assert model.standard.tolist() == [5.0, 6.0, 6.0, 4.0]
     assert model.ties == {2: 1}
     assert model.restricted(np.array([True, False, True, True])).ties == {}

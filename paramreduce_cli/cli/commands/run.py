@@ -16,6 +16,7 @@ from paramreduce_cli.cli.options import (
     QUIET,
     RESULTS,
     SET,
+    asked,
     cores,
     results_store,
 )
@@ -68,6 +69,7 @@ def run(
                     None,
                     remark,
                     interruption.heeded,
+                    asked(config, results, overrides),
                 )
                 outcome = runner.run(stage, force=force)
             if not quiet:

@@ -1,0 +1,498 @@
+// The explorer: one state (a curve and a row of it), and everything on the page that follows it.
+(async () => {
+  "use strict";
+  const source = document.getElementById("explorer-data");
+  if (!source || !window.DecompressionStream) return;
+  const data = JSON.parse(source.textContent);
+  const TYPES = { float32: Float32Array, float64: Float64Array, uint32: Uint32Array, uint16: Uint16Array };
+  const root = document.getElementById("explorer");
+  const part = (name) => root.querySelector(`[data-part="${name}"]`);
+  const element = (tag, properties = {}, ...children) => {
+    const made = Object.assign(document.createElement(tag), properties);
+    made.append(...children);
+    return made;
+  };
+  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+
+  // ---- data
+
+  async function unpacked(value) {
+    if (Array.isArray(value)) return Promise.all(value.map(unpacked));
+    if (value === null || typeof value !== "object") return value;
+    if ("data" in value && "type" in value) {
+      const bytes = Uint8Array.from(atob(value.data), (c) => c.charCodeAt(0));
+      const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+      return new TYPES[value.type](await new Response(stream).arrayBuffer());
+    }
+    const entries = Object.entries(value).map(async ([key, one]) => [key, await unpacked(one)]);
+    return Object.fromEntries(await Promise.all(entries));
+  }
+  const { curves, models, motion, figure, joints, columns } = Object.assign(data, {
+    curves: await unpacked(data.curves),
+    models: await unpacked(data.models),
+    motion: await unpacked(data.motion),
+    figure: await unpacked(data.figure),
+  });
+  root.hidden = false;
+  const nSamples = motion.time.length;
+  const nDof = motion.tau.length / nSamples;
+  const SETS = ["estimation", "validation"].filter((s) => curves.some((c) => c.torque[s].some(Number.isFinite)));
+
+  function modelOf(curve, row) {
+    const k = curve.model[row];
+    if (k < 0) return { columns: [], values: [] };
+    const [from, to] = [models.starts[k], models.starts[k + 1]];
+    return { columns: models.columns.subarray(from, to), values: models.values.subarray(from, to) };
+  }
+
+  function torque(model, joint) {
+    const result = new Float64Array(nSamples);
+    for (let t = 0; t < nSamples; t++) {
+      const row = (t * nDof + joint) * columns.length;
+      let sum = 0;
+      for (let k = 0; k < model.columns.length; k++) sum += motion.W[row + model.columns[k]] * model.values[k];
+      result[t] = sum;
+    }
+    return result;
+  }
+
+  function percent(value) {
+    if (!Number.isFinite(value)) return "∞";
+    if (value >= 10) return "> 1000 %";
+    return value < 1e-10 ? "0 %" : `${shortest(100 * value)} %`;
+  }
+  const pair = (errors, row) => SETS.map((s) => percent(errors[s][row])).join(" / ").replace(/ %(?= \/ [\d.]+ %$)/, "");
+  const shortest = (value) => `${Number(value.toPrecision(3))}`;
+
+  // ---- state
+
+  const state = { curve: 0, row: 0, hidden: new Set(), sets: new Set(SETS) };
+  const named = (name) => Math.max(0, curves.findIndex((c) => c.names.includes(name)));
+  const rowOf = (curve, n) => {
+    const all = curves[curve].n;
+    let best = 0;
+    all.forEach((m, k) => { if (Math.abs(m - n) < Math.abs(all[best] - n)) best = k; });
+    return best;
+  };
+  function fromAddress() {
+    const asked = new URLSearchParams(location.hash.slice(1));
+    state.curve = named(asked.get("heuristic") ?? data.selected.heuristic);
+    state.row = rowOf(state.curve, Number(asked.get("n") ?? data.selected.n));
+  }
+  const followers = [];
+  function go(curve, row) {
+    state.curve = curve;
+    state.row = Math.min(Math.max(row, 0), curves[curve].n.length - 1);
+    const own = curves[state.curve];
+    history.replaceState(null, "", `#heuristic=${encodeURIComponent(own.names[0])}&n=${own.n[state.row]}`);
+    follow();
+  }
+  function follow() {
+    const curve = curves[state.curve];
+    const model = modelOf(curve, state.row);
+    for (const follower of followers) follower(curve, state.row, model);
+  }
+
+  // ---- controls and figures in words
+
+  const chosen = part("heuristic");
+  curves.forEach((c, k) => chosen.append(element("option", { value: k, textContent: c.names.join(", ") })));
+  chosen.addEventListener("change", () => go(+chosen.value, rowOf(+chosen.value, curves[state.curve].n[state.row])));
+  const slider = part("n");
+  slider.addEventListener("input", () => go(state.curve, +slider.value));
+  const tolerance = part("tolerance");
+  tolerance.addEventListener("change", () => {
+    const limit = +tolerance.value / 100;
+    const rows = curves[state.curve].n.map((_, k) => k);
+    const kept = rows.find((k) => SETS.every((s) => curves[state.curve].torque[s][k] <= limit));
+    part("no-such").hidden = kept !== undefined;
+    if (kept !== undefined) go(state.curve, kept);
+  });
+  followers.push((curve, row, model) => {
+    chosen.value = state.curve;
+    slider.max = curve.n.length - 1;
+    slider.value = row;
+    slider.setAttribute("aria-valuetext", `${curve.n[row]} parameters`);
+    part("count").textContent = curve.n[row];
+    const others = finders(state.curve, row).filter((name) => !curve.names.includes(name));
+    part("others").textContent = others.length ? `Found by ${others.join(", ")} too.` : "No other heuristic found it.";
+    part("torque").textContent = pair(curve.torque, row);
+    for (const key of ["inverse", "direct"]) {
+      const cell = part(key);
+      if (cell) cell.textContent = curve.operations[key]?.[row] ?? "–";
+    }
+    const acceleration = part("acceleration");
+    if (acceleration) acceleration.textContent = pair(curve.acceleration, row);
+    part("command").textContent = `${root.dataset.command} --model ${curve.names[0]}:${curve.n[row]}`;
+    const values = new Map(Array.from(model.columns, (k, i) => [k, model.values[i]]));
+    columns.forEach((column, k) => {
+      const kept = values.has(k);
+      column.chip.className = kept ? "chip kept" : "chip";
+      const value = kept ? `${column.name} = ${Number(values.get(k).toPrecision(6))} ${column.unit}` : `${column.name}: dropped`;
+      column.chip.title = value;
+    });
+    root.querySelectorAll("[data-joint-error]").forEach((cell) => {
+      const [set, j] = cell.dataset.jointError.split(":");
+      const joint = joints[+j];
+      const share = curve.joints[set][row * nDof + joint.index];
+      cell.textContent = joint.unit ? `${percent(share)}, ${Number((share * joint.rms[set]).toPrecision(2))} ${joint.unit}` : percent(share);
+    });
+  });
+
+  // Parameters by what they belong to.
+  const owners = new Map();
+  for (const column of columns) {
+    if (!owners.has(column.owner)) owners.set(column.owner, []);
+    column.chip = element("span", { textContent: column.symbol });
+    owners.get(column.owner).push(column.chip);
+  }
+  for (const [owner, chips] of owners) {
+    part("parameters").append(element("div", { className: "owner" }, element("b", { textContent: owner }), ...chips));
+  }
+
+  // Errors joint by joint.
+  const errors = part("joints");
+  errors.append(element("thead", {}, element("tr", {}, element("th", { textContent: "joint" }), ...SETS.map((s) => element("th", { textContent: s })))));
+  const body = element("tbody");
+  joints.forEach((joint, j) => {
+    const cells = SETS.map((s) => { const cell = element("td"); cell.dataset.jointError = `${s}:${j}`; return cell; });
+    body.append(element("tr", {}, element("td", { textContent: joint.name }), ...cells));
+  });
+  errors.append(body);
+
+  // ---- charts
+
+  const drawn = [];
+  const axis = (label, more = {}) => ({
+    label, labelSize: 18, labelFont: "12px system-ui", font: "11px system-ui",
+    stroke: () => colour("--soft"), grid: { stroke: () => colour("--line"), width: 1 }, ticks: { stroke: () => colour("--line") }, ...more,
+  });
+  const isPower = (v) => Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6;
+  const powersOnly = (u, ticks) => ticks.map((v) => (isPower(v) ? v : null));
+  const spelled = (v) => (v >= 0.9e-5 ? `${Number((100 * v).toPrecision(3))} %` : `1e${Math.round(Math.log10(v)) + 2} %`);
+  const errorAxis = (label) => {
+    const lines = { stroke: () => colour("--line"), width: 1, filter: powersOnly };
+    return axis(label, { filter: powersOnly, grid: lines, ticks: lines, size: 66, values: (u, ticks) => ticks.map((v) => (v === null ? null : spelled(v))) });
+  };
+  const errorScale = { distr: 3, range: (u, low, high) => [Math.max(low || 1e-7, 1e-7) / 1.5, Math.min(high || 1, 10) * 1.5] };
+  function plot(place, height, options, values) {
+    const made = new uPlot({
+      width: Math.max(place.clientWidth, 200), height, legend: { show: false }, cursor: { drag: { x: false, y: false } }, ...options,
+    }, values, place);
+    new ResizeObserver(() => {
+      const width = place.clientWidth;
+      if (width && width !== made.width) made.setSize({ width, height });
+    }).observe(place);
+    drawn.push(made);
+    return made;
+  }
+  const visible = (value) => (Number.isFinite(value) ? Math.max(value, 1e-7) : null);
+
+  // Points of a chart that can be pointed at: what is nearest is named, and a click goes there.
+  function pointing(u, points, spot) {
+    const nearest = (event) => {
+      const box = u.over.getBoundingClientRect();
+      const [x, y] = [event.clientX - box.left, event.clientY - box.top];
+      let best = null, least = 30 ** 2;
+      for (const p of points()) {
+        const [dx, dy] = [u.valToPos(p.x, "x") - x, u.valToPos(p.y, "y") - y];
+        if (dx * dx + dy * dy < least) { least = dx * dx + dy * dy; best = p; }
+      }
+      return best;
+    };
+    u.over.addEventListener("mousemove", (event) => {
+      const p = nearest(event);
+      spot.textContent = p ? p.text : " ";
+      u.over.style.cursor = p && "curve" in p ? "pointer" : "default";
+    });
+    u.over.addEventListener("click", (event) => {
+      const p = nearest(event);
+      if (p && "curve" in p) go(p.curve, p.row);
+    });
+  }
+  const shownCurves = () => curves.map((c, k) => k).filter((k) => !state.hidden.has(k));
+  // All heuristics that found the very model of a curve's row.
+  const finders = (k, row) => curves.filter((c) => c.model.includes(curves[k].model[row])).flatMap((c) => c.names);
+  const spoken = (k, row) => {
+    const c = curves[k];
+    const cost = c.operations.inverse ? `, d in ${c.operations.inverse[row]} operations` : "";
+    return `${finders(k, row).join(", ")}: ${c.n[row]} parameters, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
+  };
+
+  // Error against the number of parameters.
+  const largest = Math.max(...curves.flatMap((c) => c.n));
+  const ns = Array.from({ length: largest }, (_, k) => k + 1);
+  const lines = curves.flatMap((c, k) => SETS.map((set) => ({ curve: k, set })));
+  const against = lines.map(({ curve, set }) => {
+    const own = curves[curve];
+    const values = new Array(largest).fill(null);
+    own.n.forEach((n, row) => { values[n - 1] = visible(own.torque[set][row]); });
+    return values;
+  });
+  const ring = (u, x, y, of) => {
+    if (y === null || !Number.isFinite(y)) return;
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.lineWidth = 2 * devicePixelRatio;
+    u.ctx.strokeStyle = of;
+    u.ctx.arc(u.valToPos(x, "x", true), u.valToPos(y, "y", true), 6 * devicePixelRatio, 0, 7);
+    u.ctx.stroke();
+    u.ctx.restore();
+  };
+  const upright = (u, x) => {
+    const at = u.valToPos(x, "x", true);
+    u.ctx.save();
+    u.ctx.beginPath();
+    u.ctx.setLineDash([4, 4]);
+    u.ctx.strokeStyle = colour("--soft");
+    u.ctx.moveTo(at, u.bbox.top);
+    u.ctx.lineTo(at, u.bbox.top + u.bbox.height);
+    u.ctx.stroke();
+    u.ctx.restore();
+  };
+  const errorChart = plot(part("error-chart"), 300, {
+    scales: { x: { time: false, range: [0, largest + 1] }, y: errorScale },
+    axes: [axis("number of parameters n", { incrs: [1, 2, 5, 10, 20, 50, 100] }), errorAxis("torque error")],
+    series: [{}, ...lines.map(({ curve, set }) => ({
+      stroke: curves[curve].colour, width: 1.6, dash: set === "validation" ? [5, 4] : undefined, spanGaps: false, points: { show: set === "estimation", size: 4 },
+    }))],
+    hooks: { draw: [(u) => {
+      const own = curves[state.curve];
+      upright(u, own.n[state.row]);
+      ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), own.colour);
+    }] },
+  }, [ns, ...against]);
+  pointing(errorChart, () => shownCurves().flatMap((k) => SETS.filter((s) => state.sets.has(s)).flatMap((set) =>
+    curves[k].n.map((n, row) => ({ x: n, y: visible(curves[k].torque[set][row]), curve: k, row, text: spoken(k, row) })))
+  ).filter((p) => p.y !== null), part("error-spot"));
+  followers.push(() => errorChart.redraw(false, false));
+
+  // The legend switches curves and sets.
+  const legend = part("legend");
+  const toggled = (button, on) => button.setAttribute("aria-pressed", String(on));
+  function apply() {
+    lines.forEach(({ curve, set }, k) => {
+      const show = !state.hidden.has(curve) && state.sets.has(set);
+      if (errorChart.series[k + 1].show !== show) errorChart.setSeries(k + 1, { show });
+    });
+    for (const chart of Object.values(costCharts)) {
+      curves.forEach((_, k) => chart.setSeries(k + 1, { show: !state.hidden.has(k) }));
+    }
+  }
+  curves.forEach((c, k) => {
+    const mark = element("i");
+    mark.style.background = c.colour;
+    const button = element("button", { type: "button" }, mark, c.names.join(", "));
+    toggled(button, true);
+    button.addEventListener("click", () => {
+      const off = state.hidden.has(k);
+      off ? state.hidden.delete(k) : state.hidden.add(k);
+      toggled(button, off);
+      apply();
+    });
+    legend.append(button);
+  });
+  SETS.forEach((set) => {
+    const button = element("button", { type: "button", className: "set" }, set === "estimation" ? "— estimation" : "- - validation");
+    toggled(button, true);
+    button.addEventListener("click", () => {
+      const on = state.sets.has(set);
+      on ? state.sets.delete(set) : state.sets.add(set);
+      toggled(button, !on);
+      apply();
+    });
+    legend.append(button);
+  });
+
+  // Error against operations: a point for every model, the front, and functions with terms left out.
+  const costCharts = {};
+  function costChart(key, label) {
+    const all = curves.flatMap((c, k) => c.n.map((_, row) => ({ x: c.operations[key][row], y: visible(c.torque.estimation[row]), curve: k, row, text: spoken(k, row) }))).filter((p) => p.y !== null);
+    const [counts, found] = data.terms[key] ?? [[], []];
+    const terms = counts.map((x, k) => ({ x, y: visible(found[k]), terms: true, text: `terms left out: ${x} operations, ${percent(found[k])}` }));
+    const points = [...all, ...terms].sort((a, b) => a.x - b.x || b.y - a.y);
+    let best = Infinity;
+    const front = points.map((p) => (p.terms || p.y >= best ? null : (best = p.y)));
+    const series = curves.map((_, k) => points.map((p) => (p.curve === k ? p.y : null)));
+    const dots = (stroke) => ({ stroke, paths: () => null, points: { show: true, size: 5, stroke, fill: stroke } });
+    const line = (stroke, dash) => ({ stroke, width: 1.6, dash, spanGaps: true, points: { show: false } });
+    const chart = plot(part(`${key}-chart`), 300, {
+      scales: { x: { time: false }, y: errorScale },
+      axes: [axis(`operations of ${label}`), errorAxis("torque error, estimation")],
+      series: [{}, ...curves.map((c) => dots(c.colour)),
+        { ...line(() => colour("--ink")), paths: uPlot.paths.stepped({ align: 1 }) },
+        { ...line(() => colour("--blue"), [2, 3]), points: { show: true, size: 5, stroke: () => colour("--blue"), fill: () => colour("--card") } }],
+      hooks: { draw: [(u) => {
+        const own = curves[state.curve];
+        ring(u, own.operations[key][state.row], visible(own.torque.estimation[state.row]), own.colour);
+      }] },
+    }, [points.map((p) => p.x), ...series, front, points.map((p) => (p.terms ? p.y : null))]);
+    pointing(chart, () => points.filter((p) => p.terms || !state.hidden.has(p.curve)), part(`${key}-spot`));
+    followers.push(() => chart.redraw(false, false));
+    costCharts[key] = chart;
+  }
+  if (data.counted) {
+    costChart("inverse", "d");
+    costChart("direct", "[M | δ]");
+  }
+
+  // Torques along the motion with what is missed; drawn when they come into view.
+  const first = data.measured ? "measured" : "as given";
+  const seen = new Set();
+  const torqueCharts = joints.map((joint, j) => {
+    const place = element("div", { className: "joint" });
+    const unit = joint.unit ? `, ${joint.unit}` : "";
+    place.append(element("h4", { textContent: `${joint.name}${unit}` }));
+    const upper = element("div"), lower = element("div");
+    place.append(upper, lower);
+    part("torques").append(place);
+    const given = Float64Array.from({ length: nSamples }, (_, t) => motion.tau[t * nDof + joint.index]);
+    let charts = null;
+    const show = (model) => {
+      const values = torque(model, joint.index);
+      const missed = values.map((v, t) => given[t] - v);
+      if (charts) {
+        charts[0].setData([motion.time, given, values]);
+        charts[1].setData([motion.time, missed]);
+        return;
+      }
+      const shared = { scales: { x: { time: false } }, cursor: { drag: { x: true, y: false }, sync: { key: "time" } } };
+      charts = [
+        plot(upper, 130, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 52 })],
+          series: [{}, { stroke: () => colour("--blue"), width: 1.8 }, { stroke: () => colour("--ink"), width: 1.2, dash: [5, 4] }] }, [motion.time, given, values]),
+        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 52, space: 18 })],
+          series: [{}, { stroke: () => colour("--bad"), width: 1.2 }] }, [motion.time, missed]),
+      ];
+    };
+    return { place, show, j };
+  });
+  part("first").textContent = first;
+  const watcher = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      const chart = torqueCharts.find((c) => c.place === entry.target);
+      entry.isIntersecting ? seen.add(chart) : seen.delete(chart);
+      if (entry.isIntersecting) chart.show(modelOf(curves[state.curve], state.row));
+    }
+  }, { rootMargin: "100px" });
+  torqueCharts.forEach((chart) => watcher.observe(chart.place));
+  followers.push((curve, row, model) => seen.forEach((chart) => chart.show(model)));
+
+  // ---- the mechanism, moving
+
+  if (figure) mechanism(part("mechanism"));
+  function mechanism(place) {
+    place.hidden = false;
+    const canvas = place.querySelector("canvas");
+    const [button, time] = [place.querySelector("button"), place.querySelector("input")];
+    const nPoints = figure.count;
+    const nFrames = figure.points.length / 3 / nPoints;
+    const used = new Set(figure.lines.flatMap(([a, b]) => [a, b]));
+    const [middle, reach] = extent();
+    const view = { azimuth: widest() + 0.35, elevation: 0.38, frame: 0, playing: false, drag: null };
+    let shares = new Map();
+    time.max = nFrames - 1;
+    view.frame = mostSpread();
+    time.value = view.frame;
+    function extent() {
+      const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
+      figure.points.forEach((v, k) => {
+        if (!used.has(Math.floor(k / 3) % nPoints)) return;
+        low[k % 3] = Math.min(low[k % 3], v);
+        high[k % 3] = Math.max(high[k % 3], v);
+      });
+      return [low.map((v, k) => (v + high[k]) / 2), Math.max(...low.map((v, k) => high[k] - v), 1e-9)];
+    }
+    function mostSpread() {
+      let [best, most] = [0, -1];
+      for (let f = 0; f < nFrames; f++) {
+        let spread = 0;
+        for (const [a, b] of figure.lines) {
+          for (const k of [a, b]) for (let i = 0; i < 3; i++) spread += Math.abs(figure.points[3 * (f * nPoints + k) + i] - figure.points[3 * f * nPoints + i]);
+        }
+        if (spread > most) [best, most] = [f, spread];
+      }
+      return best;
+    }
+    // From where the motion is seen from its broad side.
+    function widest() {
+      let [xx, xy, yy] = [0, 0, 0];
+      for (let k = 0; k < figure.points.length / 3; k++) {
+        if (!used.has(k % nPoints)) continue;
+        const [x, y] = [figure.points[3 * k] - middle[0], figure.points[3 * k + 1] - middle[1]];
+        [xx, xy, yy] = [xx + x * x, xy + x * y, yy + y * y];
+      }
+      return Math.atan2(2 * xy, xx - yy) / 2 - Math.PI / 2;
+    }
+    function draw() {
+      const scale = window.devicePixelRatio || 1;
+      const [width, height] = [canvas.clientWidth, canvas.clientHeight];
+      if (canvas.width !== width * scale) [canvas.width, canvas.height] = [width * scale, height * scale];
+      const context = canvas.getContext("2d");
+      context.setTransform(scale, 0, 0, scale, 0, 0);
+      context.clearRect(0, 0, width, height);
+      const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
+      const zoom = (0.8 * Math.min(width, height)) / reach;
+      const project = (k) => {
+        const at = 3 * (view.frame * nPoints + k);
+        const [x, y, z] = [0, 1, 2].map((i) => figure.points[at + i] - middle[i]);
+        const across = -sa * x + ca * y, near = ca * x + sa * y;
+        return [width / 2 + zoom * across, height / 2 - zoom * (ce * z - se * near), ce * near + se * z];
+      };
+      const pieces = figure.lines.map(([a, b, owner, kind]) => ({ from: project(a), to: project(b), owner, kind }));
+      pieces.sort((p, q) => p.from[2] + p.to[2] - q.from[2] - q.to[2]);
+      context.lineCap = "round";
+      for (const piece of pieces) {
+        const share = shares.get(figure.owners[piece.owner]);
+        context.strokeStyle = share === undefined ? colour("--line") : `color-mix(in srgb, ${colour("--blue")} ${Math.round(100 * share)}%, ${colour("--orange")})`;
+        context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2 }[piece.kind];
+        context.beginPath();
+        context.moveTo(piece.from[0], piece.from[1]);
+        context.lineTo(piece.to[0], piece.to[1]);
+        context.stroke();
+      }
+    }
+    followers.push((curve, row, model) => {
+      const kept = new Set(model.columns);
+      const counts = new Map();
+      columns.forEach((column, k) => {
+        const [mine, all] = counts.get(column.owner) ?? [0, 0];
+        counts.set(column.owner, [mine + kept.has(k), all + 1]);
+      });
+      shares = new Map(Array.from(counts, ([owner, [mine, all]]) => [owner, mine / all]));
+      draw();
+    });
+    time.addEventListener("input", () => { view.frame = +time.value; draw(); });
+    let last = 0;
+    const step = (now) => {
+      if (!view.playing) return;
+      if (now - last > 60) {
+        last = now;
+        time.value = view.frame = (view.frame + 1) % nFrames;
+        draw();
+      }
+      requestAnimationFrame(step);
+    };
+    button.addEventListener("click", () => {
+      view.playing = !view.playing;
+      button.textContent = view.playing ? "Pause" : "Play";
+      requestAnimationFrame(step);
+    });
+    canvas.addEventListener("pointerdown", (event) => { view.drag = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
+    canvas.addEventListener("pointerup", () => { view.drag = null; });
+    canvas.addEventListener("pointermove", (event) => {
+      if (!view.drag) return;
+      view.azimuth -= (event.clientX - view.drag[0]) * 0.01;
+      view.elevation = Math.min(1.5, Math.max(-1.5, view.elevation + (event.clientY - view.drag[1]) * 0.01));
+      view.drag = [event.clientX, event.clientY];
+      draw();
+    });
+    new ResizeObserver(draw).observe(canvas);
+    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+  }
+
+  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach((chart) => chart.redraw()));
+  addEventListener("hashchange", () => { fromAddress(); follow(); });
+  fromAddress();
+  follow();
+  root.dataset.ready = "true";
+})();

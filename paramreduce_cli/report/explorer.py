@@ -1,0 +1,190 @@
+"""What the page's explorer moves through: every model that was found, and one motion to see it on."""
+
+import base64
+import gzip
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.records import HeuristicValidation, IntArray, ModelChoice
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.style import heuristic_style, joint_label
+
+_NUMBERS = 600_000
+"""Most entries of the observation matrix that the page carries; an arm of six joints has 300 per sample."""
+_EQUAL = 1e-4
+"""Relative difference of values that single precision and other orders of columns explain."""
+_SETS = ("estimation", "validation")
+_FUNCTIONS = ("inverse", "direct")
+
+
+def explorer(data: ReportData) -> dict[str, Any]:
+    """Everything that the explorer shows, as plain data with packed arrays.
+
+    Torques are not embedded but the observation matrix of one motion, in single precision: the page
+    multiplies it with the parameters of whichever model is looked at.
+
+    Args:
+        data: What the report is made from.
+    """
+    shown = np.flatnonzero(data.reduction.factor[:, :-1].any(axis=0))
+    library = _Models(data, shown)
+    selected = data.validation.selected
+    return {
+        "selected": {"heuristic": selected.heuristic, "n": selected.n},
+        "pareto": [[choice.heuristic, choice.n] for choice in data.validation.pareto],
+        "measured": data.identification is not None,
+        "counted": data.known_model is not None,
+        "rank": data.reduction.rank,
+        "joints": _joints(data),
+        "columns": _columns(data, shown),
+        "curves": _curves(data, library),
+        "terms": _terms(data),
+        "models": library.packed(),
+        "motion": _motion(data, shown),
+        "figure": _figure(data),
+    }
+
+
+class _Models:
+    """The distinct models, each once however many heuristics found it."""
+
+    def __init__(self, data: ReportData, shown: IntArray) -> None:
+        self._reduction = data.reduction
+        self._place = {int(column): k for k, column in enumerate(shown)}
+        self._numbers: dict[bytes, list[int]] = {}
+        self._columns: list[np.ndarray] = []
+        self._values: list[np.ndarray] = []
+
+    def number(self, choice: ModelChoice) -> int:
+        """Of a heuristic's model; -1 where there is none."""
+        row = choice.row(self._reduction)
+        if row is None:
+            return -1
+        found = self._reduction.heuristics[choice.heuristic]
+        kept = [k for k, column in enumerate(found.subsets[row]) if int(column) in self._place]
+        kept.sort(key=lambda k: found.subsets[row][k])
+        columns = np.array([self._place[int(found.subsets[row][k])] for k in kept], np.uint16)
+        values = found.parameters[row][kept].astype(np.float32)
+        # The same parameters may have other values, fitted by another criterion.
+        same = self._numbers.setdefault(columns.tobytes(), [])
+        for number in same:
+            if np.allclose(self._values[number], values, rtol=_EQUAL, atol=0):
+                return number
+        same.append(len(self._columns))
+        self._columns.append(columns)
+        self._values.append(values)
+        return same[-1]
+
+    def packed(self) -> dict[str, Any]:
+        """Columns and values of all, one after the other, and where each begins."""
+        starts = np.cumsum([0, *(columns.size for columns in self._columns)])
+        return {
+            "starts": packed(starts.astype(np.uint32)),
+            "columns": packed(np.concatenate(self._columns)),
+            "values": packed(np.concatenate(self._values)),
+        }
+
+
+def _curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
+    """Errors and costs by heuristic; those that found the same models are one curve."""
+    curves: dict[tuple[Any, ...], dict[str, Any]] = {}
+    for name, result in data.validation.heuristics.items():
+        models = [library.number(ModelChoice(name, n)) for n in result.n.tolist()]
+        same = (tuple(result.n.tolist()), tuple(models))
+        if same in curves:
+            curves[same]["names"].append(name)
+            continue
+        colour, _ = heuristic_style(data, name)
+        curves[same] = {"names": [name], "colour": colour, "n": result.n.tolist(),
+                        "model": models, **_worth(data, result)}  # fmt: skip
+    return list(curves.values())
+
+
+def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
+    counted = data.known_model is not None
+    return {
+        "torque": {s: packed(getattr(result, f"torque_error_{s}")) for s in _SETS},
+        "joints": {
+            s: packed(getattr(result, f"torque_error_joint_{s}").astype(np.float32)) for s in _SETS
+        },
+        "acceleration": {s: packed(getattr(result, f"acceleration_error_{s}")) for s in _SETS},
+        "operations": {
+            f: getattr(result, f"operations_{f}").tolist() if counted else None for f in _FUNCTIONS
+        },
+    }
+
+
+def _terms(data: ReportData) -> dict[str, Any]:
+    """Operations and errors on the estimation set of functions with terms left out."""
+    found = data.terms.functions if data.terms is not None else {}
+    return {
+        name: [one.front.operations.tolist(), one.front.torque_error_estimation.tolist()]
+        for name, one in found.items()
+    }
+
+
+def _joints(data: ReportData) -> list[dict[str, Any]]:
+    """Joints whose torques are measured or known, with what they amount to on either set."""
+    return [
+        {
+            "index": j,
+            "name": joint_label(data, j),
+            "unit": data.force_unit(j),
+            "rms": {s: float(rms[j]) for s, rms in data.rms_torque.items()},
+        }
+        for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
+    ]
+
+
+def _columns(data: ReportData, shown: IntArray) -> list[dict[str, str]]:
+    """What is chosen among, with the body or drive that each belongs to."""
+    columns = data.reduction.columns
+    if data.known_model is None:
+        return [{"name": columns.names[k], "symbol": columns.names[k], "owner": "", "unit": ""}
+                for k in shown]  # fmt: skip
+    parameters = data.known_model.mechanism.parameters
+    result = []
+    for k in shown:
+        first = parameters[int(np.flatnonzero(columns.column == k)[0])]
+        alone = first.name == columns.names[k]
+        result.append({"name": columns.names[k], "owner": first.owner, "unit": first.unit,
+                       "symbol": first.kind.symbol if alone else columns.names[k]})  # fmt: skip
+    return result
+
+
+def _motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
+    """Torques and observation matrix of the motion that is shown, thinned to what a page may weigh."""
+    motion, n_dof = data.motion, data.motion.tau.shape[1]
+    step = max(1, -(-motion.time.size * n_dof * shown.size // _NUMBERS))
+    columns = data.reduction.columns.expansion[:, shown] if data.reduction.columns.tied else None
+    W = motion.W[::step]
+    W = W[..., shown] if columns is None else W @ columns
+    return {
+        "timed": motion.timed,
+        "time": packed(motion.time[::step]),
+        "tau": packed(motion.tau[::step].astype(np.float32)),
+        "W": packed(W.astype(np.float32)),
+    }
+
+
+def _figure(data: ReportData) -> dict[str, Any] | None:
+    """The mechanism along the motion: points in the base frame, and lines between them by body."""
+    if data.animation is None:
+        return None
+    return {
+        "count": data.animation.points.shape[1],
+        "points": packed(data.animation.points.astype(np.float32)),
+        "lines": data.animation.lines,
+        "owners": list(data.animation.owners),
+    }
+
+
+def packed(array: np.ndarray) -> dict[str, Any]:
+    """An array as text: compressed, and by its type and shape to be read in a browser."""
+    content = gzip.compress(np.ascontiguousarray(array).tobytes(), compresslevel=6, mtime=0)
+    return {
+        "type": array.dtype.name,
+        "shape": list(array.shape),
+        "data": base64.b64encode(content).decode(),
+    }

@@ -1,0 +1,134 @@
+"""The explorer: what it carries, and what it shows in a browser."""
+
+import base64
+import gzip
+import io
+import json
+import re
+import zipfile
+
+import h5py
+import numpy as np
+import pytest
+from browser import MISSING, complaints, opened
+
+from paramreduce_cli.texts import share
+
+in_browser = pytest.mark.skipif(MISSING, reason="there is no Chromium with its driver")
+
+
+@pytest.fixture(scope="module")
+def page(two_link_results):
+    return two_link_results / "report" / "index.html"
+
+
+@pytest.fixture(scope="module")
+def carried(page):
+    """What is embedded, unpacked."""
+
+    def unpacked(value):
+        if isinstance(value, dict) and {"data", "shape", "type"} <= set(value):
+            content = gzip.decompress(base64.b64decode(value["data"]))
+            return np.frombuffer(content, value["type"]).reshape(value["shape"])
+        if isinstance(value, dict):
+            return {key: unpacked(one) for key, one in value.items()}
+        return [unpacked(one) for one in value] if isinstance(value, list) else value
+
+    text = re.search(r'id="explorer-data">(.*?)</script>', page.read_text(), re.DOTALL)[1]
+    return unpacked(json.loads(text))
+
+
+def test_errors_and_costs_are_those_of_the_summary(carried, summary):
+    names = [name for curve in carried["curves"] for name in curve["names"]]
+    assert sorted(names) == sorted(summary["validation"])
+    for curve in carried["curves"]:
+        for name in curve["names"]:
+            for k, row in enumerate(summary["validation"][name]):
+                assert curve["n"][k] == row["n"]
+                for which in ("estimation", "validation"):
+                    known = row["torque_error"][which]
+                    assert curve["torque"][which][k] == pytest.approx(known, rel=1e-12)
+                assert curve["operations"]["inverse"][k] == row["operations"]["inverse"]
+
+
+def test_torques_are_those_of_the_samples(carried, summary, two_link_results):
+    """The selected model's torques from what is embedded, and from samples and summary."""
+    models, motion = carried["models"], carried["motion"]
+    curve = next(c for c in carried["curves"] if summary["selected"]["heuristic"] in c["names"])
+    k = curve["model"][curve["n"].index(summary["selected"]["n"])]
+    own = slice(models["starts"][k], models["starts"][k + 1])
+    embedded = motion["W"][..., models["columns"][own]] @ models["values"][own]
+    with h5py.File(two_link_results / "samples.h5") as file:
+        names = [name.decode() for name in file["parameters/names"]]
+        step = -(-file["validation/tau"].shape[0] // len(motion["time"]))
+        W, tau = file["validation/W"][:], file["validation/tau"][:]
+    phi = np.array([summary["selected"]["parameters"].get(name, 0.0) for name in names])
+    expected = (W @ phi).reshape(tau.shape)[::step][: len(embedded)]
+    assert np.abs(embedded - expected).max() < 1e-5 * np.abs(expected).max()
+    assert np.abs(motion["tau"] - tau[::step][: len(embedded)]).max() < 1e-5 * np.abs(tau).max()
+
+
+def test_heuristics_that_found_the_same_are_one_curve(carried, summary):
+    subsets = {
+        name: [frozenset((one["subsets"] or [one["order"][:n] for n in one["n"]])[k]) for k in range(len(one["n"]))]
+        for name, one in summary["reduction"].items()
+        if name not in ("proofs", "pareto")
+    }  # fmt: skip
+    for curve in carried["curves"]:
+        assert len({tuple(subsets[name]) for name in curve["names"]}) == 1
+
+
+def test_the_code_is_in_the_page(page):
+    content = re.search(r"data:application/zip;base64,([^\"]+)", page.read_text())[1]
+    with zipfile.ZipFile(io.BytesIO(base64.b64decode(content))) as archive:
+        assert {"two_link.h", "two_link.c"} <= set(archive.namelist())
+
+
+@in_browser
+def test_every_step_of_the_slider_shows_its_model(page, summary):
+    with opened(page, place="heuristic=qr&n=2") as driver:
+
+        def text(part):
+            return driver.find_element("css selector", f'[data-part="{part}"]').text
+
+        rows = {row["n"]: row for row in summary["validation"]["qr"]}
+        for n in (2, 3, max(rows)):
+            driver.execute_script(
+                "const s = document.querySelector('[data-part=n]'); s.value = arguments[0] - 1;"
+                "s.dispatchEvent(new Event('input'));", n)  # fmt: skip
+            error = rows[n]["torque_error"]
+            assert text("count") == str(n)
+            sets = ("estimation", "validation")
+            for which, shown in zip(sets, text("torque").split(" / "), strict=True):
+                digits = float(shown.removesuffix(" %")) / 100
+                assert digits == pytest.approx(error[which], rel=5e-3, abs=1e-10)
+            assert text("inverse") == str(rows[n]["operations"]["inverse"])
+            assert text("command").endswith(f"--model qr:{n}")
+            assert len(driver.find_elements("css selector", ".chip.kept")) == n
+        field = driver.find_element("css selector", '[data-part="tolerance"]')
+        field.send_keys("50\t")
+        least = min(n for n in rows if max(rows[n]["torque_error"][s] for s in sets) <= 0.5)
+        assert text("count") == str(least)
+        assert driver.execute_script("return location.hash") == f"#heuristic=qr&n={least}"
+        assert complaints(driver) == []
+
+
+@in_browser
+@pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
+def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
+    with opened(page, width=width, dark=dark) as driver:
+        assert driver.execute_script("return document.documentElement.scrollWidth") <= width
+        header = driver.find_element("id", "answer")
+        selected = summary["selected"]
+        assert selected["verdict"] in header.text
+        assert "paramreduce export" in header.text
+        assert share(selected["torque_error"]["validation"]) in header.text
+        assert str(selected["operations"]["inverse"]) in header.text
+        assert all(name in header.text for name in selected["parameters"])
+        assert width < 1000 or header.rect["y"] + header.rect["height"] < 800
+        background = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
+        assert (sum(map(int, re.findall(r"\d+", background)[:3])) < 200) == dark
+        charts = driver.find_elements("css selector", ".uplot canvas")
+        assert all(chart.size["width"] <= width for chart in charts)
+        assert len(charts) >= 3
+        assert complaints(driver) == []
