@@ -65,6 +65,10 @@ def chosen_model(
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {share(error)}"
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
+    judged = validation and validation.heuristics.get(choice.heuristic)
+    if judged and (known_row := judged.row(choice.n)) is not None:
+        other = float(judged.torque_error_validation[known_row])
+        title += f", {share(other)} on the validation set"
     known = model.values if model is not None else None
     return reduced_model(reduction, choice.heuristic, row, known), title
 

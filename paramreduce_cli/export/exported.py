@@ -191,27 +191,37 @@ def plain(text: str) -> str:
     return kept
 
 
-def about(model: ExportedModel) -> list[str]:
-    """The lines that open every file."""
+def about(model: ExportedModel, first: int = 0) -> list[str]:
+    """The lines that open every file.
+
+    Args:
+        model: What is exported.
+        first: What the language counts from.
+    """
     lines = [plain(line) for line in model.heading]
     lines += [
         "",
         "Coordinates, in this order; forces are in N m where they are in rad, in N where in m:",
     ]
-    lines += _listed(model, range(len(model.coordinates)))
+    lines += _listed(model, range(len(model.coordinates)), first)
     if model.closures:
         lines += ["", "Independent coordinates, in the order of z, dz, ddz, tau, M, delta and K:"]
-        lines += _listed(model, model.independent.tolist())
+        lines += _listed(model, model.independent.tolist(), first)
         lines += ["", "Dependent coordinates, in the order of the rows of R and b:"]
-        lines += _listed(model, model.dependent)
+        lines += _listed(model, model.dependent, first)
     kind = "constants of the code" if model.constant else "in this order"
-    lines += ["", f"Parameters, {kind}; each is followed by what it is made of (to six digits):"]
-    for k, p in enumerate(model.parameters):
+    lines += [
+        "",
+        "First moments and inertias are about the origin of their body's frame, in its axes, as the config",
+        f"places it. Parameters, {kind}; each is followed by what it is made of:",
+    ]
+    for k, p in enumerate(model.parameters, first):
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")
     return lines
 
 
-def _listed(model: ExportedModel, positions: Iterable[int]) -> list[str]:
+def _listed(model: ExportedModel, positions: Iterable[int], first: int) -> list[str]:
     return [
-        f"  {k}: {plain(model.coordinates[i])}, {model.units[i]}" for k, i in enumerate(positions)
+        f"  {k}: {plain(model.coordinates[i])}, {model.units[i]}"
+        for k, i in enumerate(positions, first)
     ]

@@ -19,7 +19,14 @@ from paramreduce_cli.export.exported import ExportedModel, ParameterValue
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
-from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
+from paramreduce_cli.records import (
+    FloatArray,
+    Mechanism,
+    Model,
+    ReducedModel,
+    TermModel,
+    Validation,
+)
 
 _CASES = 16
 """States in the self-test."""
@@ -57,6 +64,7 @@ def export(
     single: bool = False,
     origin: str = "",
     simplified: TermModel | None = None,
+    validation: Validation | None = None,
 ) -> dict[str, bytes]:
     """Files of a model in some language.
 
@@ -71,6 +79,7 @@ def export(
         origin: Of the model, for the comment that opens every file.
         simplified: The function that is asked for with terms left out, whose parameters are those of
             the model.
+        validation: Says in which ranges the model was validated; None where it was not.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
@@ -102,6 +111,7 @@ def export(
                 if model.unmeasured
                 else []
             ),
+            *([] if validation is None else _validated(mechanism, validation)),
             *([] if simplified is None else _validity(mechanism, simplified)),
             *([_rounding(functions, checked)] if single else []),
             "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
@@ -131,16 +141,28 @@ def _rounding(functions: tuple[Function, ...], checked: Mapping[str, FloatArray]
     )
 
 
+def _validated(mechanism: Mechanism, validation: Validation) -> list[str]:
+    """What the errors were measured on, line by line."""
+    lines = ["Errors were measured on motions within"]
+    return lines + _ranges(mechanism, validation.lower, validation.upper)
+
+
+def _ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
+    """Of states, (3, n_dof) each, a line for every joint."""
+    kinds = ("position", "velocity", "acceleration")
+    return [
+        f"  {name}: "
+        + ", ".join(
+            f"{kind} {lower[k, j]:.4g} to {upper[k, j]:.4g}" for k, kind in enumerate(kinds)
+        )
+        for j, name in enumerate(mechanism.coordinate_names)
+    ]
+
+
 def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
     """Where a function with terms left out holds, line by line."""
     lines = ["TERMS WERE LEFT OUT: it holds inside the ranges that it was fitted in, which are"]
-    names = mechanism.coordinate_names
-    for j, name in enumerate(names):
-        spans = (
-            f"{symbol} {simplified.lower[k, j]:.4g} to {simplified.upper[k, j]:.4g}"
-            for k, symbol in enumerate(("position", "velocity", "acceleration"))
-        )
-        lines.append(f"  {name}: {', '.join(spans)}")
+    lines += _ranges(mechanism, simplified.lower, simplified.upper)
     largest = ", ".join(f"{value:.3g}" for value in simplified.largest_difference)
     where = "both sets"
     if np.isfinite(simplified.random_torque_error):

@@ -17,6 +17,10 @@ class NormErrors:
     infinity: FloatArray
     joints: FloatArray
     """In the 2-norm, joint by joint, (n_models, n_dof); not a number where torques are not measured."""
+    lower: FloatArray
+    """Smallest positions, speeds and accelerations that were met, (3, n_dof)."""
+    upper: FloatArray
+    """Largest ones, (3, n_dof)."""
 
 
 def torque_errors(
@@ -34,7 +38,11 @@ def torque_errors(
     squares = np.zeros((n_models, n_dof))
     largest = np.zeros(n_models)
     chi_sum, chi_square, chi_largest = np.zeros(n_dof), np.zeros(n_dof), 0.0
+    lower, upper = np.full((3, n_dof), np.inf), np.full((3, n_dof), -np.inf)
     for block in blocks:
+        states = np.array([block.z, block.dz, block.ddz])
+        lower = np.minimum(lower, states.min(axis=1))
+        upper = np.maximum(upper, states.max(axis=1))
         chi = block.tau / weights
         predicted = (block.W @ parameters).reshape(-1, n_dof, n_models) / weights[:, None]
         error = np.abs(chi[:, :, None] - predicted)
@@ -52,4 +60,6 @@ def torque_errors(
         two=np.sqrt(squares.sum(axis=1) / max(chi_square.sum(), tiny)),
         infinity=largest / max(chi_largest, tiny),
         joints=joints,
+        lower=lower,
+        upper=upper,
     )

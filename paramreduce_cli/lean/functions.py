@@ -66,7 +66,7 @@ class LeanFunctions:
         z = self._mechanism.n_dof
         M = Argument("M", (z, z), "mass matrix")
         delta = Argument("delta", (z,), "torques without acceleration, N m or N")
-        text = "Mass matrix and bias: tau = M ddz + delta."
+        text = "Mass matrix and remainder, gravity and friction included: tau = M ddz + delta."
         graph, outputs = self._model(self._models.direct, projected_direct)
         lower, bias = outputs[:-z], outputs[-z:]
         rows = range(z)

@@ -138,6 +138,10 @@ class Validation:
     full: Mapping[str, float]
     """Operation counts and mass-matrix figures of the full model, by name."""
     nominal_acceleration: FloatArray
+    lower: FloatArray
+    """Smallest positions, speeds and accelerations of both sets, (3, n_dof)."""
+    upper: FloatArray
+    """Largest ones, (3, n_dof)."""
     selected: Selected
     pareto: tuple[ModelChoice, ...]
     """By growing n."""

@@ -443,7 +443,7 @@
       context.lineCap = "round";
       for (const piece of pieces) {
         const share = shares.get(figure.owners[piece.owner]);
-        context.strokeStyle = share === undefined ? colour("--line") : `color-mix(in srgb, ${colour("--blue")} ${Math.round(100 * share)}%, ${colour("--orange")})`;
+        context.strokeStyle = share === undefined ? colour("--soft") : `color-mix(in srgb, ${colour("--blue")} ${Math.round(100 * share)}%, ${colour("--orange")})`;
         context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2 }[piece.kind];
         context.beginPath();
         context.moveTo(piece.from[0], piece.from[1]);

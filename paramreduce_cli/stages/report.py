@@ -133,7 +133,7 @@ def _code(model: Model | None, reduction: Reduction, validation: Validation) -> 
     chosen, title = chosen_model(None, model, reduction, validation)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
-        return export(model, chosen, title=title, language="c")
+        return export(model, chosen, title=title, language="c", validation=validation)
 
 
 def _rms_torque(samples: Samples) -> dict[str, FloatArray]:

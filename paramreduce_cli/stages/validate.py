@@ -79,7 +79,9 @@ def validate(
     """
     known = previous if run.unchanged >= _MEASURED_ON else None
     if known:
-        measured = _Measured(known.heuristics, known.full, known.nominal_acceleration)
+        measured = _Measured(
+            known.heuristics, known.full, known.nominal_acceleration, known.lower, known.upper
+        )
     elif model is None:
         measured = _torques_alone(samples, reduction)
     else:
@@ -105,6 +107,8 @@ def validate(
         heuristics=heuristics,
         full=full,
         nominal_acceleration=measured.nominal_acceleration,
+        lower=measured.lower,
+        upper=measured.upper,
         selected=selected,
         pareto=pareto_front(heuristics),
         stability=repeated,
@@ -122,6 +126,8 @@ class _Measured:
     heuristics: Mapping[str, HeuristicValidation]
     full: Mapping[str, float]
     nominal_acceleration: FloatArray
+    lower: FloatArray
+    upper: FloatArray
 
 
 def _measured(
@@ -149,7 +155,15 @@ def _measured(
     for name, found in reduction.heuristics.items():
         operations = np.array([counts.all(reduction.model(name, k)) for k in range(found.n.size)])
         heuristics[name] = _judged(found.n, operations, estimation, validation, models.rows[name])
-    return _Measured(heuristics, _full_model(model, counts, estimation[1], validation[1]), nominal)
+    full = _full_model(model, counts, estimation[1], validation[1])
+    return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
+
+
+def _ranges(estimation: NormErrors, validation: NormErrors) -> tuple[FloatArray, FloatArray]:
+    """Of the states of both sets, each (3, n_dof)."""
+    lower: FloatArray = np.minimum(estimation.lower, validation.lower)
+    upper: FloatArray = np.maximum(estimation.upper, validation.upper)
+    return lower, upper
 
 
 def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
@@ -174,7 +188,7 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
         )
         for name, found in reduction.heuristics.items()
     }
-    return _Measured(heuristics, {}, np.full(n_dof, np.nan))
+    return _Measured(heuristics, {}, np.full(n_dof, np.nan), *_ranges(estimation, validation))
 
 
 def _check_coordinates(model: Model, samples: Samples) -> None:

@@ -1,5 +1,6 @@
 """The command that writes a reduced model as code."""
 
+import contextlib
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.export.choice import (
     BASE,
     CONSISTENT,
@@ -107,6 +109,9 @@ def export(
     elif text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
     loading = {record: up_to_date(loaded, store, record) for record in records}
+    if Reduction in loading and Validation not in loading:
+        with contextlib.suppress(ArtifactError):  # it only tells more
+            loading[Validation] = up_to_date(loaded, store, Validation)
     simplified = None
     if text == TERMS:
         chosen, simplified, title = simplified_model(loading[TermReduction], _FUNCTIONS[what])
@@ -137,6 +142,7 @@ def export(
             single=single,
             simplified=simplified,
             origin=origin,
+            validation=loading.get(Validation),
         )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel
+from paramreduce_cli.export.exported import ExportedModel, about
 from paramreduce_cli.expressions.functions import Argument, Function
 
 _CALLS = {
@@ -28,11 +28,19 @@ _CALLS = {
 
 
 def casadi(model: ExportedModel) -> dict[str, bytes]:
-    """One file a function, for casadi.Function.load in Python, MATLAB and C++."""
+    """One file a function, for casadi.Function.load in Python, MATLAB and C++, and a text about them.
+
+    The function ``parameters`` gives the values, where they are no constants of the code.
+    """
     functions = {f.name: _function(f) for f in (*model.functions, *model.closures)}
     if model.closures:
         functions |= _loops(model, functions)
-    return {f"{model.name}_{name}.casadi": _saved(f) for name, f in functions.items()}
+    if not model.constant:
+        values = ca.DM([p.value for p in model.parameters])
+        functions["parameters"] = ca.Function("parameters", [], [values], [], ["phi"])
+    files = {f"{model.name}_{name}.casadi": _saved(f) for name, f in functions.items()}
+    lines = [*about(model), "", *(str(function) for function in functions.values())]
+    return files | {f"{model.name}.txt": ("\n".join(lines) + "\n").encode()}
 
 
 def _saved(function: ca.Function) -> bytes:

@@ -36,7 +36,7 @@ def _function(model: ExportedModel, function: Function) -> str:
         f"{array.name}: {array.text}, {' x '.join(map(str, array.shape))}"
         for array in (*function.arguments, *function.results)
     ]
-    lines += _comment([*documented, "", *about(model)])
+    lines += _comment([*documented, "", *about(model, 1)])
     steps, outputs = _LANGUAGE.body(function)
     lines += [f"{name} = {text};" for name, text in steps]
     for result in function.results:
@@ -57,7 +57,7 @@ _LANGUAGE = Language({name: name for name in FUNCTIONS}, repr, _element)
 
 def _parameters(model: ExportedModel) -> str:
     lines = [f"function phi = {model.name}_parameters()", "% The values of the parameters."]
-    lines += _comment(about(model))
+    lines += _comment(about(model, 1))
     values = "; ".join(repr(p.value) for p in model.parameters)
     return "\n".join([*lines, f"phi = [{values}];", "end"])
 
