@@ -3,11 +3,14 @@
 import os
 import sys
 import warnings
+from pathlib import Path
 
 import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
+from paramreduce_cli.cli.hints import meant_command, next_command, with_arguments
+from paramreduce_cli.cli.next_step import next_steps
 from paramreduce_cli.cli.terminal import complain, err, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
 from paramreduce_cli.stages import stages
@@ -26,13 +29,11 @@ def main() -> None:
     try:
         code = cli.main(standalone_mode=False)
     except ParamreduceError as error:
-        show_errors(str(error))
+        show_errors(with_arguments(str(error)))
         code = error.exit_code
-    except click.exceptions.NoArgsIsHelpError as error:
-        say(error.format_message())
-        code = WRONG
     except click.ClickException as error:
-        error.show()
+        show_errors(error.format_message())
+        complain(next_command(error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         err.print(
@@ -74,6 +75,14 @@ class _Commands(click.Group):
             return stage_command(name)
         return None
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """The command that is asked for, or the one that was meant."""
+        if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
+            raise click.UsageError(meant_command(args[0], self.list_commands(ctx)), ctx)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List them with what they do, read from their files."""
         rooms = {name: room for room in (stages, commands) for name in room}
@@ -83,11 +92,19 @@ class _Commands(click.Group):
             )
 
 
-@click.group(cls=_Commands, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(
+    cls=_Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    invoke_without_command=True,
+)
 @click.version_option(__version__, prog_name="paramreduce")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Find the smallest set of dynamic parameters that still predicts a robot's forces.
 
     A robot is one YAML file; results go to results/ROBOT. Start with
-    `paramreduce run configs/two_link.yaml`, or `paramreduce init --dh my_arm` for your own.
+    `paramreduce init --example two_link`, or `paramreduce init my_robot.urdf` for your own; without a
+    command it says what to do next in this folder.
     """
+    if context.invoked_subcommand is None:
+        say("\n".join(next_steps(Path())))

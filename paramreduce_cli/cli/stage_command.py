@@ -10,10 +10,12 @@ from paramreduce_cli.artifacts.store import file_of, load_file
 from paramreduce_cli.cli.options import (
     FORCE,
     JOBS,
+    LOG,
     PART,
     QUIET,
     RESULTS,
     SET,
+    VERBOSE,
     asked,
     cores,
     results_store,
@@ -68,7 +70,7 @@ def stage_command(name: str) -> click.Command:
             say_outcome(outcome)
         return _exit_code(stage, outcome, quiet)
 
-    params: list[Any] = [RESULTS, SET, FORCE, QUIET]
+    params: list[Any] = [RESULTS, SET, FORCE, QUIET, VERBOSE, LOG]
     if stage.lends_run is not None:
         params.append(JOBS)
     if stage.in_shares:

@@ -3,19 +3,23 @@
 from __future__ import annotations
 
 import io
+import json
 import os
 import re
+import shlex
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO
 
 import rich.console
 import rich.progress
 
-from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 
 if TYPE_CHECKING:
     from paramreduce_cli.records import Progress  # NumPy takes longer to load than all else here
@@ -39,14 +43,52 @@ out = _Console(highlight=False, soft_wrap=True, emoji=False)
 err = _Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
+class Journal:
+    """A file that is told what is said, with times; and whether every step is."""
+
+    def __init__(self) -> None:
+        self._file: TextIO | None = None
+        self.verbose = False
+
+    def open(self, path: Path) -> None:
+        """Append to a file from now on.
+
+        Raises:
+            ConfigError: It cannot be written.
+        """
+        try:
+            self._file = path.open("a", encoding="utf-8")
+        except OSError as error:
+            raise ConfigError(f"--log {path}: cannot be written: {error.strerror}.") from error
+        self.note(f"$ {' '.join(map(shlex.quote, sys.argv))}")
+
+    def note(self, text: str) -> None:
+        """Write lines, if there is a file."""
+        if self._file is not None:
+            now = time.strftime("%Y-%m-%dT%H:%M:%S")
+            self._file.writelines(f"{now} {line}\n" for line in text.splitlines())
+            self._file.flush()
+
+
+journal = Journal()
+
+
 def say(message: str) -> None:
     """Print to standard output, without markup."""
+    journal.note(message)
     out.print(harmless(message), markup=False)
 
 
 def complain(message: str) -> None:
     """Print to standard error, without markup."""
+    journal.note(message)
     err.print(harmless(message), markup=False)
+
+
+def emit(**event: Any) -> None:
+    """Print something as one line of JSON, for programs that read along."""
+    sys.stdout.write(json.dumps(event, ensure_ascii=False, allow_nan=False) + "\n")
+    sys.stdout.flush()
 
 
 def harmless(text: str) -> str:
@@ -104,9 +146,9 @@ interruption = Interruption()
 
 
 @contextmanager
-def progress_bars(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    """Show long work: bars on a terminal, plain lines elsewhere, nothing if quiet."""
-    with _shown_progress(quiet) as show:
+def progress_bars(quiet: bool, as_json: bool = False) -> Iterator[Callable[[Progress], None]]:
+    """Show long work: bars on a terminal, plain lines elsewhere, events as JSON, nothing if quiet."""
+    with _shown_progress(quiet, as_json) as show:
 
         def step(p: Progress) -> None:
             show(p)
@@ -117,17 +159,20 @@ def progress_bars(quiet: bool) -> Iterator[Callable[[Progress], None]]:
 
 
 @contextmanager
-def _shown_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
-    if quiet:
+def _shown_progress(quiet: bool, as_json: bool) -> Iterator[Callable[[Progress], None]]:
+    if as_json:
+        yield _Lines(1.0, lambda p, _: emit(event="progress", **vars(p))).show
+    elif quiet:
         yield lambda _: None
-    elif not err.is_terminal:
-        yield _plain_line
+    elif not err.is_terminal or journal.verbose:
+        yield _Lines(0.0 if journal.verbose else 10.0, _plain_line).show
     else:
         columns = (
             rich.progress.TextColumn("{task.description}"),
             rich.progress.BarColumn(),
             rich.progress.TaskProgressColumn(),
             rich.progress.TimeElapsedColumn(),
+            rich.progress.TimeRemainingColumn(elapsed_when_finished=True),
             rich.progress.TextColumn("{task.fields[remark]}"),
         )
         with rich.progress.Progress(*columns, console=err) as bars:
@@ -141,6 +186,31 @@ def _shown_progress(quiet: bool) -> Iterator[Callable[[Progress], None]]:
             yield advance
 
 
-def _plain_line(p: Progress) -> None:
-    if p.done >= p.total:
-        complain(f"{p.task}: done{', ' + p.remark if p.remark else ''}")
+class _Lines:
+    """Progress as lines, the last step of a task always, others not too often.
+
+    Args:
+        pause: Between two lines of a task, s.
+        tell: Given a step and the time that is left, s; None where that cannot be told.
+    """
+
+    def __init__(self, pause: float, tell: Callable[[Progress, float | None], None]) -> None:
+        self._pause, self._tell = pause, tell
+        self._begun: dict[str, float] = {}
+        self._told: dict[str, float] = {}
+
+    def show(self, p: Progress) -> None:
+        """Tell of a step, if it is time."""
+        now = time.monotonic()
+        begun = self._begun.setdefault(p.task, now)
+        if p.done < p.total and now - self._told.get(p.task, begun) < self._pause:
+            return
+        self._told[p.task] = now
+        share = p.done / p.total if p.total else 1.0
+        self._tell(p, (now - begun) * (1 - share) / share if 0 < share < 1 else None)
+
+
+def _plain_line(p: Progress, left: float | None) -> None:
+    state = "done" if p.done >= p.total else f"{p.done:.4g} of {p.total:.4g}"
+    rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
+    complain(f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}")

@@ -1,6 +1,7 @@
 """From a YAML file to a Config, with every error of the file reported at once."""
 
 import copy
+import difflib
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -21,6 +22,7 @@ from paramreduce_cli.fields.section import Section
 
 Problem = tuple[Key, str]
 S = TypeVar("S", bound=Section)
+_ROBOT_FILES = (".urdf", ".xml", ".xacro")
 _MOST_PROBLEMS = 30
 """That are listed at once."""
 
@@ -38,7 +40,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     """
     document = _read(path)
     if not isinstance(document.data, dict):
-        raise ConfigError(f"{path}: a config is a mapping that starts with robot: NAME.")
+        raise ConfigError(_no_mapping(path))
     for text in overrides:
         try:
             reading.apply_override(document, text)
@@ -152,9 +154,27 @@ def _read(path: Path) -> Document:
 
 
 def _similar(path: Path) -> str:
-    folder = path.parent if path.parent.is_dir() else Path(".")
-    names = sorted(p.name for p in folder.glob("*.yaml"))
-    return f" {folder} holds {', '.join(names)}." if names else ""
+    """What may have been meant instead of a file that there is not."""
+    below = Path("configs") / path.with_suffix(".yaml").name
+    for meant in (path.with_suffix(".yaml"), below):
+        if meant != path and meant.is_file():
+            return f" Did you mean {meant}?"
+    beside = (
+        sorted(other.name for other in path.parent.glob("*.yaml")) if path.parent.is_dir() else []
+    )
+    near = difflib.get_close_matches(path.name, beside, n=1)
+    if near:
+        return f" Did you mean {path.with_name(near[0])}?"
+    if beside:
+        return f" {path.parent} holds {', '.join(beside)}."
+    return f" `paramreduce init --dh {path.stem}` writes one, or `paramreduce init ROBOT.urdf` from a robot's file."
+
+
+def _no_mapping(path: Path) -> str:
+    """What is said of a file that is no config at all."""
+    if path.suffix in _ROBOT_FILES:
+        return f"{path}: is a robot's file; `paramreduce init {path}` makes a config of it."
+    return f"{path}: a config is a mapping that starts with robot: NAME; `paramreduce init --dh NAME` writes one."
 
 
 def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:

@@ -1,4 +1,4 @@
-"""Numbers as people write them in YAML: 1e-3, pi/2, -2*pi/3, 1/3, or 0.9*(R - r) with constants.
+"""Numbers as people write them in YAML: 1e-3, pi/2, -2*pi/3, 90deg, 1/3, or 0.9*(R - r) with constants.
 
 The constants of a config reach the numbers as pydantic's validation context.
 """
@@ -6,12 +6,14 @@ The constants of a config reach the numbers as pydantic's validation context.
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Mapping
 from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
-_CONSTANTS = {"pi": math.pi, "inf": math.inf}
+_CONSTANTS = {"pi": math.pi, "inf": math.inf, "deg": math.pi / 180}
+_DEGREES = re.compile(r"(?<=[\d.)])\s*(?:deg\b|°)")
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -28,14 +30,14 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
 
     Args:
         value: A number, or text made of numbers, ``pi``, ``inf``, names of constants,
-            + - * / ** and brackets.
+            + - * / ** and brackets; ``90deg`` is 90 degrees in rad.
         constants: By name.
 
     Raises:
         ValueError: It is neither.
     """
     known = {**_CONSTANTS, **(constants or {})}
-    example = "write one such as 0.5, 1e-3 or pi/2"
+    example = "write one such as 0.5, 1e-3, pi/2 or 90deg"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         raise ValueError(f"{value!r} is not a number; {example}")
     if isinstance(value, int | float):
@@ -44,7 +46,9 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
         try:
             if len(value) > _LONGEST:
                 raise ValueError("too long")
-            result = _evaluate(ast.parse(value.strip(), mode="eval").body, known)
+            result = _evaluate(
+                ast.parse(_DEGREES.sub("*deg", value.strip()), mode="eval").body, known
+            )
         except (ValueError, SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
             if constants:
                 example += f", or with the constants {', '.join(constants)}"
@@ -109,7 +113,7 @@ def read_constants(given: Any) -> tuple[dict[str, float], dict[str, str]]:
     for name, value in given.items() if isinstance(given, dict) else ():
         if not name.isidentifier() or name in _CONSTANTS:
             wrong[name] = (
-                "cannot be the name of a constant; use letters, digits and _, not pi or inf"
+                "cannot be the name of a constant; use letters, digits and _, not pi, inf or deg"
             )
             continue
         try:

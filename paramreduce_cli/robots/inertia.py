@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Section, Triple
@@ -13,6 +13,16 @@ from paramreduce_cli.records import INERTIAL, FloatArray, Kind
 
 _FIRST_MOMENTS = (Kind.MX, Kind.MY, Kind.MZ)
 _TENSOR = (Kind.IXX, Kind.IXY, Kind.IXZ, Kind.IYY, Kind.IYZ, Kind.IZZ)
+
+
+def _upper_triangle(value: Any) -> Any:
+    """The six elements of a tensor that may be written as a symmetric matrix."""
+    rows = isinstance(value, list) and len(value) == 3 and all(isinstance(r, list) for r in value)
+    if not rows or any(len(row) != 3 for row in value):
+        return value
+    if any(value[i][j] != value[j][i] for i in range(3) for j in range(i)):
+        raise ValueError("is no symmetric matrix; write [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
+    return [value[i][j] for i in range(3) for j in range(i, 3)]
 
 
 class BodyParameters(Section):
@@ -40,8 +50,11 @@ class BodyParameters(Section):
     """Inertia about the frame's origin, kg m^2."""
     com: Triple | None = None
     """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
-    inertia_com: Annotated[list[Number], Field(min_length=6, max_length=6)] | None = None
-    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
+    inertia_com: (
+        Annotated[list[Number], BeforeValidator(_upper_triangle), Field(min_length=6, max_length=6)]
+        | None
+    ) = None
+    """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] or all three rows, about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
 
     @model_validator(mode="after")
     def _one_way_only(self) -> BodyParameters:

@@ -5,7 +5,8 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import load_summary
-from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.cli.options import JSON
+from paramreduce_cli.cli.terminal import emit, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
 from paramreduce_cli.report.comparison import compare as compared
@@ -23,7 +24,10 @@ DIFFERENT = 1
 @click.option(
     "--only", multiple=True, type=click.Choice(list(QUANTITIES)), help="Compare only this."
 )
-def compare(first: Path, second: Path, given: tuple[str, ...], only: tuple[str, ...]) -> int:
+@JSON
+def compare(
+    first: Path, second: Path, given: tuple[str, ...], only: tuple[str, ...], as_json: bool
+) -> int:
     """Compare two summaries or results folders; exit code 1 if they differ too much.
 
     Orders are compared up to ties, trajectories by the best and the median condition number.
@@ -45,6 +49,9 @@ def compare(first: Path, second: Path, given: tuple[str, ...], only: tuple[str, 
             f"{first} or {second}: is no summary of this version ({error})."
         ) from error
     bad = [d for d in differences if not d.tolerated]
+    if as_json:
+        emit(agree=not bad, differences=[vars(d) for d in differences])
+        return DIFFERENT if bad else 0
     for difference in bad:
         say(f"{difference.what}: {difference.first} -> {difference.second}")
     tolerated = len(differences) - len(bad)

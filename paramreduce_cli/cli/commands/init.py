@@ -9,6 +9,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.config.examples import copy_example
 from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.config.log_template import guessed_columns, log_text
 from paramreduce_cli.config.schema import SourceSection
@@ -34,6 +35,8 @@ _FARTHEST = 1e6
 @click.option("--tree", "kind", flag_value="tree", help="A tree of bodies.")
 @click.option("--loop", "kind", flag_value="loop", help="A mechanism with a closed loop.")
 @click.option("--recorded", "kind", flag_value="recorded", help="An arm with recorded motions.")
+@click.option("--example", "kind", flag_value="example",
+              help="One of the robots that come along, such as puma560.")  # fmt: skip
 @click.option(
     "--joints",
     type=click.IntRange(1, 30),
@@ -68,8 +71,13 @@ def init(
         raise ConfigError(
             "say what the robot is: `paramreduce init robot.urdf`; or, to describe it in a config, "
             "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies), `--loop NAME` "
-            "(closed loops) or `--recorded NAME` (an arm with recorded motions)."
+            "(closed loops) or `--recorded NAME` (an arm with recorded motions); or to begin with one that works: "
+            "`paramreduce init --example puma560`."
         )
+    if kind == "example":
+        copied = copy_example(source, output or Path("configs") / f"{source}.yaml")
+        say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {copied[0]}")
+        return
     choice = SourceSection(
         file=(described(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
         ignored=list(ignored), floating=floating, uncoupled=uncouple,

@@ -13,15 +13,18 @@ from paramreduce_cli.cli.options import (
     CONFIG,
     FORCE,
     JOBS,
+    JSON,
+    LOG,
     QUIET,
     RESULTS,
     SET,
+    VERBOSE,
     asked,
     cores,
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import interruption, out, progress_bars, remark, say
+from paramreduce_cli.cli.terminal import emit, interruption, out, progress_bars, remark, say
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.records import Report
@@ -38,6 +41,9 @@ _TABLE_WIDTH = 110
 @FORCE
 @QUIET
 @JOBS
+@JSON
+@VERBOSE
+@LOG
 def run(
     config: Path,
     results: Path | None,
@@ -45,21 +51,25 @@ def run(
     force: bool,
     quiet: bool,
     jobs: int | None,
+    as_json: bool,
 ) -> int:
     """Run all stages in order, skipping what is up to date.
 
     Ends with a summary table and the path of the report. Exit code 1 where the selected
     model is not accepted.
 
+    With --json every event is a line: stages, progress, and the verdict at last.
+
     Example: paramreduce run configs/puma560.yaml
     """
+    quiet = quiet or as_json
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
     with placed_errors(config, overrides), store.locked():
         if overrides and results is None:
             _say_what_is_replaced(Runner(loaded, store))
         for stage in stages_to_run(loaded):
-            with progress_bars(quiet) as progress:
+            with progress_bars(quiet, as_json) as progress:
                 runner = Runner(
                     loaded,
                     store,
@@ -72,13 +82,19 @@ def run(
                     asked(config, results, overrides),
                 )
                 outcome = runner.run(stage, force=force)
-            if not quiet:
+            if as_json:
+                emit(event="stage", stage=stage.name, up_to_date=outcome.current,
+                     seconds=outcome.seconds, path=str(outcome.path))  # fmt: skip
+            elif not quiet:
                 say_outcome(outcome)
     summary = load_summary(store.path(Report))
     if not quiet:
         _say_summary(summary)
         say(f"Report: {store.path(Report).with_name('index.html')}")
     selected = summary["selected"]
+    if as_json:
+        page = store.path(Report).with_name("index.html")
+        emit(event="done", report=str(page), selected=selected)
     if not quiet:
         say(f"Selected: {selected['reason']}")
         for text in selected["remarks"]:

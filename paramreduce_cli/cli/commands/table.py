@@ -6,9 +6,11 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.atomic import atomically
-from paramreduce_cli.artifacts.report_files import load_summary
-from paramreduce_cli.cli.terminal import say
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
+from paramreduce_cli.cli.hints import results_below
+from paramreduce_cli.cli.options import JSON
+from paramreduce_cli.cli.terminal import emit, say
+from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
 from paramreduce_cli.report.table import Table
@@ -21,7 +23,8 @@ from paramreduce_cli.report.table import Table
     help="Files are called PREFIX.txt, .csv, .tex and .html.  [default: table, beside the first results]",
 )  # fmt: skip
 @click.option("--parquet", is_flag=True, help="Write PREFIX-runs.parquet too; it needs pyarrow.")
-def table(results: tuple[Path, ...], output: Path | None, parquet: bool) -> None:
+@JSON
+def table(results: tuple[Path, ...], output: Path | None, parquet: bool, as_json: bool) -> None:
     """Set one table over several robots or runs, as text, CSV, LaTeX and a page.
 
     RESULTS are results folders or summaries. Shows the selected model of each robot beside its
@@ -32,6 +35,10 @@ def table(results: tuple[Path, ...], output: Path | None, parquet: bool) -> None
     """
     rows, records = [], []
     for path in results:
+        if path.is_dir() and not (path / SUMMARY).exists():
+            raise ArtifactError(
+                f"{path}: holds no results itself.{results_below(path, 'table') or ' Make them with `paramreduce run`.'}"
+            )
         try:
             summary = load_summary(path)
             rows.append(overview_row(summary))
@@ -45,6 +52,9 @@ def table(results: tuple[Path, ...], output: Path | None, parquet: bool) -> None
     _write(prefix, made, records)
     if parquet:
         _write_parquet(prefix.with_name(f"{prefix.name}-runs.parquet"), records)
+    if as_json:
+        emit(runs=records)
+        return
     for one in made:
         say(one.to_text())
     say(f"Written to {prefix}.txt, .csv, .tex, .html and {prefix.name}-runs.csv")

@@ -1,0 +1,113 @@
+"""The command that says what this machine has."""
+
+import importlib.metadata
+import os
+import platform
+import re
+import shutil
+import subprocess
+import sys
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+
+import click
+import rich.table
+
+from paramreduce_cli import __version__
+from paramreduce_cli.cli.options import JSON, cores
+from paramreduce_cli.cli.terminal import emit, out
+from paramreduce_cli.errors import ParamreduceError
+
+_EXTRAS = {"identify": "cvxpy", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
+"""A distribution that each extra brings."""
+WRONG = 1
+
+
+@click.command()
+@JSON
+def doctor(as_json: bool) -> int:
+    """Say what this machine has: compiler, caches, linear algebra, threads, extras.
+
+    Exit code 1 if something is missing that everything needs.
+    """
+    findings = list(_findings())
+    if as_json:
+        emit(findings=[dict(zip(("what", "state", "found"), one, strict=True)) for one in findings])
+    else:
+        table = rich.table.Table(box=None, pad_edge=False, show_header=False)
+        for what, state, found in findings:
+            table.add_row(what, {"ok": "[green]ok[/]", "slow": "[yellow]slower[/]", "none": "-"}.get(state, "[red]wrong[/]"), found)  # fmt: skip
+        out.print(table)
+    return WRONG if any(state == "wrong" for _, state, _ in findings) else 0
+
+
+def _findings() -> Iterator[tuple[str, str, str]]:
+    """What was looked at, how it is, and what was found."""
+    yield "paramreduce", "ok", f"{__version__} in {Path(__file__).parents[2]}"
+    yield "Python", "ok", f"{platform.python_version()}, {sys.executable}, {platform.machine()}"
+    yield _compiler()
+    yield from _caches()
+    yield "cores", "ok", f"{cores()} that this process may use"
+    threads = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
+    yield "threads", "ok", ", ".join(f"{k}={v}" for k, v in threads.items() if v)
+    yield _algebra()
+    for extra, name in _EXTRAS.items():
+        found = _version(name)
+        how = f"pip install 'paramreduce[{extra}]' brings {name}"
+        yield f"extra {extra}", "ok" if found else "none", f"{name} {found}" if found else how
+
+
+def _compiler() -> tuple[str, str, str]:
+    from paramreduce_cli.expressions.compiled import compiler
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            command = compiler()
+    except ParamreduceError as error:
+        return "C compiler", "wrong", str(error)
+    if command is None:
+        return "C compiler", "slow", "none; install gcc, or set CC: models run several times slower"
+    said = subprocess.run(
+        [*command, "--version"], capture_output=True, text=True, check=False, timeout=20
+    )
+    return "C compiler", "ok", f"{' '.join(command)}: {said.stdout.partition(chr(10))[0]}"
+
+
+def _caches() -> Iterator[tuple[str, str, str]]:
+    from paramreduce_cli.expressions.cache import cache_folder
+
+    try:
+        folder = cache_folder()
+    except (ParamreduceError, OSError) as error:
+        yield "cache of compiled models", "wrong", str(error)
+    else:
+        files = list(folder.glob("*.so"))
+        size = sum(file.stat().st_size for file in files) / 1e6
+        free = shutil.disk_usage(folder).free / 1e9
+        text = f"{folder}: {len(files)} models, {size:.1f} MB; {free:.1f} GB are free"
+        yield "cache of compiled models", "ok", text
+    package = Path(__file__).parents[2]
+    place = os.environ.get("NUMBA_CACHE_DIR")
+    writable = place is not None or os.access(package, os.W_OK)
+    text = (
+        place
+        or f"beside the package{'' if writable else ', which cannot be written: set NUMBA_CACHE_DIR'}"
+    )
+    yield "cache of Numba", "ok" if writable else "slow", text
+
+
+def _algebra() -> tuple[str, str, str]:
+    import numpy as np
+
+    found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
+    version = re.sub(r"\s+", " ", str(found.get("version", "")))
+    return "linear algebra", "ok", f"NumPy {np.__version__}, {found.get('name')} {version}"
+
+
+def _version(name: str) -> str | None:
+    try:
+        return importlib.metadata.version(name)
+    except importlib.metadata.PackageNotFoundError:
+        return None

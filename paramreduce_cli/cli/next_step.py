@@ -1,0 +1,74 @@
+"""What to do next in a folder, for who calls paramreduce without a command."""
+
+import re
+from pathlib import Path
+
+from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.texts import share
+
+_MOST = 8
+"""Robots that are listed."""
+
+
+def next_steps(folder: Path) -> list[str]:
+    """Lines that say what there is and what to type.
+
+    Args:
+        folder: Where the user is.
+    """
+    configs = [path for path in _candidates(folder) if _is_config(path)]
+    if not configs:
+        return [
+            "There is no robot here yet. Begin with one of these:",
+            "  paramreduce init my_robot.urdf        a robot from its URDF or MJCF",
+            "  paramreduce init --dh my_arm          an arm in Denavit-Hartenberg parameters, to be filled in",
+            "  paramreduce init --example puma560    one that works",
+            "",
+            "paramreduce --help lists all commands.",
+        ]
+    configs.sort(key=lambda path: not (folder / _results(path) / SUMMARY).exists())
+    lines = [line for path in configs[:_MOST] for line in _robot(folder, path)]
+    if len(configs) > _MOST:
+        lines.append(f"and {len(configs) - _MOST} more")
+    return [*lines, "", "paramreduce --help lists all commands."]
+
+
+def _candidates(folder: Path) -> list[Path]:
+    found = [*sorted(folder.glob("*.yaml")), *sorted((folder / "configs").glob("*.yaml"))]
+    return [path.relative_to(folder) if folder != Path() else path for path in found]
+
+
+def _is_config(path: Path) -> bool:
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            return re.search(r"^robot:", file.read(4096), re.MULTILINE) is not None
+    except OSError:
+        return False
+
+
+def _results(path: Path) -> Path:
+    """Where the results of a config go."""
+    text = path.read_text(encoding="utf-8", errors="replace")
+    named = re.search(r"^robot:\s*[\"']?([\w.-]+)", text, re.MULTILINE)
+    return Path("results") / (named[1] if named else path.stem)
+
+
+def _robot(folder: Path, path: Path) -> list[str]:
+    """What was made of a robot, and the next command."""
+    results = _results(path)
+    made = sorted(file.name for file in (folder / results).glob("*.h5"))
+    if not (folder / results / SUMMARY).exists():
+        state = f"begun ({', '.join(made)}); go on" if made else "not run yet"
+        return [f"{path}: {state}: paramreduce run {path}"]
+    try:
+        selected = load_summary(folder / results)["selected"]
+        error = share(selected["torque_error"]["estimation"])
+    except (ArtifactError, KeyError, TypeError) as problem:
+        return [f"{path}: its report cannot be read ({problem}): paramreduce run {path}"]
+    return [
+        f"{path}: {selected['heuristic']} with {selected['n']} parameters, torque error {error}",
+        f"  paramreduce open {results}    its report",
+        f"  paramreduce export {path}    its code",
+        f"  paramreduce run {path}    again, if the config has changed",
+    ]

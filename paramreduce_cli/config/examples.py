@@ -1,0 +1,55 @@
+"""The configs that come along: beside the package in its repository, or as data of its distribution."""
+
+import importlib.metadata
+import re
+import shutil
+from pathlib import Path
+
+from paramreduce_cli.errors import ConfigError
+
+_INSTALLED = "share/paramreduce/configs/"
+
+
+def examples() -> dict[str, Path]:
+    """Files of the robots that come along, by name."""
+    beside = Path(__file__).parents[2] / "configs"
+    if (beside.parent / "pyproject.toml").exists():
+        files = list(beside.glob("*.yaml"))
+    else:
+        listed = importlib.metadata.distribution("paramreduce").files or ()
+        found = [entry for entry in listed if _INSTALLED in entry.as_posix()]
+        files = [Path(str(entry.locate())) for entry in found if entry.suffix == ".yaml"]
+    return {path.stem: path for path in sorted(files)}
+
+
+def copy_example(name: str, path: Path) -> list[Path]:
+    """Copy a robot's config, and the files that it names beside it.
+
+    Args:
+        name: Of the robot.
+        path: Where its config is to be.
+
+    Returns:
+        What was written, the config first.
+
+    Raises:
+        ConfigError: There is no such robot, or a file is there already.
+    """
+    known = examples()
+    if name not in known:
+        raise ConfigError(f"--example {name}: there is {', '.join(known)}.")
+    source = known[name]
+    named = re.findall(r"[\w./-]+/[\w.-]+\.\w+", source.read_text(encoding="utf-8"))
+    beside = [entry for entry in dict.fromkeys(named) if (source.parent / entry).is_file()]
+    inside = [entry for entry in beside if ".." not in Path(entry).parts]
+    pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
+    taken = [target for _, target in pairs if target.exists()]
+    if taken:
+        raise ConfigError(f"{taken[0]}: exists already; choose another place with --output.")
+    try:
+        for original, target in pairs:
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(original, target)
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
+    return [target for _, target in pairs]
