@@ -1,3 +1,26 @@
-"""paramreduce: the smallest set of dynamic parameters that still predicts a robot's forces."""
+"""paramreduce: the smallest set of dynamic parameters that still predicts a robot's forces.
+
+From Python everything is in :mod:`paramreduce_cli.api` and here by its name::
+
+    import paramreduce_cli as pr
+
+    config = pr.load_config("configs/two_link.yaml")
+    model = pr.build_model(config)
+"""
+
+from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
+
+if TYPE_CHECKING:
+    from paramreduce_cli.api import *  # noqa: F403
+
+
+def __getattr__(name: str) -> Any:
+    """Names of the interface, loaded when one is first asked for: the command line does without."""
+    if not name.startswith("_"):
+        import paramreduce_cli.api as api
+
+        if name in api.__all__:
+            return getattr(api, name)
+    raise AttributeError(f"module 'paramreduce_cli' has no attribute {name!r}")

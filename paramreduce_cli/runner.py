@@ -8,7 +8,7 @@ import hashlib
 import importlib.metadata
 import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -97,6 +97,57 @@ def _logs(inputs: _Inputs) -> RawLogs:
     held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
     training = tuple(log for name, log in found.items() if name.startswith("training"))
     return RawLogs(training, held_out)
+
+
+def _coefficients(inputs: _Inputs) -> Coefficients | None:
+    paths = inputs.files(Coefficients)
+    return load_coefficients(paths["coefficients"]) if paths else None
+
+
+def _recordings(inputs: _Inputs) -> Recordings:
+    assert inputs.config is not None
+    found: dict[str, Recording | None] = {"estimation": None, "validation": None}
+    for name, path in inputs.files(Recordings).items():
+        found[name] = load_recording(path, inputs.config.n_dof)
+    return Recordings(**found)
+
+
+_OUTSIDE: dict[type, Callable[[_Inputs], Any]] = {
+    Coefficients: _coefficients,
+    Recordings: _recordings,
+    RawLogs: _logs,
+}
+"""What stages read from files of the user's own."""
+
+
+def made_in_memory(
+    stage: Stage, config: Config | Settings, records: Mapping[type, Any], run: Run
+) -> Any:
+    """Run a stage on records, without files.
+
+    Args:
+        stage: Which one.
+        config: Whose sections it takes.
+        records: What other stages have made, by type.
+        run: Workers and an audience.
+
+    Raises:
+        TypeError: A record that it needs is not among them.
+        ParamreduceError: It fails.
+    """
+    inputs = _Inputs(config if isinstance(config, Config) else None)
+    lent: dict[type, Any] = {Run: run, Share: WHOLE, Shares: UNSHARED, **records}
+    arguments: dict[str, Any] = {}
+    for entry in stage.inputs:
+        if is_section(entry.type):
+            arguments[entry.name] = section(config, entry.type)
+        elif entry.type in _OUTSIDE:
+            arguments[entry.name] = _OUTSIDE[entry.type](inputs)
+        elif lent.get(entry.type) is not None or entry.optional:
+            arguments[entry.name] = lent.get(entry.type)
+        else:
+            raise TypeError(f"{stage.name} needs a {entry.type.__name__}")
+    return _called(stage, arguments)
 
 
 @dataclass
@@ -263,13 +314,8 @@ class Runner:
             return section(self.config or self.settings, entry.type)
         if entry.type is Provenance:
             return self._provenance()
-        if entry.type is Coefficients:
-            paths = inputs.files(Coefficients)
-            return load_coefficients(paths["coefficients"]) if paths else None
-        if entry.type is Recordings:
-            return self._recordings(inputs)
-        if entry.type is RawLogs:
-            return _logs(inputs)
+        if entry.type in _OUTSIDE:
+            return _OUTSIDE[entry.type](inputs)
         return self._artifact(entry, inputs)
 
     def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:
@@ -328,13 +374,6 @@ class Runner:
             for name, found in stamps.items()
             if found is not None and name in stamp.inputs and found.digest != stamp.inputs[name]
         ]
-
-    def _recordings(self, inputs: _Inputs) -> Recordings:
-        assert self.config is not None
-        found: dict[str, Recording | None] = {"estimation": None, "validation": None}
-        for name, path in inputs.files(Recordings).items():
-            found[name] = load_recording(path, self.config.n_dof)
-        return Recordings(**found)
 
     def _lend_run(
         self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs, unchanged: frozenset[str]

@@ -13,7 +13,7 @@ import paramreduce_cli
 
 PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
-    {"cli", "__main__"},
+    {"cli", "__main__", "api"},
     {"workflow", "runner"},
     {"sweep"},
     {"pipeline"},

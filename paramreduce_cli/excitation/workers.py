@@ -105,7 +105,13 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
     missing = [key for key in keys if key not in found]
     if not missing:
         return found
-    excitation_of(task)  # compile once, before the workers all ask for it
+    excitation = excitation_of(task)  # compile once, before the workers all ask for it
+    if run.jobs == 0:
+        for key in missing:
+            made = optimise_trajectory(excitation, task.settings, _seed(task, key), lambda _: None)
+            found[key] = run.parts[key] = made
+            run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
+        return found
     with _pool(task, min(run.jobs, len(missing)), run) as pool:
         with _interruption_held():  # so that new processes are born without it
             futures = {pool.submit(_optimise, key): key for key in missing}
@@ -190,10 +196,14 @@ def _end_with(parent: int) -> None:
 
 def _optimise(key: str) -> Trajectory:
     task = _Worker.task
-    seed = [task.seed, zlib.crc32(key.encode())]
 
     def tell(share: float) -> None:
         if share < 1.0:
             _Worker.news.put(Progress(key, share, 1.0))
 
-    return optimise_trajectory(_Worker.excitation, task.settings, seed, tell)
+    return optimise_trajectory(_Worker.excitation, task.settings, _seed(task, key), tell)
+
+
+def _seed(task: ExcitationTask, key: str) -> list[int]:
+    """Of a trajectory's own random numbers."""
+    return [task.seed, zlib.crc32(key.encode())]

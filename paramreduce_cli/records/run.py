@@ -44,6 +44,7 @@ class Run:
     """What the caller lends a stage: workers, a place for finished parts, an audience."""
 
     jobs: int = 1
+    """Worker processes; 0 for doing all in this one."""
     parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
     """Finished parts of an artifact that is not whole yet, kept across interruptions."""
     progress: Callable[[Progress], None] = lambda _: None

@@ -32,7 +32,7 @@ def effort(wanted: ReductionSection, run: Run) -> Effort:
         seed=wanted.swap.seed,
         time_limit=wanted.best_subset.time_limit,
         node_limit=wanted.best_subset.node_limit,
-        jobs=run.jobs,
+        jobs=max(1, run.jobs),
     )
 
 

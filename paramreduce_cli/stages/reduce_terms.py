@@ -71,7 +71,7 @@ def reduce_terms(
             judge.thinned(samples.estimation, _SEARCHED),
             judge.thinned(validation, _WATCHED) if validation is not None else None,
             judge.poses(_POSES),
-            budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=run.jobs, progress=progress,
+            budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
         )  # fmt: skip
         fitted = judge.thinned(samples.estimation, _FITTED)
         refitted = (one.refitted(fitted, budget) for one in found)

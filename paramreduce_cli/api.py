@@ -1,0 +1,342 @@
+"""The pipeline from Python: stages as functions on records, and what a results folder holds.
+
+The functions call the stages that the commands call, with the sections of the config that these
+name. Records are immutable dataclasses of NumPy arrays, documented in :mod:`paramreduce_cli.records`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.config import Config, load_config
+from paramreduce_cli.config.schema import Settings
+from paramreduce_cli.errors import ParamreduceError
+from paramreduce_cli.export.writing import export
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.pipeline import maker_of, pipeline, stages_to_run
+from paramreduce_cli.records import (
+    FloatArray,
+    Identification,
+    MeasuredLog,
+    Model,
+    Progress,
+    ReducedModel,
+    Reduction,
+    Run,
+    Samples,
+    TermReduction,
+    Trajectories,
+    Validation,
+)
+from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
+from paramreduce_cli.runner import Runner, made_in_memory
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = [
+    "Config",
+    "ParamreduceError",
+    "Results",
+    "base_model",
+    "build_model",
+    "chosen",
+    "code",
+    "frame",
+    "full_model",
+    "identify",
+    "inverse_dynamics",
+    "load_config",
+    "open_results",
+    "optimize_trajectories",
+    "process_log",
+    "reduce",
+    "reduce_terms",
+    "run",
+    "sample",
+    "validate",
+]
+
+
+def build_model(config: Config) -> Model:
+    """Derive a robot's model, its parameters and its base parameters.
+
+    Args:
+        config: As :func:`load_config` reads it.
+
+    Raises:
+        ParamreduceError: The config describes no mechanism that can be.
+    """
+    return _made(Model, config)
+
+
+def optimize_trajectories(config: Config, model: Model, *, jobs: int = 0) -> Trajectories:
+    """Find exciting trajectories, or take those that the config names.
+
+    Args:
+        config: What is asked for in ``trajectories``.
+        model: From :func:`build_model`.
+        jobs: Worker processes, which a script starts below ``if __name__ == "__main__":`` alone; 0 for none. The numbers
+            do not depend on them.
+    """
+    return _made(Trajectories, config, model, jobs=jobs)
+
+
+def process_log(config: Config, model: Model) -> MeasuredLog:
+    """Make the logs ready that ``sampling.log`` names."""
+    return _made(MeasuredLog, config, model)
+
+
+def sample(
+    config: Config, model: Model, source: Trajectories | MeasuredLog | None = None
+) -> Samples:
+    """Sample estimation and validation set.
+
+    Args:
+        config: What is asked for in ``sampling``.
+        model: From :func:`build_model`.
+        source: Trajectories or a log; None for recordings that the config names.
+
+    Returns:
+        Sets that are computed block by block whenever they are read.
+    """
+    return _made(Samples, config, model, source)
+
+
+def reduce(
+    samples: Samples, config: Config | None = None, model: Model | None = None, *, jobs: int = 0
+) -> Reduction:
+    """Select parameters with each heuristic, for every number of them.
+
+    Args:
+        samples: From :func:`sample`, or of one's own.
+        config: What is asked for in ``reduction``; the defaults if None.
+        model: Of the robot, for criteria that need one.
+        jobs: Threads of proofs.
+    """
+    return _made(Reduction, config or Settings(), samples, model, jobs=jobs)
+
+
+def reduce_terms(
+    config: Config, model: Model, samples: Samples, reduction: Reduction, *, jobs: int = 0
+) -> TermReduction:
+    """Leave terms out of the functions of reduced models, and fit what is left."""
+    return _made(TermReduction, config, model, samples, reduction, jobs=jobs)
+
+
+def validate(
+    samples: Samples,
+    reduction: Reduction,
+    config: Config | None = None,
+    model: Model | None = None,
+    *,
+    jobs: int = 0,
+) -> Validation:
+    """Judge all reduced models on both sets, and select one.
+
+    Args:
+        samples: Of both sets.
+        reduction: From :func:`reduce`.
+        config: What is asked for in ``selected`` and ``validation``; the defaults if None.
+        model: Of the robot; without it torques alone are judged.
+        jobs: Worker processes; 0 for none.
+    """
+    return _made(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
+
+
+def identify(
+    config: Config,
+    model: Model,
+    samples: Samples,
+    validation: Validation,
+    log: MeasuredLog | None = None,
+) -> Identification:
+    """Identify base parameters and those of the selected model from measured torques."""
+    return _made(Identification, config, model, samples, validation, log)
+
+
+def chosen(
+    reduction: Reduction, heuristic: str, n: int, model: Model | None = None
+) -> ReducedModel:
+    """A reduced model by heuristic and size.
+
+    Args:
+        reduction: From :func:`reduce`.
+        heuristic: Such as ``swap`` or ``swap@operations``.
+        n: Number of parameters.
+        model: Of the robot, whose values order what the parameters stand for.
+
+    Raises:
+        KeyError: There is no such model.
+    """
+    row = reduction.heuristics[heuristic].row(n)
+    if row is None:
+        raise KeyError(f"{heuristic}:{n}")
+    return reduced_model(reduction, heuristic, row, None if model is None else model.values)
+
+
+def code(
+    model: Model,
+    parameters: ReducedModel,
+    language: str = "c",
+    *,
+    title: str = "",
+    constant: bool = False,
+    single: bool = False,
+) -> dict[str, bytes]:
+    """Files of a model in some language, checked against plain recursion.
+
+    Args:
+        model: Of the robot.
+        parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
+        language: c, casadi, latex, matlab or python.
+        title: What the model is called in the files.
+        constant: Whether the values are part of the code.
+        single: Whether numbers have single precision, in C.
+
+    Raises:
+        ParamreduceError: The functions do not compute what the straightforward model does.
+    """
+    return export(
+        model, parameters, title=title, language=language, constant=constant, single=single
+    )
+
+
+def inverse_dynamics(
+    model: Model, parameters: ReducedModel, q: FloatArray, dq: FloatArray, ddq: FloatArray
+) -> FloatArray:
+    """Torques of a model along a motion.
+
+    Args:
+        model: Of the robot.
+        parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
+        q: Generalised coordinates, (n_samples, n_q), rad or m.
+        dq: Velocities, same shape.
+        ddq: Accelerations, same shape.
+
+    Returns:
+        (n_samples, n_dof), N m or N
+    """
+    arrays = (np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq))
+    torques: FloatArray = Dynamics(model.mechanism).regressor(*arrays) @ parameters.standard
+    return torques
+
+
+def run(
+    config: Path | str,
+    results: Path | str | None = None,
+    overrides: Sequence[str] = (),
+    *,
+    jobs: int = 0,
+    progress: Callable[[Progress], None] = lambda _: None,
+) -> Results:
+    """Run all stages in order, skipping what is up to date, as ``paramreduce run`` does.
+
+    Args:
+        config: The YAML.
+        results: Folder of the artifacts; results/ROBOT if None.
+        overrides: ``key.key=value`` texts that replace what the file says.
+        jobs: Worker processes; 0 for none.
+        progress: Told of long work.
+
+    Raises:
+        ParamreduceError: A stage fails; what was finished is kept.
+    """
+    loaded = load_config(Path(config), overrides)
+    store = Store(Path(results) if results is not None else Path("results") / loaded.robot)
+    with store.locked():
+        for stage in stages_to_run(loaded):
+            Runner(loaded, store, jobs, progress).run(stage)
+    return Results(store.folder)
+
+
+def open_results(folder: Path | str) -> Results:
+    """What a results folder holds."""
+    return Results(Path(folder))
+
+
+@dataclass(frozen=True)
+class Results:
+    """A results folder; each record is read, and checked, when it is first asked for."""
+
+    folder: Path
+
+    @cached_property
+    def summary(self) -> dict[str, Any]:
+        """Contents of ``summary.json``."""
+        return load_summary(self.folder)
+
+    @cached_property
+    def model(self) -> Model:
+        """The robot's model."""
+        return self._record(Model)
+
+    @cached_property
+    def trajectories(self) -> Trajectories:
+        """Of both sets."""
+        return self._record(Trajectories)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """Both sets, read from the file block by block."""
+        return self._record(Samples)
+
+    @cached_property
+    def reduction(self) -> Reduction:
+        """Subsets of all heuristics."""
+        return self._record(Reduction)
+
+    @cached_property
+    def validation(self) -> Validation:
+        """What they are worth, and the selected one."""
+        return self._record(Validation)
+
+    @cached_property
+    def identification(self) -> Identification:
+        """From measured torques."""
+        return self._record(Identification)
+
+    @cached_property
+    def terms(self) -> TermReduction:
+        """Functions with terms left out."""
+        return self._record(TermReduction)
+
+    def _record(self, kind: type) -> Any:
+        return load_file(Store(self.folder).path(kind), kind, None, maker_of(kind))[0]
+
+
+def frame(record: Reduction | Validation) -> pd.DataFrame:
+    """All models of a reduction or a validation as a table, a row each; it needs pandas.
+
+    Columns of a reduction: heuristic, n, torque_error, parameters. Of a validation: heuristic, n, and
+    what is known of every model, errors and operations, but for single joints.
+    """
+    import pandas as pd
+
+    rows = []
+    if isinstance(record, Reduction):
+        for name, found in record.heuristics.items():
+            for k, n in enumerate(found.n.tolist()):
+                kept = tuple(record.columns.names[c] for c in sorted(found.subsets[k].tolist()))
+                error = float(found.torque_error[k])
+                rows.append({"heuristic": name, "n": n, "torque_error": error, "parameters": kept})
+        return pd.DataFrame(rows)
+    for name, judged in record.heuristics.items():
+        columns = {key: value for key, value in vars(judged).items() if value.ndim == 1}
+        sizes = range(judged.n.size)
+        rows += [{"heuristic": name} | {key: all[k] for key, all in columns.items()} for k in sizes]
+    return pd.DataFrame(rows)
+
+
+def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
+    stage = next(stage for stage in pipeline() if stage.output is kind)
+    given = {type(record): record for record in records if record is not None}
+    return made_in_memory(stage, config, given, Run(jobs))
