@@ -1,6 +1,7 @@
 """Files that are replaced whole or not at all, whatever the disk does."""
 
 import contextlib
+import difflib
 import errno
 import os
 import re
@@ -45,6 +46,15 @@ def check_is_file(path: Path) -> None:
     """
     if path.exists() and not path.is_file():
         raise ArtifactError(f"{path}: is no file.")
+
+
+def missing(path: Path, hint: str = "") -> ArtifactError:
+    """That a file is not there, with a remedy if there is one, else with what may have been meant."""
+    beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
+    near = difflib.get_close_matches(path.name, beside, n=1)
+    meant = f"Did you mean {path.with_name(near[0])}?" if near else ""
+    remedy = hint or meant
+    return ArtifactError(f"{path}: there is no such file.{' ' + remedy if remedy else ''}")
 
 
 SHARES = ".parts"

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from paramreduce_cli.artifacts.atomic import missing
 from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import Reader, reading
-from paramreduce_cli.errors import ArtifactError, DataError
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import Coefficients, FloatArray, Recording
 
 _HDF5 = (".h5", ".hdf5")
@@ -60,7 +61,7 @@ def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
         }
         return trajectories["period"], sets
     except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
+        raise missing(path) from error
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
         raise DataError(
             f"{path}: holds no Fourier coefficients ({type(error).__name__}: {error}). Bring a "

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import check_is_file
+from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
 
@@ -57,7 +57,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                     )
                 numbers.extend(_number(path, rows.line_num, row[k]) for k in kept)
     except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
+        raise missing(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
     names = [header[k] for k in kept]

@@ -19,7 +19,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file
+from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file, missing
 from paramreduce_cli.errors import ArtifactError
 
 SCHEMA = 11
@@ -311,7 +311,7 @@ def reading(path: Path, hint: str = "") -> Iterator[Reader]:
         ArtifactError: It is missing, truncated or no HDF5 file.
     """
     if not path.exists():
-        raise ArtifactError(f"{path}: there is no such file.{' ' + hint if hint else ''}")
+        raise missing(path, hint)
     check_is_file(path)
     try:
         file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)

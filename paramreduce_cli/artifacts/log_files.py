@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import check_is_file
+from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import reading
 from paramreduce_cli.errors import ArtifactError, DataError
@@ -55,7 +55,7 @@ def _npz(path: Path) -> RawLog:
         with np.load(path, allow_pickle=False) as arrays:
             return _from_arrays(path, _readable(arrays))
     except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
+        raise missing(path) from error
     except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
         raise ArtifactError(f"{path}: cannot be read as NPZ ({error}).") from error
 
@@ -94,7 +94,7 @@ def _bag(path: Path) -> RawLog:
             f"{path}: ROS bags are read by rosbags; install it with `pip install 'paramreduce[rosbag]'`."
         ) from error
     if not path.exists():
-        raise ArtifactError(f"{path}: there is no such file.")
+        raise missing(path)
     found: dict[str, list[float]] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:

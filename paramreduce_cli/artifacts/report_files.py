@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.atomic import atomically, check_is_file
+from paramreduce_cli.artifacts.atomic import atomically, check_is_file, missing
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
@@ -129,6 +129,6 @@ def load_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
+        raise missing(path) from error
     except (OSError, ValueError, RecursionError) as error:
         raise ArtifactError(f"{path}: is not JSON: {error}.") from error

@@ -12,7 +12,7 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import check_is_file, remove_leftovers
+from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
 from paramreduce_cli.artifacts.report_files import (
     SUMMARY,
@@ -230,7 +230,7 @@ def file_digest(path: Path) -> str:
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError as error:
-        raise ArtifactError(f"{path}: there is no such file.") from error
+        raise missing(path) from error
     except OSError as error:
         raise ArtifactError(f"{path}: cannot be read: {error.strerror}.") from error
 

@@ -85,5 +85,7 @@ def results_store(config: Config | None, results: Path | None) -> Store:
     if results is not None:
         return Store(results)
     if config is None:
-        raise ConfigError("--results: without a config, say where the results go.")
+        raise ConfigError(
+            "--results: without a config, say where the results go or are, such as --results results/my_samples."
+        )
     return Store(Path("results") / config.robot)

@@ -51,6 +51,8 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     lines += [_line(document, problem) for problem in problems]
     if lines or config is None:
         lines = list(dict.fromkeys(lines))
+        if "description" not in document.data:
+            lines.append(f"{path}: `paramreduce init --dh NAME` writes a whole one to begin with.")
         more = len(lines) - _MOST_PROBLEMS
         if more > 0:
             lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]

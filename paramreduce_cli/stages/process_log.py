@@ -14,7 +14,10 @@ def process_log(log: LogSection | None, model: Model, logs: RawLogs) -> Measured
     What was done to them, and what looks wrong in them, is part of the result.
     """
     if log is None:
-        raise ConfigError("is missing: it says where the logs are.", ("sampling", "log"))
+        raise ConfigError(
+            "is missing: it says where the logs are; `paramreduce init ROBOT.urdf --log FILE` writes it.",
+            ("sampling", "log"),
+        )
     found = processed(logs, log, model.mechanism.coordinate_names)
     for text in found.doubts:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)

@@ -45,7 +45,10 @@ def reduce_terms(
     within the budget on the validation set too, measured ones are held out.
     """
     if section is None:
-        raise ConfigError("is missing: it says which errors are allowed.", ("terms",))
+        raise ConfigError(
+            "is missing: it says which errors are allowed, such as `terms: {torque_error: 0.01}`.",
+            ("terms",),
+        )
     measured = sampling.log is not None or (
         sampling.estimation_file is not None and sampling.torques == "measured"
     )

@@ -12,6 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import click
+import rich.markup
 import rich.table
 
 from paramreduce_cli import __version__
@@ -21,6 +22,7 @@ from paramreduce_cli.errors import ParamreduceError
 
 _EXTRAS = {"identify": "cvxpy", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
 """A distribution that each extra brings."""
+_SHOWN = {"ok": "[green]ok[/]", "slow": "[yellow]slower[/]", "none": "-", "wrong": "[red]wrong[/]"}
 WRONG = 1
 
 
@@ -37,7 +39,7 @@ def doctor(as_json: bool) -> int:
     else:
         table = rich.table.Table(box=None, pad_edge=False, show_header=False)
         for what, state, found in findings:
-            table.add_row(what, {"ok": "[green]ok[/]", "slow": "[yellow]slower[/]", "none": "-"}.get(state, "[red]wrong[/]"), found)  # fmt: skip
+            table.add_row(what, _SHOWN[state], rich.markup.escape(found))
         out.print(table)
     return WRONG if any(state == "wrong" for _, state, _ in findings) else 0
 

@@ -1,0 +1,167 @@
+"""What people type first, and what they are told to type next."""
+
+import json
+import re
+import shutil
+
+import pytest
+from conftest import CONFIGS
+
+MOVES = [
+    (["rnu", "configs/two_link.yaml"], "did you mean `paramreduce run`"),
+    (["Run", "configs/two_link.yaml"], "did you mean `paramreduce run`"),
+    (["build_model", "configs/two_link.yaml"], "did you mean `paramreduce build-model`"),
+    (["optimise-trajectories", "x.yaml"], "did you mean `paramreduce optimize-trajectories`"),
+    (["help"], "see `paramreduce --help`"),
+    (["-v"], "paramreduce --help lists all commands"),
+    (["run"], "Example: paramreduce run configs/puma560.yaml"),
+    (["run", "two_link"], "Did you mean configs/two_link.yaml?"),
+    (["run", "two_link.yaml"], "Did you mean configs/two_link.yaml?"),
+    (["run", "configs/two_lnik.yaml"], "Did you mean configs/two_link.yaml?"),
+    (["run", "configs"], "Example: paramreduce run configs/puma560.yaml"),
+    (["run", "notes.txt"], "`paramreduce init --dh NAME` writes one"),
+    (["run", "one.urdf"], "`paramreduce init one.urdf` makes a config of it"),
+    (["run", "my_arm.urdf"], "`paramreduce init --dh my_arm` writes one"),
+    (["run", "configs/empty.yaml"], "`paramreduce init --dh NAME` writes a whole one"),
+    (["run", "configs/nothing.yaml"], "`paramreduce init --dh NAME` writes one"),
+    (["run", "configs/broken.yaml"], "configs/broken.yaml, line 2: this is not YAML"),
+    (["run", "configs/two_link.yaml", "--sett", "a=b"], "Did you mean one of: '--quiet', '--set'"),
+    (["run", "configs/two_link.yaml", "--set", "selected.m=4"], "there is heuristic, n,"),
+    (["run", "configs/two_link.yaml", "--set", "selected.n"], "write KEY=VALUE"),
+    (["run", "configs/two_link.yaml", "--set", "selected.heuristic=swapp"], "did you mean swap?"),
+    (["run", "configs/two_link.yaml", "--set", "selected.n=many"], "write one such as"),
+    (["run", "configs/two_link.yaml", "--jobs", "0"], "paramreduce run --help says more"),
+    (["run", "configs/two_link.yaml", "--results", "notes.txt"], "Example: paramreduce run"),
+    (["run", "configs/two_link.yaml", "more"], "Example: paramreduce run"),
+    (["reduce", "configs/two_link.yaml", "--results", "fresh"],
+     "`paramreduce build-model configs/two_link.yaml --results fresh`"),
+    (["sample", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
+    (["validate", "configs/two_link.yaml", "--set", "selected.n=3"],
+     "`paramreduce build-model configs/two_link.yaml --set selected.n=3`"),
+    (["report", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
+    (["reduce-terms", "configs/two_link.yaml", "--results", "done"], "such as `terms: {torque_error: 0.01}`"),
+    (["process-log", "configs/two_link.yaml", "--results", "done"], "`paramreduce init ROBOT.urdf --log FILE`"),
+    (["export"], "such as --results results/my_samples"),
+    (["export", "two_link"], "Did you mean configs/two_link.yaml?"),
+    (["export", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
+    (["export", "configs/two_link.yaml", "--format", "java"], "'c', 'casadi'"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "swap:99"], "swap:1...7"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "add --what idm"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--format", "urdf"],
+     "`paramreduce init ROBOT.urdf` writes"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--set", "selected.n=3"],
+     "`paramreduce run configs/two_link.yaml --results done --set selected.n=3`"),
+    (["check-data", "nothing.csv"], "there is no such file"),
+    (["check-data", "log.csv"], "Write sampling.log.columns by hand"),
+    (["inspect"], "Example: paramreduce inspect"),
+    (["inspect", "."], "`paramreduce inspect done`"),
+    (["inspect", "done/model"], "Did you mean done/model.h5?"),
+    (["inspect", "samples.h5"], "is not a readable HDF5 file"),
+    (["inspect", "done/reduction.h5", "--model", "best:3"], "best-subset:1...7"),
+    (["compare", "done"], "Example: paramreduce compare"),
+    (["compare", "done", "dome"], "Did you mean done?"),
+    (["compare", "done", "summary.json"], "make it again with `paramreduce run`"),
+    (["table"], "Example: paramreduce table"),
+    (["table", "."], "`paramreduce table done`"),
+    (["open"], "Example: paramreduce open"),
+    (["open", "."], "`paramreduce open done`"),
+    (["open", "results/none"], "`paramreduce run CONFIG`"),
+    (["init"], "`paramreduce init robot.urdf`"),
+    (["init", "nothing.urdf"], "give the path of a URDF or MJCF"),
+    (["init", "one.urdf"], "give --floating"),
+    (["init", "--example", "pmua560"], "puma560"),
+    (["init", "--dh", "two_link"], "choose another with --output"),
+    (["reduce", "--samples", "samples.h5"], "such as --results results/my_samples"),
+    (["reduce", "--samples", "sample.h5", "--results", "r"], "Did you mean samples.h5?"),
+    (["completion", "tcsh"], "Example: paramreduce completion bash"),
+    (["graph", "configs/two_link.yaml"], "paramreduce graph --help says more"),
+]  # fmt: skip
+
+
+@pytest.fixture
+def folder(two_link_results, tmp_path, monkeypatch):
+    """Where somebody has begun, with an earlier result and odd files."""
+    (tmp_path / "configs").mkdir()
+    for name, text in {
+        "configs/two_link.yaml": (CONFIGS / "two_link.yaml").read_text(),
+        "configs/empty.yaml": "robot: x\n",
+        "configs/broken.yaml": "a: [1\n",
+        "configs/nothing.yaml": "",
+        "notes.txt": "hello\n",
+        "one.urdf": '<robot name="r"><link name="a"/></robot>',
+        "log.csv": "time,q1\n0,1\n",
+        "summary.json": "{}",
+        "samples.h5": "no HDF5",
+    }.items():
+        (tmp_path / name).write_text(text)
+    shutil.copytree(two_link_results, tmp_path / "done")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+@pytest.mark.parametrize(("words", "told"), MOVES, ids=lambda v: " ".join(v) if isinstance(v, list) else "")  # fmt: skip
+def test_what_does_not_work_says_what_does(invoke, folder, words, told):
+    said = invoke(*words, code=2)
+    assert told in said.out + said.err
+    assert "Traceback" not in said.err
+    assert not (folder / "results").exists() or not list((folder / "results").rglob("*.h5"))
+
+
+def test_without_a_command_it_says_what_to_do(invoke, tmp_path, monkeypatch, two_link_results):
+    monkeypatch.chdir(tmp_path)
+    assert "paramreduce init --example puma560" in invoke().out
+    invoke("init", "--example", "two_link")
+    assert "paramreduce run configs/two_link.yaml" in invoke().out
+    shutil.copytree(two_link_results, tmp_path / "results" / "two_link")
+    said = invoke().out
+    for command in ("paramreduce open results/two_link", "paramreduce export configs/two_link.yaml"):  # fmt: skip
+        assert command in said
+
+
+def test_examples_bring_the_files_they_name(invoke, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    said = invoke("init", "--example", "ur10").out
+    for name in ("ur10.yaml", "logs/ur10.csv.gz", "logs/ur10.urdf"):
+        assert (tmp_path / "configs" / name).read_bytes() == (CONFIGS / name).read_bytes()
+        assert f"configs/{name}" in said
+
+
+def test_json_is_a_line_for_every_event(invoke, folder):
+    lines = invoke("run", "configs/two_link.yaml", "--results", "done", "--json").out.splitlines()
+    events = [json.loads(line) for line in lines]
+    assert [e["event"] for e in events if e["event"] != "progress"][-2:] == ["stage", "done"]
+    assert events[-1]["selected"]["n"] == 4
+    contents = json.loads(invoke("inspect", "done/model.h5", "--json").out)
+    assert {"/base/columns", "/base/beta"} <= {one["name"] for one in contents["datasets"]}
+    model = json.loads(invoke("inspect", "done", "--json").out)
+    assert {one["name"] for one in model["parameters"]} == set(events[-1]["selected"]["parameters"])
+    assert json.loads(invoke("compare", "done", "done", "--json").out)["agree"] is True
+    (run,) = json.loads(invoke("table", "done", "--json").out)["runs"]
+    assert run["n"] == 4
+
+
+def test_a_log_keeps_what_is_said(invoke, folder):
+    said = invoke("run", "configs/two_link.yaml", "--results", "done", "--log", "run.log").out
+    lines = (folder / "run.log").read_text().splitlines()
+    assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d ", line) for line in lines)
+    assert "$ paramreduce run configs/two_link.yaml" in lines[0]
+    assert said.splitlines()[-1] in lines[-1]
+
+
+def test_doctor_names_what_is_missing(invoke, monkeypatch):
+    found = {one["what"]: one for one in json.loads(invoke("doctor", "--json").out)["findings"]}
+    assert found["linear algebra"]["state"] == "ok"
+    monkeypatch.setenv("CC", "gcc '")
+    from paramreduce_cli.expressions.compiled import compiler
+
+    compiler.cache_clear()
+    assert "the variable CC holds no command" in " ".join(invoke("doctor", code=1).out.split())
+    monkeypatch.delenv("CC")
+    compiler.cache_clear()
+
+
+def test_completion_is_what_the_shell_asks_for(invoke, tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    invoke("completion", "bash", "--install")
+    path = tmp_path / ".local/share/bash-completion/completions/paramreduce"
+    assert "_PARAMREDUCE_COMPLETE=bash_complete" in path.read_text()
