@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
+.PHONY: docs help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -29,6 +29,7 @@ help:
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
 	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
+	@echo "make docs        build the site, and run what it tells to type"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -133,6 +134,16 @@ controllers: $(VENV)/.installed-dev
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1
+# The site into site/, with warnings as errors; then every command and snippet of the tutorial and its
+# neighbours from a wheel in an empty folder.
+$(VENV)/.installed-docs: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
+	@touch $@
+
+docs: $(VENV)/.installed-docs
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet
+	PYTHONPATH=tests $(BIN)/python -m tests.docs
+
 torture: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.torture --share $(SHARE)
 

@@ -211,22 +211,25 @@ def code(
 
 
 def inverse_dynamics(
-    model: Model, parameters: ReducedModel, q: FloatArray, dq: FloatArray, ddq: FloatArray
-) -> FloatArray:
-    """Torques of a model along a motion.
+    model: Model, parameters: ReducedModel
+) -> Callable[[FloatArray, FloatArray, FloatArray], FloatArray]:
+    """Torques of a model as a function of a motion.
 
     Args:
         model: Of the robot.
         parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
-        q: Generalised coordinates, (n_samples, n_q), rad or m.
-        dq: Velocities, same shape.
-        ddq: Accelerations, same shape.
 
     Returns:
-        (n_samples, n_dof), N m or N
+        A function of q, dq, ddq, (n_samples, n_q) each, rad or m and their rates, that gives
+        (n_samples, n_dof), N m or N.
     """
-    arrays = (np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq))
-    torques: FloatArray = Dynamics(model.mechanism).regressor(*arrays) @ parameters.standard
+    regressor, standard = Dynamics(model.mechanism).regressor, parameters.standard
+
+    def torques(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+        arrays = (np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq))
+        found: FloatArray = regressor(*arrays) @ standard
+        return found
+
     return torques
 
 

@@ -1,0 +1,206 @@
+"""The pages that are made from the program itself: every key of a config, every command, every record.
+
+mkdocs runs this when the site is built; `python docs/generated.py FOLDER` writes the pages too.
+"""
+
+import ast
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+import yaml
+
+from paramreduce_cli.cli import cli
+from paramreduce_cli.config.loading import config_schema
+
+CONFIGS = Path(__file__).resolve().parents[1] / "configs"
+RECORDS = Path(__file__).resolve().parents[1] / "paramreduce_cli" / "records"
+Schema = Mapping[str, Any]
+
+
+def config_page() -> str:
+    """Every key of a config: kind, default, what it is, and where a config that comes along uses it."""
+    schema = config_schema()
+    lines = [
+        "# Keys of a config",
+        "",
+        "Made from the schema that the program checks configs with; `paramreduce schema` prints it for editors.",
+        "Numbers may be written as `pi/2`, `90deg` or with names under `constants`. Where a key has no",
+        "default it must be given. *Example* is from a config that comes along.",
+    ]
+    examples = _examples()
+    for path, section, about in _sections(schema):
+        lines += ["", f"## `{path}`" if path else "## At the top", "", about, ""]
+        lines += ["| key | what it takes | default | what it is | example |", "| --- | --- | --- | --- | --- |"]  # fmt: skip
+        for key, entry in section.get("properties", {}).items():
+            full = f"{path}.{key}" if path else key
+            needed = key in section.get("required", ())
+            default = "**must be given**" if needed else _code(entry.get("default"))
+            cells = (f"`{key}`", _kind(entry, schema), default, _cell(entry.get("description", "")), _example(examples, full))  # fmt: skip
+            lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
+def keys() -> list[str]:
+    """Every key with its place, such as ``trajectories.count``."""
+    return [
+        f"{path}.{key}" if path else key
+        for path, section, _ in _sections(config_schema())
+        for key in section.get("properties", {})
+    ]
+
+
+def commands_page() -> str:
+    """The help of every command."""
+    context = click.Context(cli, info_name="paramreduce")
+    lines = ["# Commands", "", "What `paramreduce COMMAND --help` prints. `paramreduce` alone says what to do next in a folder.", "Exit codes: 0, all is well; 1, the model is not accepted, or two runs differ; 2, something was wrong with the input;", "70, a bug; 130, interrupted.", ""]  # fmt: skip
+    for name in cli.list_commands(context):
+        command = cli.get_command(context, name)
+        assert command is not None
+        text = command.get_help(click.Context(command, info_name=name, parent=context))
+        lines += [f"## {name}", "", "```text", text.rstrip(), "```", ""]
+    return "\n".join(lines)
+
+
+def records_page() -> str:
+    """Every record with its fields, which are what datasets are named after."""
+    lines = ["# Records and datasets", "", "What stages hand each other, in memory and, under the same names, as datasets of the [files](../artifacts.md): a field that is", "a record itself is a group, a mapping a group with a member for every name, and `shown` of a log `/shown/...`. Made from", "`paramreduce_cli/records/`."]  # fmt: skip
+    for path in sorted(RECORDS.glob("*.py")):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef) and (fields := list(_fields(node))):
+                lines += ["", f"## {node.name}", "", _text(ast.get_docstring(node) or ""), ""]
+                lines += ["| field | kind | what it is |", "| --- | --- | --- |"]
+                lines += [f"| `{name}` | `{kind}` | {_cell(about)} |" for name, kind, about in fields]  # fmt: skip
+    return "\n".join(lines) + "\n"
+
+
+def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str, str]]:
+    """Fields of a class with their kinds and the texts under them."""
+    for entry, after in zip(node.body, [*node.body[1:], None], strict=True):
+        if isinstance(entry, ast.AnnAssign) and isinstance(entry.target, ast.Name):
+            value = after.value if isinstance(after, ast.Expr) else None
+            about = value.value if isinstance(value, ast.Constant) else ""
+            yield entry.target.id, ast.unparse(entry.annotation).replace("|", "or"), str(about)
+
+
+def _sections(schema: Schema) -> Iterator[tuple[str, Schema, str]]:
+    """Sections by the place where they first stand, with what they are."""
+    waiting: list[tuple[str, Schema]] = [("", schema)]
+    seen = set()
+    while waiting:
+        path, section = waiting.pop(0)
+        yield path, section, _text(section.get("description", ""))
+        for key, entry in section.get("properties", {}).items():
+            for name, many in _references(entry):
+                if name not in seen:
+                    seen.add(name)
+                    place = f"{path}.{key}" if path else key
+                    waiting.append((place + many, schema["$defs"][name]))
+
+
+def _references(entry: Any, many: str = "") -> Iterator[tuple[str, str]]:
+    """Names of sections in an entry, and how one gets there: ``[]`` of a list, ``.NAME`` of a mapping."""
+    if isinstance(entry, list):
+        for one in entry:
+            yield from _references(one, many)
+    elif isinstance(entry, dict):
+        if "$ref" in entry:
+            yield entry["$ref"].rpartition("/")[2], many
+        for key, below in entry.items():
+            step = {"items": "[]", "additionalProperties": ".NAME"}.get(key, "")
+            if isinstance(below, dict | list):
+                yield from _references(below, many + step)
+
+
+def _kind(entry: Schema, schema: Schema) -> str:
+    """What a key takes, in words."""
+    if "$ref" in entry:
+        name = entry["$ref"].rpartition("/")[2]
+        target = schema["$defs"][name]
+        return "one of " + ", ".join(f"`{v}`" for v in target["enum"]) if "enum" in target else "a section"  # fmt: skip
+    if "enum" in entry:
+        return "one of " + ", ".join(f"`{value}`" for value in entry["enum"])
+    if "const" in entry:
+        return f"`{entry['const']}`"
+    if "anyOf" in entry:
+        kinds = [_kind(one, schema) for one in entry["anyOf"] if one.get("type") != "null"]
+        if {"a number", "text"} <= set(kinds) and not any(
+            "pattern" in one for one in entry["anyOf"]
+        ):
+            kinds.remove("text")  # arithmetic is written as text
+        return " or ".join(dict.fromkeys(kinds))
+    if entry.get("type") == "array":
+        return f"a list of {_plural(_kind(entry.get('items', {}), schema))}"
+    if entry.get("type") == "object":
+        below = entry.get("additionalProperties")
+        return (
+            f"names with {_plural(_kind(below, schema))}"
+            if isinstance(below, dict)
+            else "a section"
+        )
+    words = {"integer": "a whole number", "number": "a number", "string": "text", "boolean": "true or false"}  # fmt: skip
+    return words.get(str(entry.get("type")), "anything")
+
+
+def _plural(kind: str) -> str:
+    return {"a number": "numbers", "a section": "sections", "text": "texts", "a whole number": "whole numbers"}.get(kind, kind)  # fmt: skip
+
+
+def _code(value: Any) -> str:
+    if value is None:
+        return "none"
+    text = yaml.safe_dump(value, default_flow_style=True, width=1000).strip().removesuffix("...").strip()  # fmt: skip
+    return f"`{text}`" if len(text) <= 60 else "see the text"
+
+
+def _examples() -> dict[str, str]:
+    """Values of keys in the configs that come along, by place; names and positions stand as in `_sections`."""
+    found: dict[str, str] = {}
+
+    def walk(value: Any, places: set[str]) -> None:
+        if isinstance(value, dict):
+            for key, below in value.items():
+                walk(below, {f"{p}.{k}".lstrip(".") for p in places for k in (key, "NAME")})
+        elif isinstance(value, list) and value and isinstance(value[0], dict):
+            walk(value[0], {f"{place}[]" for place in places})
+        if not isinstance(value, dict):
+            for place in places:
+                found.setdefault(place, _code(value))
+
+    for path in sorted(CONFIGS.glob("*.yaml")):
+        walk(yaml.safe_load(path.read_text(encoding="utf-8")), {""})
+    return {place: text for place, text in found.items() if text != "see the text"}
+
+
+def _example(examples: Mapping[str, str], place: str) -> str:
+    return examples.get(place, "")
+
+
+def _text(text: str) -> str:
+    return re.sub(r"\s+", " ", text).strip()
+
+
+def _cell(text: str) -> str:
+    return _text(text).replace("|", "\\|")
+
+
+PAGES = {
+    "reference/config.md": config_page,
+    "reference/commands.md": commands_page,
+    "reference/records.md": records_page,
+}
+
+if __name__ == "<run_path>" or "mkdocs_gen_files" in sys.modules:
+    import mkdocs_gen_files
+
+    for page_name, make in PAGES.items():
+        with mkdocs_gen_files.open(page_name, "w") as page:
+            page.write(make())
+elif __name__ == "__main__":
+    for page_name, make in PAGES.items():
+        target = Path(sys.argv[1]) / page_name
+        target.parent.mkdir(parents=True, exist_ok=True)
+        target.write_text(make(), encoding="utf-8")

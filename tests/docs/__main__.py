@@ -1,0 +1,88 @@
+"""What the docs tell to type, typed: from a wheel, each page in an empty folder of its own."""
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import rich.console
+import rich.table
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = ("tutorial.md", "how-to.md", "python.md")
+NOTEBOOK = "tutorial.ipynb"
+_BLOCK = re.compile(
+    r"(?:`(?P<file>[\w.]+\.py)`:\n\n)?```(?P<kind>sh|python)\n(?P<text>.*?)```", re.DOTALL
+)
+
+
+def steps(text):
+    """What is typed on a page, in order: shell commands, and scripts of neighbouring Python blocks."""
+    found = []
+    for block in _BLOCK.finditer(text):
+        kind, content = block["kind"], block["text"]
+        if block["file"]:
+            found.append(("file", block["file"], content))
+        elif kind == "sh":
+            found += [("sh", line, line) for line in content.splitlines() if line]
+        elif found and found[-1][0] == "python":
+            found[-1] = ("python", found[-1][1], found[-1][2] + content)
+        else:
+            found.append(("python", "snippet", content))
+    return found
+
+
+def main():
+    table = rich.table.Table("page", "what is typed", "seconds", "exit code")
+    failed = False
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        environment = installed(folder)
+        for page in PAGES:
+            here = folder / page.removesuffix(".md")
+            here.mkdir()
+            for kind, shown, content in steps((ROOT / "docs" / page).read_text()):
+                if kind == "file":
+                    (here / shown).write_text(content)
+                    continue
+                words = ["bash", "-c", content] if kind == "sh" else ["python", "-c", content]
+                failed |= typed(table, page, shown, words, here, environment)
+        here = folder / "notebook"
+        here.mkdir()
+        subprocess.run(["paramreduce", "init", "--example", "two_link"], cwd=here, env=environment, check=True, stdout=subprocess.DEVNULL)  # fmt: skip
+        run = "import nbformat, nbclient; nbclient.NotebookClient(nbformat.read({!r}, 4), timeout=300).execute()"
+        words = ["python", "-c", run.format(str(ROOT / "docs" / NOTEBOOK))]
+        failed |= typed(table, NOTEBOOK, "all cells", words, here, environment)
+    rich.console.Console(width=120).print(table)
+    sys.exit(failed)
+
+
+def installed(folder):
+    """A wheel in an environment of its own; what is set to run its programs."""
+    python = folder / "venv" / "bin" / "python"
+    pip = [python, "-m", "pip", "--quiet", "--disable-pip-version-check"]
+    subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
+    subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", ROOT], check=True)
+    (wheel,) = (folder / "wheel").glob("*.whl")
+    extra = ["nbclient>=0.10,<1", "ipykernel>=6.29,<8"]
+    subprocess.run([*pip, "install", f"{wheel}[pandas]", *extra], check=True)
+    path = f"{python.parent}:{os.environ['PATH']}"
+    kept = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+    return {**kept, "PATH": path, "MPLBACKEND": "agg"}
+
+
+def typed(table, page, shown, words, folder, environment):
+    """Type something; True if it fails."""
+    started = time.monotonic()
+    done = subprocess.run(words, cwd=folder, env=environment, capture_output=True, text=True, check=False)  # fmt: skip
+    table.add_row(page, shown, f"{time.monotonic() - started:.1f}", str(done.returncode))
+    if done.returncode:
+        print(f"{page}: {shown}\n{done.stdout[-2000:]}\n{done.stderr[-2000:]}", file=sys.stderr)
+    return done.returncode != 0
+
+
+if __name__ == "__main__":
+    main()
