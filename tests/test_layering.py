@@ -127,7 +127,9 @@ def test_each_kind_of_input_and_output_has_one_place(library, owner):
 
 
 def test_no_robot_has_a_name_in_the_package():
-    allowed = r"configs/puma560\.yaml|results/(puma560|hexaglide)|reference/puma560"
+    allowed = (
+        r"--example puma560|configs/puma560\.yaml|results/(puma560|hexaglide)|reference/puma560"
+    )
     for path in [*FILES, *PACKAGE.rglob("*.html")]:
         code = re.sub(allowed, "", path.read_text().lower())
         assert not re.search("puma|hexaglide", code), path

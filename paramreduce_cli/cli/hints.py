@@ -9,7 +9,6 @@ from pathlib import Path
 
 import click
 
-from paramreduce_cli.artifacts.report_files import SUMMARY
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.5
@@ -65,6 +64,5 @@ def _own_arguments(words: Sequence[str]) -> str:
 
 def results_below(folder: Path, command: str) -> str:
     """What may have been meant where a folder holds no results itself; empty if nothing is near."""
-    suffix = Path(SUMMARY)
-    found = sorted(path.parents[len(suffix.parts) - 1] for path in folder.glob(f"*/{suffix}"))
+    found = sorted(path.parents[1] for path in folder.glob("*/report/summary.json"))
     return f" Did you mean `paramreduce {command} {found[0]}`?" if found else ""

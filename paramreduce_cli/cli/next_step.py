@@ -3,10 +3,10 @@
 import re
 from pathlib import Path
 
-from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.texts import share
 
+_SUMMARY = Path("report/summary.json")
 _MOST = 8
 """Robots that are listed."""
 
@@ -27,7 +27,7 @@ def next_steps(folder: Path) -> list[str]:
             "",
             "paramreduce --help lists all commands.",
         ]
-    configs.sort(key=lambda path: not (folder / _results(path) / SUMMARY).exists())
+    configs.sort(key=lambda path: not (folder / _results(path) / _SUMMARY).exists())
     lines = [line for path in configs[:_MOST] for line in _robot(folder, path)]
     if len(configs) > _MOST:
         lines.append(f"and {len(configs) - _MOST} more")
@@ -58,9 +58,11 @@ def _robot(folder: Path, path: Path) -> list[str]:
     """What was made of a robot, and the next command."""
     results = _results(path)
     made = sorted(file.name for file in (folder / results).glob("*.h5"))
-    if not (folder / results / SUMMARY).exists():
+    if not (folder / results / _SUMMARY).exists():
         state = f"begun ({', '.join(made)}); go on" if made else "not run yet"
         return [f"{path}: {state}: paramreduce run {path}"]
+    from paramreduce_cli.artifacts.report_files import load_summary  # it loads HDF5
+
     try:
         selected = load_summary(folder / results)["selected"]
         error = share(selected["torque_error"]["estimation"])

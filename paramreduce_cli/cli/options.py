@@ -9,7 +9,6 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import Store
-from paramreduce_cli.cli.terminal import journal
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import Share
@@ -32,17 +31,6 @@ QUIET = click.option("--quiet", is_flag=True, help="Say nothing but errors and w
 JOBS = click.option(
     "--jobs", type=click.IntRange(min=1), default=None, metavar="N",
     help="Worker processes.  [default: all cores]",
-)  # fmt: skip
-JSON = click.option("--json", "as_json", is_flag=True, help="Say it as JSON, for programs.")
-LOG = click.option(
-    "--log", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", expose_value=False,
-    callback=lambda _, __, path: None if path is None else journal.open(path),
-    help="Append what is said to a file too, with times.",
-)  # fmt: skip
-VERBOSE = click.option(
-    "--verbose", is_flag=True, expose_value=False,
-    callback=lambda _, __, wanted: setattr(journal, "verbose", wanted),
-    help="Say every step of long work in a line of its own.",
 )  # fmt: skip
 
 

@@ -10,18 +10,16 @@ from paramreduce_cli.artifacts.store import file_of, load_file
 from paramreduce_cli.cli.options import (
     FORCE,
     JOBS,
-    LOG,
     PART,
     QUIET,
     RESULTS,
     SET,
-    VERBOSE,
     asked,
     cores,
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import interruption, progress_bars, remark
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, describe_stage

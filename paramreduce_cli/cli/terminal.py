@@ -16,6 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+import click
 import rich.console
 import rich.progress
 
@@ -71,6 +72,19 @@ class Journal:
 
 
 journal = Journal()
+
+
+JSON = click.option("--json", "as_json", is_flag=True, help="Say it as JSON, for programs.")
+LOG = click.option(
+    "--log", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", expose_value=False,
+    callback=lambda _, __, path: None if path is None else journal.open(path),
+    help="Append what is said to a file too, with times.",
+)  # fmt: skip
+VERBOSE = click.option(
+    "--verbose", is_flag=True, expose_value=False,
+    callback=lambda _, __, wanted: setattr(journal, "verbose", wanted),
+    help="Say every step of long work in a line of its own.",
+)  # fmt: skip
 
 
 def say(message: str) -> None:

@@ -29,7 +29,10 @@ def test_the_command_writes_text_csv_and_latex(invoke, two_link_results, tmp_pat
 
 
 def test_folders_without_a_report(invoke, tmp_path):
-    assert "summary.json: there is no such file" in invoke("table", tmp_path, code=2).err
+    assert (
+        "holds no results itself. Make them with `paramreduce run`"
+        in invoke("table", tmp_path, code=2).err
+    )
     assert not (tmp_path / "table.csv").exists()
 
 

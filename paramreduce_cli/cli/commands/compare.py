@@ -5,8 +5,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import load_summary
-from paramreduce_cli.cli.options import JSON
-from paramreduce_cli.cli.terminal import emit, say
+from paramreduce_cli.cli.terminal import JSON, emit, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
 from paramreduce_cli.report.comparison import compare as compared

@@ -16,8 +16,8 @@ import rich.markup
 import rich.table
 
 from paramreduce_cli import __version__
-from paramreduce_cli.cli.options import JSON, cores
-from paramreduce_cli.cli.terminal import emit, out
+from paramreduce_cli.cli.options import cores
+from paramreduce_cli.cli.terminal import JSON, emit, out
 from paramreduce_cli.errors import ParamreduceError
 
 _EXTRAS = {"identify": "cvxpy", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip

@@ -36,7 +36,7 @@ _FARTHEST = 1e6
 @click.option("--loop", "kind", flag_value="loop", help="A mechanism with a closed loop.")
 @click.option("--recorded", "kind", flag_value="recorded", help="An arm with recorded motions.")
 @click.option("--example", "kind", flag_value="example",
-              help="One of the robots that come along, such as puma560.")  # fmt: skip
+              help="One of the robots that come along.")  # fmt: skip
 @click.option(
     "--joints",
     type=click.IntRange(1, 30),

@@ -13,8 +13,7 @@ import rich.table
 from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.options import JSON
-from paramreduce_cli.cli.terminal import emit, harmless, out, say
+from paramreduce_cli.cli.terminal import JSON, emit, harmless, out, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.records import ModelChoice, Reduction, Validation
 

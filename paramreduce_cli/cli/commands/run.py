@@ -13,18 +13,25 @@ from paramreduce_cli.cli.options import (
     CONFIG,
     FORCE,
     JOBS,
-    JSON,
-    LOG,
     QUIET,
     RESULTS,
     SET,
-    VERBOSE,
     asked,
     cores,
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import emit, interruption, out, progress_bars, remark, say
+from paramreduce_cli.cli.terminal import (
+    JSON,
+    LOG,
+    VERBOSE,
+    emit,
+    interruption,
+    out,
+    progress_bars,
+    remark,
+    say,
+)
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.records import Report

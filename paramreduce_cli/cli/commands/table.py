@@ -8,8 +8,7 @@ import click
 from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.options import JSON
-from paramreduce_cli.cli.terminal import emit, say
+from paramreduce_cli.cli.terminal import JSON, emit, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
