@@ -9,7 +9,7 @@ _FAR_OFF = 10.0
 
 _ESCAPES = {
     "\\": r"\textbackslash{}", "%": r"\%", "&": r"\&", "#": r"\#", "$": r"\$", "{": r"\{",
-    "}": r"\}", "~": r"\textasciitilde{}", "^": r"\^{}", "_": r"\_",
+    "}": r"\}", "~": r"\textasciitilde{}", "^": r"\^{}", "_": r"\_", ">": "$>$", "<": "$<$", "|": "$|$", "[": "{[}",
 }  # fmt: skip
 
 
@@ -48,6 +48,8 @@ def _latex_word(word: str, symbols: Mapping[str, str]) -> str:
 
 
 _GREEK = {
+    "∞": r"$\infty$",
+    "≤": r"$\le$",
     "n_φ": r"$n_\varphi$",
     "κ": r"$\kappa$",
     "ε_τ": r"$\varepsilon_\tau$",

@@ -1,13 +1,9 @@
-"""A table as text, CSV and LaTeX."""
+"""A table as text and CSV."""
 
 import csv
 import io
 import unicodedata
-from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-
-from paramreduce_cli.texts import latex
 
 
 @dataclass(frozen=True)
@@ -41,27 +37,6 @@ class Table:
         writer.writerow(self.header)
         writer.writerows(self.rows)
         return buffer.getvalue()
-
-    def to_latex(self, symbols: Mapping[str, str] = MappingProxyType({})) -> str:
-        """A tabular with its caption, ready to be included; names in it as formulas."""
-
-        def row(cells: tuple[str, ...]) -> str:
-            return " & ".join(latex(cell, symbols) for cell in cells) + r" \\"
-
-        lines = [
-            r"\begin{table}[ht]",
-            r"\centering",
-            rf"\caption{{{latex(self.title, symbols)}}}",
-            rf"\begin{{tabular}}{{{'l' * len(self.header)}}}",
-            r"\hline",
-            row(self.header),
-            r"\hline",
-            *map(row, self.rows),
-            r"\hline",
-            r"\end{tabular}",
-            r"\end{table}",
-        ]
-        return "\n".join(lines) + "\n"
 
 
 def _width(text: str) -> int:

@@ -32,6 +32,7 @@ from paramreduce_cli.reduction.models import full_model
 from paramreduce_cli.registry import Registry
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
 from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
 from paramreduce_cli.report.summary import summary_of
@@ -99,7 +100,7 @@ def report(
     symbols = {} if model is None else model.mechanism.symbols
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
-        files[f"tables/{name}.tex"] = table.to_latex(symbols).encode()
+        files[f"tables/{name}.tex"] = latex_table(table, symbols).encode()
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation)
     ).encode()

@@ -10,6 +10,7 @@ import pytest
 from conftest import run_stages
 
 from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.table import Table
 from paramreduce_cli.report.tables import tables
 
@@ -46,7 +47,7 @@ def test_tables_are_rectangular(folder, name):
     rows = list(csv.reader(io.StringIO((folder / "tables" / f"{name}.csv").read_text())))
     assert len({len(row) for row in rows}) == 1
     latex = (folder / "tables" / f"{name}.tex").read_text()
-    assert latex.count(r"\begin{tabular}") == 1
+    assert latex.count(r"\begin{tabular}") + latex.count(r"\begin{longtable}") == 1
     assert latex.count("&") == len(rows) * (len(rows[0]) - 1)
 
 
@@ -117,10 +118,24 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
 
 def test_latex_escapes_what_latex_would_trip_over():
     table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
-    text = table.to_latex({"m_3": r"m_{\mathrm{3}}"})
+    text = latex_table(table, {"m_3": r"m_{\mathrm{3}}"})
     for piece in (r"$\kappa$ \& 5 \%", r"$m_{\mathrm{3}}$", r"a\_b", r"50 \%",
                   r"$\varepsilon_\tau$", r"x\^{}2"):  # fmt: skip
         assert piece in text
+
+
+def test_latex_sets_numbers_breaks_texts_and_fits_the_line():
+    long = "a + " * 30
+    rows = (("1", "-0.25", "1e-7", "50 %", long), ("23", "4", "2.5e+11", "> 1000 %", "[M | δ]"))
+    lines = latex_table(Table("t", ("a", "b", "c", "d", "e"), rows)).splitlines()
+    (columns,) = (line for line in lines if line.startswith(r"\begin{tabular}"))
+    assert columns.startswith(
+        r"\begin{tabular}{S[table-format=2]S[table-format=-1.2]S[table-format=1.1e-2]r>{\raggedright"
+    )
+    assert lines[-4] == r"23 & 4 & 2.5e+11 & $>$ 1000 \% & {[}M $|$ $\delta$] \\"
+    many = tuple((str(k), "x" * 20) * 4 for k in range(60))
+    assert r"\begin{longtable}" in latex_table(Table("t", ("a", "b") * 4, many))
+    assert r"\resizebox{\linewidth}" in latex_table(Table("t", ("a", "b") * 4, many[:3]))
 
 
 def test_drives_have_a_table_of_their_own(tmp_path):

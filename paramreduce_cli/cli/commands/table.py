@@ -10,6 +10,7 @@ from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, emit, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
+from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
 from paramreduce_cli.report.table import Table
@@ -75,7 +76,7 @@ def _write(prefix: Path, made: list[Table], records: list[dict[str, Any]]) -> No
     for ending, text in (
         (".txt", "\n".join(one.to_text() for one in made)),
         (".csv", "\n".join(one.to_csv() for one in made)),
-        (".tex", "\n".join(one.to_latex() for one in made)),
+        (".tex", "\n".join(map(latex_table, made))),
         (".html", render_sweep("Reduced models", records, made)),
         ("-runs.csv", runs.to_csv()),
     ):
