@@ -16,7 +16,8 @@ import numpy as np
 
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.artifacts.store import Store, load_file
-from paramreduce_cli.config import Config, load_config
+from paramreduce_cli.config import Config
+from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.export.writing import export
@@ -37,7 +38,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
-from paramreduce_cli.runner import Runner, made_in_memory
+from paramreduce_cli.runner import Runner, asked, made_in_memory
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -64,6 +65,19 @@ __all__ = [
     "sample",
     "validate",
 ]
+
+
+def load_config(path: Path | str, overrides: Sequence[str] = ()) -> Config:
+    """Read a robot's YAML.
+
+    Args:
+        path: The file.
+        overrides: ``key.key=value`` texts that replace what the file says.
+
+    Raises:
+        ParamreduceError: With all that is wrong, one problem a line.
+    """
+    return loaded_config(Path(path), overrides)
 
 
 def build_model(config: Config) -> Model:
@@ -253,11 +267,12 @@ def run(
     Raises:
         ParamreduceError: A stage fails; what was finished is kept.
     """
-    loaded = load_config(Path(config), overrides)
+    loaded = load_config(config, overrides)
     store = Store(Path(results) if results is not None else Path("results") / loaded.robot)
+    words = asked(Path(config), None if results is None else Path(results), overrides)
     with store.locked():
         for stage in stages_to_run(loaded):
-            Runner(loaded, store, jobs, progress).run(stage)
+            Runner(loaded, store, jobs, progress, asked=words).run(stage)
     return Results(store.folder)
 
 

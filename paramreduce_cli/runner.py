@@ -7,8 +7,9 @@ from, the return type which artifact is written.
 import hashlib
 import importlib.metadata
 import json
+import shlex
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -148,6 +149,14 @@ def made_in_memory(
         else:
             raise TypeError(f"{stage.name} needs a {entry.type.__name__}")
     return _called(stage, arguments)
+
+
+def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
+    """The arguments that name a run at the shell, for commands that are to follow it."""
+    words = [str(config)] if config is not None else []
+    words += ["--results", str(results)] if results is not None else []
+    words += [word for text in overrides for word in ("--set", text)]
+    return shlex.join(words)
 
 
 @dataclass

@@ -11,7 +11,7 @@ from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
 from paramreduce_cli.cli.hints import meant_command, next_command, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
-from paramreduce_cli.cli.terminal import complain, err, interruption, say, show_errors, show_warning
+from paramreduce_cli.cli.terminal import complain, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
 from paramreduce_cli.stages import stages
 
@@ -36,7 +36,7 @@ def main() -> None:
         complain(next_command(error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
-        err.print(
+        complain(
             "\nInterrupted. Finished stages, trajectories and proofs are kept: the same command goes on from there."
         )
         code = INTERRUPTED

@@ -51,18 +51,19 @@ def _own_arguments(words: Sequence[str]) -> str:
     kept: list[str] = []
     following = False
     for word in words[1:]:
-        if following or word.startswith(("--set=", "--results=")):
+        if following or word.startswith(("--set=", "--results=", "--samples=")):
             kept.append(word)
             following = False
-        elif word in ("--set", "--results"):
+        elif word in ("--set", "--results", "--samples"):
             kept.append(word)
             following = True
         elif word.endswith((".yaml", ".yml")):
             kept.insert(0, word)
-    return shlex.join(kept) if any(word.endswith((".yaml", ".yml")) for word in kept) else ""
+    named = any(word.endswith((".yaml", ".yml")) or word.startswith("--samples") for word in kept)
+    return shlex.join(kept) if named else ""
 
 
 def results_below(folder: Path, command: str) -> str:
     """What may have been meant where a folder holds no results itself; empty if nothing is near."""
     found = sorted(path.parents[1] for path in folder.glob("*/report/summary.json"))
-    return f" Did you mean `paramreduce {command} {found[0]}`?" if found else ""
+    return f" Did you mean `paramreduce {command} {shlex.quote(str(found[0]))}`?" if found else ""

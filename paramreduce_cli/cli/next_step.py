@@ -1,12 +1,15 @@
 """What to do next in a folder, for who calls paramreduce without a command."""
 
 import re
+import shlex
 from pathlib import Path
 
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.texts import share
 
 _SUMMARY = Path("report/summary.json")
+_READ = 100_000
+"""Characters of a file in which a config must have begun."""
 _MOST = 8
 """Robots that are listed."""
 
@@ -42,7 +45,7 @@ def _candidates(folder: Path) -> list[Path]:
 def _is_config(path: Path) -> bool:
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
-            return re.search(r"^robot:", file.read(4096), re.MULTILINE) is not None
+            return re.search(r"^robot:", file.read(_READ), re.MULTILINE) is not None
     except OSError:
         return False
 
@@ -56,21 +59,21 @@ def _results(path: Path) -> Path:
 
 def _robot(folder: Path, path: Path) -> list[str]:
     """What was made of a robot, and the next command."""
-    results = _results(path)
+    results, shown = _results(path), shlex.quote(str(path))
     made = sorted(file.name for file in (folder / results).glob("*.h5"))
     if not (folder / results / _SUMMARY).exists():
         state = f"begun ({', '.join(made)}); go on" if made else "not run yet"
-        return [f"{path}: {state}: paramreduce run {path}"]
+        return [f"{path}: {state}: paramreduce run {shown}"]
     from paramreduce_cli.artifacts.report_files import load_summary  # it loads HDF5
 
     try:
         selected = load_summary(folder / results)["selected"]
         error = share(selected["torque_error"]["estimation"])
     except (ArtifactError, KeyError, TypeError) as problem:
-        return [f"{path}: its report cannot be read ({problem}): paramreduce run {path}"]
+        return [f"{path}: its report cannot be read ({problem}): paramreduce run {shown}"]
     return [
         f"{path}: {selected['heuristic']} with {selected['n']} parameters, torque error {error}",
-        f"  paramreduce open {results}    its report",
-        f"  paramreduce export {path}    its code",
-        f"  paramreduce run {path}    again, if the config has changed",
+        f"  paramreduce open {shlex.quote(str(results))}    its report",
+        f"  paramreduce export {shown}    its code",
+        f"  paramreduce run {shown}    again, if the config has changed",
     ]

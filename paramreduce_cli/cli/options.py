@@ -1,8 +1,6 @@
 """Options that several commands take, and what they stand for."""
 
 import os
-import shlex
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -58,14 +56,6 @@ PART = click.option(
 def cores() -> int:
     """Cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-
-
-def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
-    """The arguments that name a run at the shell, for commands that are to follow it."""
-    words = [str(config)] if config is not None else []
-    words += ["--results", str(results)] if results is not None else []
-    words += [word for text in overrides for word in ("--set", text)]
-    return shlex.join(words)
 
 
 def results_store(config: Config | None, results: Path | None) -> Store:

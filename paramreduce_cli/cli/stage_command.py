@@ -7,24 +7,14 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import file_of, load_file
-from paramreduce_cli.cli.options import (
-    FORCE,
-    JOBS,
-    PART,
-    QUIET,
-    RESULTS,
-    SET,
-    asked,
-    cores,
-    results_store,
-)
+from paramreduce_cli.cli.options import FORCE, JOBS, PART, QUIET, RESULTS, SET, cores, results_store
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, describe_stage
 from paramreduce_cli.records import WHOLE, Share, Validation
-from paramreduce_cli.runner import Outcome, Runner
+from paramreduce_cli.runner import Outcome, Runner, asked
 from paramreduce_cli.stages import stages
 
 
@@ -61,7 +51,7 @@ def stage_command(name: str) -> click.Command:
                 settings,
                 remark,
                 interruption.heeded,
-                asked(config, results, overrides),
+                asked(config if robot else None, results, overrides),
             )
             outcome = runner.run(stage, force=force, go_on=True, share=share or WHOLE)
         if not quiet:

@@ -67,8 +67,12 @@ class Journal:
         """Write lines, if there is a file."""
         if self._file is not None:
             now = time.strftime("%Y-%m-%dT%H:%M:%S")
-            self._file.writelines(f"{now} {line}\n" for line in text.splitlines())
-            self._file.flush()
+            try:
+                self._file.writelines(f"{now} {line}\n" for line in text.splitlines())
+                self._file.flush()
+            except OSError as error:
+                self._file = None  # the work matters more than its log
+                remark(f"--log: cannot be written any more: {error.strerror}")
 
 
 journal = Journal()
@@ -101,7 +105,9 @@ def complain(message: str) -> None:
 
 def emit(**event: Any) -> None:
     """Print something as one line of JSON, for programs that read along."""
-    sys.stdout.write(json.dumps(event, ensure_ascii=False, allow_nan=False) + "\n")
+    text = json.dumps(event, ensure_ascii=False, allow_nan=False)
+    journal.note(text)
+    sys.stdout.write(text + "\n")
     sys.stdout.flush()
 
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from paramreduce_cli.errors import ConfigError
 
+_LOGS = (".csv", ".csv.gz", ".gz", ".h5", ".npz")
 _INSTALLED = "share/paramreduce/configs/"
 
 
@@ -22,7 +23,7 @@ def examples() -> dict[str, Path]:
     return {path.stem: path for path in sorted(files)}
 
 
-def copy_example(name: str, path: Path) -> list[Path]:
+def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     """Copy a robot's config, and the files that it names beside it.
 
     Args:
@@ -30,7 +31,7 @@ def copy_example(name: str, path: Path) -> list[Path]:
         path: Where its config is to be.
 
     Returns:
-        What was written, the config first.
+        What is there now, the config first; and files that it names which do not come along.
 
     Raises:
         ConfigError: There is no such robot, or a file is there already.
@@ -43,7 +44,7 @@ def copy_example(name: str, path: Path) -> list[Path]:
     beside = [entry for entry in dict.fromkeys(named) if (source.parent / entry).is_file()]
     inside = [entry for entry in beside if ".." not in Path(entry).parts]
     pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
-    taken = [target for _, target in pairs if target.exists()]
+    taken = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
     if taken:
         raise ConfigError(f"{taken[0]}: exists already; choose another place with --output.")
     try:
@@ -52,4 +53,7 @@ def copy_example(name: str, path: Path) -> list[Path]:
             shutil.copyfile(original, target)
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
-    return [target for _, target in pairs]
+    absent = [
+        entry for entry in dict.fromkeys(named) if entry.endswith(_LOGS) and entry not in inside
+    ]
+    return [target for _, target in pairs], absent

@@ -213,7 +213,8 @@ def about(model: ExportedModel, first: int = 0) -> list[str]:
     lines += [
         "",
         "First moments and inertias are about the origin of their body's frame, in its axes, as the config",
-        f"places it. Parameters, {kind}; each is followed by what it is made of:",
+        f"places it. Parameters, {kind}; each is followed by what it is made of, ordered and",
+        "counted by the values in the config; what is zero there is left out:",
     ]
     for k, p in enumerate(model.parameters, first):
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")

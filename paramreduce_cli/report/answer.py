@@ -6,7 +6,9 @@ import numpy as np
 
 from paramreduce_cli.records import ReducedModel
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.texts import share
+
+_NO_TORQUE = 1e-100
+"""What stands for zero, N m or N."""
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,8 @@ class Answer:
     """The largest error of a joint's torque, in its unit; empty where nothing is known of units."""
     nanoseconds: str
     """Of an evaluation, beside that of the full model; empty where it was not measured."""
+    as_identified: bool
+    """Whether the values are those of identification, to which held-out errors and deviations belong."""
     command: str
     """That writes the model as code."""
 
@@ -45,13 +49,16 @@ def answer(data: ReportData, asked: str) -> Answer:
         parameters=_parameters(data, data.validation.selected.model),
         worst_joint=_worst_joint(data),
         nanoseconds=_nanoseconds(data),
+        as_identified=_as_identified(data),
         command=export if data.known_model is not None else f"{export} --format values",
     )
 
 
 def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:
-    estimate = data.identification and data.identification.reduced
-    deviations = dict(zip(estimate.names, estimate.deviations, strict=True)) if estimate else {}
+    deviations = {}
+    if data.identification is not None and _as_identified(data):
+        found = data.identification.reduced
+        deviations = dict(zip(found.names, found.deviations, strict=True))
     return tuple(
         ShownParameter(
             name,
@@ -63,20 +70,33 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
     )
 
 
+def _as_identified(data: ReportData) -> bool:
+    """Whether the selected values are those that were identified: other weights give others."""
+    if data.identification is None:
+        return False
+    found = data.identification.reduced
+    identified = dict(zip(found.names, found.values, strict=True))
+    model = data.validation.selected.model
+    if set(identified) != set(model.names):
+        return False
+    ours = np.array([identified[name] for name in model.names])
+    return bool(np.allclose(ours, model.values, rtol=1e-4, atol=0))
+
+
 def _worst_joint(data: ReportData) -> str:
-    """On the validation set where there is one."""
+    """By error over nominal torque, on the validation set where there is one."""
     if data.known_model is None:
         return ""
     name, rms = list(data.rms_torque.items())[-1]
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
-    assert row is not None  # it is among what was validated
-    shares = getattr(result, f"torque_error_joint_{name}")[row]
-    errors = np.where(np.isfinite(shares), shares * rms, -np.inf)
-    j = int(errors.argmax())
+    errors = getattr(result, f"torque_error_joint_{name}")[row] * rms
+    shares = np.where(np.isfinite(errors), errors / data.reduction.nominal_torque, -np.inf)
+    j = int(shares.argmax())
     label = data.known_model.mechanism.coordinate_names[j]
-    return f"{errors[j]:.2g} of {rms[j]:.2g} {data.force_unit(j)} at most, {label} ({share(float(shares[j]))})"
+    whole = f"{rms[j]:.2g}" if rms[j] > _NO_TORQUE else "no"
+    return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole} {data.force_unit(j)}"
 
 
 def _nanoseconds(data: ReportData) -> str:

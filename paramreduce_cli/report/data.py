@@ -55,8 +55,13 @@ class ReportData:
     """How many symmetries complete the estimation set."""
     reduction: Reduction
     validation: Validation
+    weighting: str
+    """Of the residuals in fits, as the config names it."""
+    simulated: bool
+    """Whether the states of the samples are those of a simulation."""
     rms_torque: Mapping[str, FloatArray]
-    """Root mean square of each joint's torque by set, (n_dof,), N m or N."""
+    """Root mean square of each joint's torque by set, (n_dof,), N m or N: what a relative error of one
+    is; next to nothing where the torque is zero, so that errors there are not lost."""
     motion: ShownMotion
     skeletons: tuple[Skeleton, ...]
     animation: Animation | None

@@ -102,13 +102,15 @@
   slider.addEventListener("input", () => go(state.curve, +slider.value));
   const tolerance = part("tolerance");
   tolerance.addEventListener("change", () => {
-    const limit = +tolerance.value / 100;
+    if (tolerance.value === "") return;
+    const limit = Math.max(+tolerance.value / 100, 1e-10);
     const rows = curves[state.curve].n.map((_, k) => k);
     const kept = rows.find((k) => SETS.every((s) => curves[state.curve].torque[s][k] <= limit));
-    part("no-such").hidden = kept !== undefined;
     if (kept !== undefined) go(state.curve, kept);
+    else part("no-such").hidden = false;
   });
   followers.push((curve, row, model) => {
+    part("no-such").hidden = true;
     chosen.value = state.curve;
     slider.max = curve.n.length - 1;
     slider.value = row;
@@ -134,8 +136,9 @@
     root.querySelectorAll("[data-joint-error]").forEach((cell) => {
       const [set, j] = cell.dataset.jointError.split(":");
       const joint = joints[+j];
-      const share = curve.joints[set][row * nDof + joint.index];
-      cell.textContent = joint.unit ? `${percent(share)}, ${Number((share * joint.rms[set]).toPrecision(2))} ${joint.unit}` : percent(share);
+      const error = curve.joints[set][row * nDof + joint.index];
+      const share = joint.rms[set] > 1e-100 ? percent(error / joint.rms[set]) : "no torque";
+      cell.textContent = joint.unit ? `${share}, ${Number(error.toPrecision(2))} ${joint.unit}` : share;
     });
   });
 
@@ -360,7 +363,7 @@
       charts = [
         plot(upper, 130, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 52 })],
           series: [{}, { stroke: () => colour("--blue"), width: 1.8 }, { stroke: () => colour("--ink"), width: 1.2, dash: [5, 4] }] }, [motion.time, given, values]),
-        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 52, space: 18 })],
+        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 52, space: 11 })],
           series: [{}, { stroke: () => colour("--bad"), width: 1.2 }] }, [motion.time, missed]),
       ];
     };
@@ -491,7 +494,7 @@
   }
 
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach((chart) => chart.redraw()));
-  addEventListener("hashchange", () => { fromAddress(); follow(); });
+  addEventListener("hashchange", () => { if (/[#&](heuristic|n)=/.test(location.hash)) { fromAddress(); follow(); } });
   fromAddress();
   follow();
   root.dataset.ready = "true";

@@ -106,7 +106,8 @@ def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
     return {
         "torque": {s: packed(getattr(result, f"torque_error_{s}")) for s in _SETS},
         "joints": {
-            s: packed(getattr(result, f"torque_error_joint_{s}").astype(np.float32)) for s in _SETS
+            s: packed((getattr(result, f"torque_error_joint_{s}") * rms).astype(np.float32))
+            for s, rms in data.rms_torque.items()
         },
         "acceleration": {s: packed(getattr(result, f"acceleration_error_{s}")) for s in _SETS},
         "operations": {

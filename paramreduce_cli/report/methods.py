@@ -1,9 +1,13 @@
 """A paragraph for papers that says what was done, and what to cite for it."""
 
 from collections.abc import Iterator
+from math import isfinite
 
-from paramreduce_cli.records import ProofStatus, SelectionMethod
+import numpy as np
+
+from paramreduce_cli.records import MeasuredLog, ProofStatus, SelectionMethod, Trajectories
 from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.texts import share
 
 _BIBTEX = {
     "Atkeson1986": ("article", "C. G. Atkeson and C. H. An and J. M. Hollerbach",
@@ -55,11 +59,11 @@ def _sentences(data: ReportData) -> Iterator[str]:
 def _model(data: ReportData) -> Iterator[str]:
     model = data.model
     mechanism = model.mechanism
-    loops = ", with closed kinematic loops," if mechanism.loops is not None else ""
+    freedom = f"{mechanism.n_dof} degree{'s' if mechanism.n_dof > 1 else ''} of freedom"
+    loops = ", closed kinematic loops" if mechanism.loops is not None else ""
     yield (
-        f"The rigid-body model of the robot ({mechanism.n_dof} degrees of freedom{loops}) is linear in its "
-        f"{model.values.size} standard dynamic parameters [Atkeson1986], {data.n_affecting} of which act on the "
-        f"generalised forces."
+        f"The rigid-body model of the robot ({freedom}{loops}) is linear in its {model.values.size} standard dynamic "
+        f"parameters [Atkeson1986], {data.n_affecting} of which act on the generalised forces."
     )
     yield (
         f"A numerical rank analysis [Gautier1991] gives {model.base.columns.size} base parameters."
@@ -67,43 +71,79 @@ def _model(data: ReportData) -> Iterator[str]:
 
 
 def _excitation(data: ReportData) -> Iterator[str]:
-    trajectories = data.trajectories
     if data.log is not None:
-        yield (
-            f"Torques were measured at {data.log.recorded_rate:.4g} Hz; the same filter was applied to them and to the "
-            f"observation matrix [Gautier1997], and part of the motion was held out."
-        )
-        return
-    if trajectories is None:
+        yield _measured(data.log)
+    elif data.trajectories is not None:
+        yield _trajectories(data.trajectories)
+    elif data.known_model is None:
         yield "The observation matrix and the forces were given."
-        return
-    count = f"{len(trajectories.estimation)} estimation and {len(trajectories.validation)} validation trajectories"
-    if trajectories.source:
-        yield f"Finite Fourier series [Swevers1996] were given for {count} of {trajectories.period:.4g} s."
+    elif data.simulated:
+        yield "The states of both sets are those of simulated motions of the full model."
     else:
-        kappas = [t.kappa for t in trajectories.estimation]
-        yield (
-            f"{count[0].upper()}{count[1:]} of {trajectories.period:.4g} s, finite Fourier series [Swevers1996] within "
-            f"limits of position, velocity and acceleration, were optimised for the {trajectories.criterion} criterion "
-            f"of the {trajectories.scaling} observation matrix; condition numbers of the estimation set are "
-            f"{min(kappas):.3g} to {max(kappas):.3g}."
+        yield "The states of both sets were given."
+
+
+def _measured(log: MeasuredLog) -> str:
+    states = "differentiated positions" if not isfinite(log.state_cutoff) else (
+        f"positions and speeds low-passed at {log.state_cutoff:.4g} Hz"
+    )  # fmt: skip
+    torques = "were taken as recorded"
+    if isfinite(log.torque_cutoff):
+        torques = (
+            f"and the observation matrix were low-passed alike at {log.torque_cutoff:.4g} Hz "
+            "[Gautier1997]"
         )
+    return (
+        f"Motion and torques were recorded at {log.recorded_rate:.4g} Hz; states are {states}, torques {torques}; what was "
+        "held out took no part in any fit."
+    )
+
+
+def _trajectories(found: Trajectories) -> str:
+    count = (
+        f"{len(found.estimation)} estimation and {len(found.validation)} validation trajectories"
+    )
+    if found.source:
+        return (
+            f"Finite Fourier series [Swevers1996] were given for {count} of {found.period:.4g} s."
+        )
+    limits = found.limits
+    kinds = {"velocity": limits.velocity, "acceleration": limits.acceleration,
+             "torque": limits.torque, "power": limits.power}  # fmt: skip
+    kept = ["position", *(kind for kind, values in kinds.items() if np.isfinite(values).any())]
+    bounded = f" and {len(found.constraints)} bounded quantities" if found.constraints else ""
+    kappas = [t.kappa for t in found.estimation]
+    return (
+        f"{count[0].upper()}{count[1:]} of {found.period:.4g} s, finite Fourier series [Swevers1996] within limits of "
+        f"{', '.join(kept)}{bounded}, were optimised by the {found.criterion} criterion of the {found.scaling} observation "
+        f"matrix; condition numbers of single estimation trajectories are {min(kappas):.3g} to {max(kappas):.3g}."
+    )
+
+
+_WEIGHTS = {
+    "nominal-torque": "each joint's residuals over its nominal torque",
+    "noise": "each joint's residuals over its noise",
+    "none": "unweighted",
+}
 
 
 def _selection(data: ReportData) -> Iterator[str]:
-    names = [SelectionMethod.parse(name).heuristic for name in data.reduction.heuristics]
-    cited = [f"{n} [{_HEURISTICS[n]}]" if n in _HEURISTICS else n for n in dict.fromkeys(names)]
+    names = list(data.reduction.heuristics)
+    cited = []
+    for name in names:
+        key = _HEURISTICS.get(SelectionMethod.parse(name).heuristic)
+        cited.append(f"{name} [{key}]" if key else name)
+    yield f"Subsets of parameters were selected by {', '.join(cited)}."
     yield (
-        "Subsets of parameters of every size were selected by "
-        f"{', '.join(cited)}, and the values of those that are kept fitted by least squares on the estimation set, each "
-        "joint's residuals over its nominal torque [Ros2019]."
+        "Values of the parameters that are kept are those of least squares on the torques of the estimation set, "
+        f"{_WEIGHTS[data.weighting]} [Ros2019]."
     )
+    if any(SelectionMethod.parse(name).criterion == "acceleration" for name in names):
+        yield "Those selected by acceleration (@acceleration) are fitted to the accelerations instead."
     proofs = data.reduction.proofs
     if proofs is not None:
         proven = sum(status is ProofStatus.OPTIMAL for status in proofs.status)
-        yield (
-            f"A branch-and-bound search proved the best subset by torque error for {proven} of the {proofs.n.size} sizes."
-        )
+        yield f"A branch-and-bound search proved the best subset by torque error for {proven} of {proofs.n.size} sizes."
     if data.validation.cross_validation:
         yield "The size was chosen by cross-validation inside the estimation set with the one-standard-error rule [Hastie2009]."
 
@@ -112,15 +152,17 @@ def _result(data: ReportData) -> Iterator[str]:
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
-    errors = [f"{100 * result.torque_error_estimation[row]:.3g} % on the estimation set"]
+    errors = [f"{share(float(result.torque_error_estimation[row]))} on the estimation set"]
     if "validation" in data.rms_torque:
-        errors.append(f"{100 * result.torque_error_validation[row]:.3g} % on the validation set")
-    yield f"The model with the {selected.n} parameters of {selected.heuristic} has a relative torque error of {' and '.join(errors)}."
+        errors.append(f"{share(float(result.torque_error_validation[row]))} on the validation set")
+    yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {' and '.join(errors)}."
     if data.known_model is not None:
-        full, reduced = (data.validation.full["operations_inverse"], result.operations_inverse[row])
+        full = data.validation.full["operations_inverse"]
+        reduced = result.operations_inverse[row]
+        loops = data.known_model.mechanism.loops is not None
         yield (
             f"Its inverse dynamics, recursive Newton-Euler equations [Luh1980] simplified symbolically, takes {reduced} "
-            f"operations instead of {full:.0f}, parameters being inputs."
+            f"operations instead of {full:.0f}{', the solution of the loops left out' if loops else ''}, parameters being inputs."
         )
 
 

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.config.schema import ReportSection, SamplingSection
-from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
+from paramreduce_cli.config.schema import ReductionSection, ReportSection, SamplingSection
+from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.running import RunningModel
 from paramreduce_cli.export.writing import export
@@ -47,6 +47,7 @@ _FRAMES = 120
 def report(
     section: ReportSection,
     sampling: SamplingSection,
+    search: ReductionSection,
     model: Model | None,
     trajectories: Trajectories | None,
     samples: Samples,
@@ -76,7 +77,9 @@ def report(
         symmetries=len(sampling.symmetries),
         reduction=reduction,
         validation=validation,
-        rms_torque=_rms_torque(samples),
+        weighting=search.weighting,
+        simulated=sampling.simulation is not None,
+        rms_torque=_rms_torque(samples, reduction.nominal_torque),
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
         animation=None if model is None else _animation(model, motion),
@@ -102,7 +105,7 @@ def report(
         files[f"tables/{name}.csv"] = table.to_csv().encode()
         files[f"tables/{name}.tex"] = latex_table(table, symbols).encode()
     files["index.html"] = render_page(
-        data, summary, images, made, provenance, _code(model, reduction, validation)
+        data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
     return Report(summary, files)
 
@@ -127,24 +130,36 @@ def _tracking(
     return tracked(section.tracking, model, controllers, motion.z, motion.dz)
 
 
-def _code(model: Model | None, reduction: Reduction, validation: Validation) -> Mapping[str, bytes]:
+def _code(
+    model: Model | None, reduction: Reduction, validation: Validation, provenance: Provenance
+) -> Mapping[str, bytes]:
     """The selected model in C, checked; none without a mechanism."""
     if model is None:
         return {}
     chosen, title = chosen_model(None, model, reduction, validation)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
-        return export(model, chosen, title=title, language="c", validation=validation)
+    origin = f"report of config {provenance.config_sha256[:12]}"
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
+            return export(
+                model, chosen, title=title, language="c", validation=validation, origin=origin
+            )
+    except FormulationError as error:
+        warnings.warn(f"the page has no code: {error}", ParamreduceWarning, stacklevel=2)
+        return {}
 
 
-def _rms_torque(samples: Samples) -> dict[str, FloatArray]:
-    """By set and joint, N m or N."""
+def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
+    """By set and joint, N m or N; zero is as small as relative errors of joints take it to be."""
     sets = {"estimation": samples.estimation, "validation": samples.validation}
-    return {
-        name: np.sqrt((one.factors()[..., -1] ** 2).sum(axis=(0, 2)) / one.n_samples)
-        for name, one in sets.items()
-        if one is not None
-    }
+    found = {}
+    for name, one in sets.items():
+        if one is not None:
+            squares = (one.factors()[..., -1] ** 2).sum(axis=(0, 2)) / nominal**2
+            least = np.maximum(squares, np.finfo(float).tiny)
+            measured = np.where(np.isfinite(nominal), nominal, 0.0)
+            found[name] = measured * np.sqrt(least / one.n_samples)
+    return found
 
 
 def _animation(model: Model, motion: ShownMotion) -> Animation:

@@ -101,6 +101,9 @@ class Slurm:
         self.controller.kill()
         self.controller.wait()
         self.start_controller()
+        self._wait()
+        # What ended while it was away it learns when nodes register, which would be in half an hour.
+        self.run("scontrol", "reconfigure")
 
     def run(self, *words):
         """Call one of its commands; returns what it prints."""

@@ -76,6 +76,9 @@ def test_heuristics_that_found_the_same_are_one_curve(carried, summary):
     }  # fmt: skip
     for curve in carried["curves"]:
         assert len({tuple(subsets[name]) for name in curve["names"]}) == 1
+    assert len(carried["curves"]) < len(subsets)  # on this arm some find the same everywhere
+    by_torque = {tuple(subsets[curve["names"][0]]) for curve in carried["curves"]}
+    assert len(by_torque) == len(carried["curves"])
 
 
 def test_the_code_is_in_the_page(page):

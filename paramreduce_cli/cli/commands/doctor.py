@@ -7,6 +7,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tempfile
 import warnings
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,7 +21,7 @@ from paramreduce_cli.cli.options import cores
 from paramreduce_cli.cli.terminal import JSON, emit, out
 from paramreduce_cli.errors import ParamreduceError
 
-_EXTRAS = {"identify": "cvxpy", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
+_EXTRAS = {"identify": "cvxpy", "pandas": "pandas", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
 """A distribution that each extra brings."""
 _SHOWN = {"ok": "[green]ok[/]", "slow": "[yellow]slower[/]", "none": "-", "wrong": "[red]wrong[/]"}
 WRONG = 1
@@ -71,6 +72,14 @@ def _compiler() -> tuple[str, str, str]:
         return "C compiler", "wrong", str(error)
     if command is None:
         return "C compiler", "slow", "none; install gcc, or set CC: models run several times slower"
+    with tempfile.TemporaryDirectory() as folder:
+        source, made = Path(folder, "a.c"), Path(folder, "a.so")
+        source.write_text("int one(void) { return 1; }\n", encoding="utf-8")
+        words = [*command, "-shared", "-fPIC", "-o", str(made), str(source)]
+        subprocess.run(words, capture_output=True, check=False)
+        if not made.exists():
+            text = f"{' '.join(command)} compiles nothing; models run several times slower"
+            return "C compiler", "slow", text
     said = subprocess.run(
         [*command, "--version"], capture_output=True, text=True, check=False, timeout=20
     )

@@ -5,6 +5,7 @@ import re
 import tempfile
 from collections.abc import Sequence
 from pathlib import Path
+from shlex import quote
 
 import click
 
@@ -75,8 +76,10 @@ def init(
             "`paramreduce init --example puma560`."
         )
     if kind == "example":
-        copied = copy_example(source, output or Path("configs") / f"{source}.yaml")
-        say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {copied[0]}")
+        copied, absent = copy_example(source, output or Path("configs") / f"{source}.yaml")
+        for name in absent:
+            say(f"- {name} does not come along; bring it, or a log of your own.")
+        say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {quote(str(copied[0]))}")
         return
     choice = SourceSection(
         file=(described(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
@@ -103,7 +106,7 @@ def init(
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written: {error.strerror}.") from error
     todo = "Fill in what is marked TODO, then: " if "TODO" in text else ""
-    say(f"Wrote {path}. {todo}paramreduce run {path}")
+    say(f"Wrote {path}. {todo}paramreduce run {quote(str(path))}")
 
 
 def _log(config: Path, logs: Sequence[Path], joints: Sequence[str]) -> str:

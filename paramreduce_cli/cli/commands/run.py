@@ -16,7 +16,6 @@ from paramreduce_cli.cli.options import (
     QUIET,
     RESULTS,
     SET,
-    asked,
     cores,
     results_store,
 )
@@ -35,7 +34,7 @@ from paramreduce_cli.cli.terminal import (
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.records import Report
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.runner import Runner, asked
 from paramreduce_cli.texts import share
 
 _TABLE_WIDTH = 110

@@ -7,7 +7,7 @@ from paramreduce_cli.report.table import Table
 
 @placed(PageSection.SELECTED, 1, tall=True)
 def approximate_base_parameters(data: ReportData) -> Table:
-    """The parameters of the selected model: value, and what they take over from the others."""
+    """The parameters of the selected model: value, and what they take over from the others, by the values in the config."""
     selected = data.validation.selected
     model = selected.model
     rows = [

@@ -1,0 +1,68 @@
+"""What the page says of its run in words."""
+
+import html
+import json
+import re
+
+import h5py
+import numpy as np
+import pytest
+from conftest import CONFIGS
+
+from paramreduce_cli.cli.commands.run import run
+
+
+def paragraph(results):
+    page = (results / "report" / "index.html").read_text()
+    return html.unescape(re.search(r"<h2>For a paper</h2>\n<p>(.*?)</p>", page, re.DOTALL)[1])
+
+
+def test_methods_tell_of_trajectories(two_link_results, summary):
+    text = paragraph(two_link_results)
+    assert "(2 degrees of freedom) is linear in its 20 standard dynamic parameters" in text
+    assert "2 estimation and 1 validation trajectories" in text
+    assert "within limits of position, velocity, were" in text  # and of no acceleration
+    assert "over its nominal torque" in text
+    assert "swap, best-subset" in text
+    assert f"takes {summary['selected']['operations']['inverse']} operations" in text
+    page = (two_link_results / "report" / "index.html").read_text()
+    for key in set(re.findall(r"\[([A-Z][a-z]+\d{4})\]", text)):
+        assert re.search(rf"@\w+{{{key},", page)
+
+
+def test_methods_tell_of_a_log(measured_results):
+    results = measured_results / "results"
+    text = paragraph(results)
+    with h5py.File(results / "log.h5") as file:
+        recorded, cutoff = file["recorded_rate"][()], file["torque_cutoff"][()]
+    assert f"recorded at {recorded:.4g} Hz" in text
+    assert ("taken as recorded" in text) != bool(np.isfinite(cutoff))
+    assert "Fourier series" not in text
+
+
+@pytest.fixture(scope="module")
+def simulated(tmp_path_factory):
+    """A cart whose pole carries no torque, from simulated motions."""
+    folder = tmp_path_factory.mktemp("cart")
+    words = [str(CONFIGS / "cart_pole.yaml"), "--results", str(folder), "--quiet", "--set", "report.formats=[svg]",
+             "--set", "validation.stability=false"]  # fmt: skip
+    run.main(words, standalone_mode=False)
+    return folder
+
+
+def test_a_joint_without_torque_has_an_error_all_the_same(simulated):
+    """By definition, from samples and summary."""
+    selected = json.loads((simulated / "report" / "summary.json").read_text())["selected"]
+    with h5py.File(simulated / "samples.h5") as file:
+        names = [name.decode() for name in file["parameters/names"]]
+        W, tau = file["validation/W"][:], file["validation/tau"][:]
+        nominal = file["nominal_torque"][:]
+    phi = np.array([selected["parameters"].get(name, 0.0) for name in names])
+    errors = np.sqrt((((W @ phi).reshape(tau.shape) - tau) ** 2).mean(axis=0))
+    assert np.abs(tau[:, 1]).max() < 1e-9 < errors[1]
+    worst = int(np.argmax(errors / nominal))
+    page = (simulated / "report" / "index.html").read_text()
+    said = re.search(r"RMS of the worst joint, (\w+): (\S+) of", page)
+    assert said[1] == ("s", "theta")[worst]
+    assert float(said[2]) == pytest.approx(errors[worst], rel=0.06)
+    assert "simulated motions" in paragraph(simulated)
