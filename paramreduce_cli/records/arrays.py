@@ -1,8 +1,13 @@
-"""Types of arrays."""
+"""Types of arrays.
+
+Written out: ``numpy.typing.NDArray`` became an opaque alias in NumPy 2.5, and artifacts are laid out by
+what these types are made of.
+"""
+
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
-BoolArray = NDArray[np.bool_]
+FloatArray = np.ndarray[tuple[Any, ...], np.dtype[np.float64]]
+IntArray = np.ndarray[tuple[Any, ...], np.dtype[np.int64]]
+BoolArray = np.ndarray[tuple[Any, ...], np.dtype[np.bool_]]
