@@ -39,7 +39,7 @@ def config_page() -> str:
             full = f"{path}.{key}" if path else key
             needed = key in section.get("required", ())
             default = "**must be given**" if needed else _code(entry.get("default"))
-            cells = (f"`{key}`", _kind(entry, schema), default, _cell(entry.get("description", "")), _example(examples, full))  # fmt: skip
+            cells = (f"`{key}`", _kind(entry, schema), default, _cell(entry.get("description", "")), examples.get(full, ""))  # fmt: skip
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -173,10 +173,6 @@ def _examples() -> dict[str, str]:
     for path in sorted(CONFIGS.glob("*.yaml")):
         walk(yaml.safe_load(path.read_text(encoding="utf-8")), {""})
     return {place: text for place, text in found.items() if text != "see the text"}
-
-
-def _example(examples: Mapping[str, str], place: str) -> str:
-    return examples.get(place, "")
 
 
 def _text(text: str) -> str:

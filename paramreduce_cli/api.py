@@ -161,7 +161,7 @@ def validate(
         reduction: From :func:`reduce`.
         config: What is asked for in ``selected`` and ``validation``; the defaults if None.
         model: Of the robot; without it torques alone are judged.
-        jobs: Worker processes; 0 for none.
+        jobs: Threads of proofs, where the selection is repeated on other data.
     """
     return _made(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
 
@@ -350,7 +350,9 @@ def frame(record: Reduction | Validation) -> pd.DataFrame:
     for name, judged in record.heuristics.items():
         columns = {key: value for key, value in vars(judged).items() if value.ndim == 1}
         sizes = range(judged.n.size)
-        rows += [{"heuristic": name} | {key: all[k] for key, all in columns.items()} for k in sizes]
+        rows += [
+            {"heuristic": name} | {key: column[k] for key, column in columns.items()} for k in sizes
+        ]
     return pd.DataFrame(rows)
 
 

@@ -342,7 +342,7 @@
   // Torques along the motion with what is missed; drawn when they come into view.
   const first = data.measured ? "measured" : "as given";
   const seen = new Set();
-  const torqueCharts = joints.map((joint, j) => {
+  const torqueCharts = joints.map((joint) => {
     const place = element("div", { className: "joint" });
     const unit = joint.unit ? `, ${joint.unit}` : "";
     place.append(element("h4", { textContent: `${joint.name}${unit}` }));
@@ -367,7 +367,7 @@
           series: [{}, { stroke: () => colour("--bad"), width: 1.2 }] }, [motion.time, missed]),
       ];
     };
-    return { place, show, j };
+    return { place, show };
   });
   part("first").textContent = first;
   const watcher = new IntersectionObserver((entries) => {

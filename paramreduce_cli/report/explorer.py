@@ -32,10 +32,8 @@ def explorer(data: ReportData) -> dict[str, Any]:
     selected = data.validation.selected
     return {
         "selected": {"heuristic": selected.heuristic, "n": selected.n},
-        "pareto": [[choice.heuristic, choice.n] for choice in data.validation.pareto],
         "measured": data.identification is not None,
         "counted": data.known_model is not None,
-        "rank": data.reduction.rank,
         "joints": _joints(data),
         "columns": _columns(data, shown),
         "curves": _curves(data, library),
@@ -158,11 +156,8 @@ def _motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
     """Torques and observation matrix of the motion that is shown, thinned to what a page may weigh."""
     motion, n_dof = data.motion, data.motion.tau.shape[1]
     step = max(1, -(-motion.time.size * n_dof * shown.size // _NUMBERS))
-    columns = data.reduction.columns.expansion[:, shown] if data.reduction.columns.tied else None
-    W = motion.W[::step]
-    W = W[..., shown] if columns is None else W @ columns
+    W = motion.W[::step] @ data.reduction.columns.expansion[:, shown]
     return {
-        "timed": motion.timed,
         "time": packed(motion.time[::step]),
         "tau": packed(motion.tau[::step].astype(np.float32)),
         "W": packed(W.astype(np.float32)),
