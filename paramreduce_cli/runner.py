@@ -10,7 +10,7 @@ import json
 import shlex
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -184,6 +184,8 @@ class Runner:
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     asked: str = ""
+    _cut_short: bool = field(default=False, init=False)
+    """Whether Ctrl-C has ended a search of the stage at hand."""
 
     def run(
         self, stage: Stage, *, force: bool = False, go_on: bool = False, share: Share = WHOLE
@@ -208,6 +210,7 @@ class Runner:
             return self._run_share(stage, share, force)
         previous = self._previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
+        self._cut_short = False
         if not force and not better and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
@@ -276,7 +279,7 @@ class Runner:
     def is_current(self, stage: Stage) -> bool:
         """Whether a stage's artifact was made by this version from just these inputs."""
         stamp = self.store.stamp(stage.output)
-        if stamp is None or self.config is None or self.samples is not None:
+        if stamp is None or stamp.cut_short or self.config is None or self.samples is not None:
             return False
         made = (stamp.schema, stamp.stage, stamp.robot, stamp.versions)
         if made != (SCHEMA, stage.name, self.config.robot, versions()):
@@ -397,9 +400,13 @@ class Runner:
             stamp = self._stamp(stage, inputs, time.perf_counter())
             parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
         arguments[stage.lends_run.name] = Run(
-            self.jobs, {} if parts is None else parts, self.progress, self.interrupted, unchanged
+            self.jobs, {} if parts is None else parts, self.progress, self._cut, unchanged
         )
         return parts
+
+    def _cut(self) -> None:
+        self.interrupted()
+        self._cut_short = True
 
     def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:
         sections: dict[str, str] = {}
@@ -417,6 +424,7 @@ class Runner:
             inputs=dict(inputs.digests),
             seed=next((seed for seed in seeds if seed is not None), 0),
             seconds=time.perf_counter() - started,
+            cut_short=self._cut_short,
         )
 
     def _provenance(self) -> Provenance:

@@ -1,10 +1,15 @@
+import signal
+
 import h5py
 import pytest
 from conftest import config_of, run_stages
 
 from paramreduce_cli.artifacts.store import Store, file_of, load_file
-from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.cli.terminal import Interruption
+from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
 from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.records import Reduction
+from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.runner import Runner
 
 ORDER = [
@@ -40,6 +45,39 @@ def test_a_change_redoes_what_depends_on_it(two_link_copy, override, redone):
     assert set(again) <= set(redone)
     assert again[0] == redone[0]
     assert all(run_stages(two_link_copy, override).values())
+
+
+def test_a_search_for_proofs_that_ctrl_c_ended_is_gone_on_with(two_link_copy, monkeypatch):
+    path = two_link_copy / "reduction.h5"
+    digest = Store(two_link_copy).stamp(Reduction).digest
+    path.unlink()
+
+    def ended(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, pytest.warns(ParamreduceWarning, match="are proven"):
+        patch.setattr(ProofSearch, "_round", ended)
+        assert not run_stages(two_link_copy)["reduce"]
+    stamp = Store(two_link_copy).stamp(Reduction)
+    assert stamp.cut_short
+    assert stamp.digest != digest
+    assert not run_stages(two_link_copy)["reduce"]
+    assert Store(two_link_copy).stamp(Reduction).digest == digest
+    assert all(run_stages(two_link_copy).values())
+
+
+def test_a_kill_ends_more_than_a_search_for_proofs(two_link_copy, monkeypatch):
+    (two_link_copy / "reduction.h5").unlink()
+    interruption = Interruption()
+
+    def killed(*_):
+        interruption._note(signal.SIGTERM, None)
+
+    monkeypatch.setattr(ProofSearch, "_round", killed)
+    runner = Runner(config_of("two_link"), Store(two_link_copy), interrupted=interruption.heeded)
+    with pytest.raises(KeyboardInterrupt):
+        runner.run(STAGES["reduce"])
+    assert not (two_link_copy / "reduction.h5").exists()
 
 
 def test_a_lost_or_foreign_artifact_is_made_again(two_link_copy):

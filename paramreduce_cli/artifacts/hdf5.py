@@ -59,6 +59,8 @@ class Stamp:
     seconds: float
     digest: str = ""
     """Of all datasets; set when the file is complete."""
+    cut_short: bool = False
+    """Whether Ctrl-C ended a search in it, with which the next run goes on."""
 
 
 class Writer:
@@ -342,6 +344,7 @@ def _attributes(stamp: Stamp) -> dict[str, Any]:
         "seed": stamp.seed,
         "wall_seconds": stamp.seconds,
         "digest": stamp.digest,
+        "cut_short": stamp.cut_short,
     }
 
 
@@ -363,4 +366,5 @@ def read_stamp(path: Path) -> Stamp | None:
             seed=int(reader.attribute("seed", 0)),
             seconds=float(reader.attribute("wall_seconds", 0.0)),
             digest=str(reader.attribute("digest", "")),
+            cut_short=bool(reader.attribute("cut_short", False)),
         )

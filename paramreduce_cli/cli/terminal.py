@@ -141,24 +141,30 @@ class Interruption:
     """
 
     def __init__(self) -> None:
-        self._met = False
+        self._met: int | None = None
 
     def install(self) -> None:
         """Take over the signals that ask for an end."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
 
-    def _note(self, *_: object) -> None:
-        self._met = True
+    def _note(self, number: int, _: object) -> None:
+        self._met = number
         raise KeyboardInterrupt
 
     def heeded(self) -> None:
-        """Go on after an interruption that has ended a search, not the work."""
-        self._met = False
+        """Go on after a Ctrl-C that has ended a search, not the work.
+
+        Raises:
+            KeyboardInterrupt: It was a kill, which asks for an end of all.
+        """
+        if self._met == signal.SIGTERM:
+            raise KeyboardInterrupt
+        self._met = None
 
     def check(self) -> None:
         """Raise an interruption that was met but did not get through."""
-        if self._met and threading.current_thread() is threading.main_thread():
+        if self._met is not None and threading.current_thread() is threading.main_thread():
             raise KeyboardInterrupt
 
 

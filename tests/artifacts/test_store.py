@@ -99,7 +99,7 @@ def test_names_relied_on_outside(two_link_results):
         with h5py.File(two_link_results / name) as file:
             assert not [d for d in datasets if d not in file]
             for attribute in ("schema", "robot", "stage", "paramreduce_version", "numpy_version",
-                              "config_sections", "inputs", "seed", "wall_seconds"):  # fmt: skip
+                              "config_sections", "inputs", "seed", "wall_seconds", "cut_short"):  # fmt: skip
                 assert attribute in file.attrs
     with h5py.File(two_link_results / "trajectories.h5") as file:
         assert file.attrs["period"] == pytest.approx(2 * np.pi)

@@ -35,11 +35,11 @@ def start(folder):
 
 
 def digests(folder):
-    """Digests of the contents of all artifacts."""
-    found = []
+    """Digests of the contents of all artifacts, by name."""
+    found = {}
     for name in _ARTIFACTS:
         with h5py.File(folder / name) as file:
-            found.append(file.attrs["digest"])
+            found[name] = file.attrs["digest"]
     return found
 
 
@@ -79,6 +79,14 @@ def try_kills(folder, count, seed=0):
         while alive(process.pid) and time.monotonic() < deadline:
             time.sleep(0.05)
         left = alive(process.pid)
-        good = start(folder / "killed").wait() == 0 and digests(folder / "killed") == expected
-        found["a process outlived it" if left else "equal" if good else "not equal"] += 1
+        found["a process outlived it" if left else again(folder / "killed", expected)] += 1
     return found
+
+
+def again(folder, expected):
+    """What running again ends with: equal artifacts, or what is wrong."""
+    code = start(folder).wait()
+    if code:
+        return f"exit {code}"
+    unequal = [name for name, digest in digests(folder).items() if digest != expected[name]]
+    return f"{', '.join(unequal)} not equal" if unequal else "equal"
