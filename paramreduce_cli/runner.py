@@ -172,6 +172,8 @@ class Runner:
         settings: What is asked where there is no config.
         remark: Told of things the user should know.
         interrupted: Told that a stage has met Ctrl-C and ends early, but whole.
+        check: Called before anything is written; raises a KeyboardInterrupt that a library swallowed,
+            which may have spoilt what was computed.
         asked: Config and options that name the run at the shell.
     """
 
@@ -183,6 +185,7 @@ class Runner:
     settings: Settings | None = None
     remark: Callable[[str], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
+    check: Callable[[], None] = lambda: None
     asked: str = ""
     _cut_short: bool = field(default=False, init=False)
     """Whether Ctrl-C has ended a search of the stage at hand."""
@@ -224,6 +227,7 @@ class Runner:
         found = () if force else self._shares(stage, inputs, shares)
         self._hand(stage, arguments, {stage.output: previous, Share: WHOLE, Shares: Shares(found)})
         record = _called(stage, arguments)
+        self.check()
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
             parts.clear()
@@ -245,6 +249,7 @@ class Runner:
         self._lend_run(stage, arguments, inputs, frozenset())
         self._hand(stage, arguments, {stage.output: None, Share: share, Shares: UNSHARED})
         record = _called(stage, arguments)
+        self.check()
         self.store.save(record, self._stamp(stage, inputs, started), path)
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 

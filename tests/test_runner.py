@@ -1,3 +1,4 @@
+import contextlib
 import signal
 
 import h5py
@@ -75,6 +76,26 @@ def test_a_kill_ends_more_than_a_search_for_proofs(two_link_copy, monkeypatch):
 
     monkeypatch.setattr(ProofSearch, "_round", killed)
     runner = Runner(config_of("two_link"), Store(two_link_copy), interrupted=interruption.heeded)
+    with pytest.raises(KeyboardInterrupt):
+        runner.run(STAGES["reduce"])
+    assert not (two_link_copy / "reduction.h5").exists()
+
+
+def test_what_a_swallowed_interruption_may_have_spoilt_is_not_written(two_link_copy, monkeypatch):
+    (two_link_copy / "reduction.h5").unlink()
+    interruption = Interruption()
+
+    def swallowed(self):
+        with contextlib.suppress(KeyboardInterrupt):
+            interruption._note(signal.SIGINT, None)
+
+    monkeypatch.setattr(ProofSearch, "_compile", swallowed)
+    runner = Runner(
+        config_of("two_link"),
+        Store(two_link_copy),
+        interrupted=interruption.heeded,
+        check=interruption.check,
+    )
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])
     assert not (two_link_copy / "reduction.h5").exists()

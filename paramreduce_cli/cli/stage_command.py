@@ -51,6 +51,7 @@ def stage_command(name: str) -> click.Command:
                 settings,
                 remark,
                 interruption.heeded,
+                interruption.check,
                 asked(config if robot else None, results, overrides),
             )
             outcome = runner.run(stage, force=force, go_on=True, share=share or WHOLE)

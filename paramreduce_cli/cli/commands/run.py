@@ -85,6 +85,7 @@ def run(
                     None,
                     remark,
                     interruption.heeded,
+                    interruption.check,
                     asked(config, results, overrides),
                 )
                 outcome = runner.run(stage, force=force)
