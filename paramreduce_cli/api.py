@@ -21,6 +21,7 @@ from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.export.writing import export
+from paramreduce_cli.in_memory import made_in_memory
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.pipeline import maker_of, pipeline, stages_to_run
 from paramreduce_cli.records import (
@@ -38,7 +39,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
-from paramreduce_cli.runner import Runner, asked, made_in_memory
+from paramreduce_cli.runner import Runner, asked
 
 if TYPE_CHECKING:
     import pandas as pd

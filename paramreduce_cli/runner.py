@@ -9,40 +9,26 @@ import importlib.metadata
 import json
 import shlex
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
 from typing import Any
 
 from paramreduce_cli import __version__
-from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
-from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.artifacts.parts import Parts, StoredShares
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
-from paramreduce_cli.config.concerns import explained
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
-from paramreduce_cli.errors import ArtifactError, ConcernError
-from paramreduce_cli.pipeline import (
-    Stage,
-    StageInput,
-    brought_files,
-    maker_of,
-    pipeline,
-    stages_to_run,
-)
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.pipeline import Stage, StageInput, maker_of, pipeline, stages_to_run
 from paramreduce_cli.records import (
     UNSHARED,
     WHOLE,
-    Coefficients,
     Progress,
     Provenance,
-    RawLogs,
-    Recording,
-    Recordings,
     Report,
     Run,
     Samples,
@@ -50,6 +36,7 @@ from paramreduce_cli.records import (
     Shares,
     Trajectories,
 )
+from paramreduce_cli.taken import OUTSIDE, Inputs, called
 
 
 @cache
@@ -69,86 +56,6 @@ class Outcome:
     current: bool
     seconds: float
     record: Any = None
-
-
-class _Inputs:
-    """What one stage has read so far: files by their digests."""
-
-    def __init__(self, config: Config | None) -> None:
-        self.config = config
-        self.digests: dict[str, str] = {}
-
-    def files(self, kind: type) -> dict[str, Path]:
-        """Files of a kind that the config names, by name; noted as read."""
-        found = brought_files(self.config, kind)
-        for path in found.values():
-            self.digests[str(path)] = file_digest(path)
-        return found
-
-
-def _called(stage: Stage, arguments: dict[str, Any]) -> Any:
-    try:
-        return stage.function(**arguments)
-    except ConcernError as error:
-        raise explained(error) from error
-
-
-def _logs(inputs: _Inputs) -> RawLogs:
-    found = {name: load_log(path) for name, path in inputs.files(RawLogs).items()}
-    held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
-    training = tuple(log for name, log in found.items() if name.startswith("training"))
-    return RawLogs(training, held_out)
-
-
-def _coefficients(inputs: _Inputs) -> Coefficients | None:
-    paths = inputs.files(Coefficients)
-    return load_coefficients(paths["coefficients"]) if paths else None
-
-
-def _recordings(inputs: _Inputs) -> Recordings:
-    assert inputs.config is not None
-    found: dict[str, Recording | None] = {"estimation": None, "validation": None}
-    for name, path in inputs.files(Recordings).items():
-        found[name] = load_recording(path, inputs.config.n_dof)
-    return Recordings(**found)
-
-
-_OUTSIDE: dict[type, Callable[[_Inputs], Any]] = {
-    Coefficients: _coefficients,
-    Recordings: _recordings,
-    RawLogs: _logs,
-}
-"""What stages read from files of the user's own."""
-
-
-def made_in_memory(
-    stage: Stage, config: Config | Settings, records: Mapping[type, Any], run: Run
-) -> Any:
-    """Run a stage on records, without files.
-
-    Args:
-        stage: Which one.
-        config: Whose sections it takes.
-        records: What other stages have made, by type.
-        run: Workers and an audience.
-
-    Raises:
-        TypeError: A record that it needs is not among them.
-        ParamreduceError: It fails.
-    """
-    inputs = _Inputs(config if isinstance(config, Config) else None)
-    lent: dict[type, Any] = {Run: run, Share: WHOLE, Shares: UNSHARED, **records}
-    arguments: dict[str, Any] = {}
-    for entry in stage.inputs:
-        if is_section(entry.type):
-            arguments[entry.name] = section(config, entry.type)
-        elif entry.type in _OUTSIDE:
-            arguments[entry.name] = _OUTSIDE[entry.type](inputs)
-        elif lent.get(entry.type) is not None or entry.optional:
-            arguments[entry.name] = lent.get(entry.type)
-        else:
-            raise TypeError(f"{stage.name} needs a {entry.type.__name__}")
-    return _called(stage, arguments)
 
 
 def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
@@ -219,14 +126,14 @@ class Runner:
             stamp = self.store.stamp(stage.output)
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
-        inputs = _Inputs(self.config)
+        inputs = Inputs(self.config)
         arguments = self._arguments(stage, inputs)
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
         shares = StoredShares(path)
         found = () if force else self._shares(stage, inputs, shares)
         self._hand(stage, arguments, {stage.output: previous, Share: WHOLE, Shares: Shares(found)})
-        record = _called(stage, arguments)
+        record = called(stage, arguments)
         self.check()
         self.store.save(record, self._stamp(stage, inputs, started))
         if parts is not None:
@@ -238,22 +145,22 @@ class Runner:
         """Do a share of a stage's work, unless that is done."""
         started = time.perf_counter()
         shares = StoredShares(self.store.path(stage.output))
-        inputs = _Inputs(self.config)
+        inputs = Inputs(self.config)
         inputs.digests |= self._input_digests(stage)
         path = shares.path(share)
         stamp = self._stamp(stage, inputs, started)
         if not force and (self.is_current(stage) or shares.is_current(share, stamp)):
             return Outcome(stage.name, path, True, 0.0)
-        inputs = _Inputs(self.config)
+        inputs = Inputs(self.config)
         arguments = self._arguments(stage, inputs)
         self._lend_run(stage, arguments, inputs, frozenset())
         self._hand(stage, arguments, {stage.output: None, Share: share, Shares: UNSHARED})
-        record = _called(stage, arguments)
+        record = called(stage, arguments)
         self.check()
         self.store.save(record, self._stamp(stage, inputs, started), path)
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 
-    def _arguments(self, stage: Stage, inputs: _Inputs) -> dict[str, Any]:
+    def _arguments(self, stage: Stage, inputs: Inputs) -> dict[str, Any]:
         """What a stage takes from the config and from files, by name."""
         lent = (Run, stage.output, Share, Shares)
         return {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
@@ -262,7 +169,7 @@ class Runner:
         """Add what is lent, by its type, where the stage asks for it."""
         arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
 
-    def _shares(self, stage: Stage, inputs: _Inputs, shares: StoredShares) -> tuple[Any, ...]:
+    def _shares(self, stage: Stage, inputs: Inputs, shares: StoredShares) -> tuple[Any, ...]:
         """Records of all shares of a stage that were made from the same; none where it is done as a whole."""
         if not stage.in_shares:
             return ()
@@ -306,7 +213,7 @@ class Runner:
             if section_digest(self.config, tuple(name.split("."))) != digest
         ]
 
-    def _unchanged(self, stage: Stage, inputs: _Inputs) -> frozenset[str]:
+    def _unchanged(self, stage: Stage, inputs: Inputs) -> frozenset[str]:
         """Sections and files that are what they were when the stage ran before."""
         stamp = self.store.stamp(stage.output)
         if stamp is None or self.config is None:
@@ -316,7 +223,7 @@ class Runner:
         return frozenset(sections | same)
 
     def _input_digests(self, stage: Stage) -> dict[str, str]:
-        inputs = _Inputs(self.config)
+        inputs = Inputs(self.config)
         for entry in stage.inputs:
             if entry in stage.artifacts:
                 stamp = self.store.stamp(entry.type)
@@ -326,16 +233,16 @@ class Runner:
                 inputs.files(entry.type)
         return inputs.digests
 
-    def _argument(self, entry: StageInput, inputs: _Inputs) -> Any:
+    def _argument(self, entry: StageInput, inputs: Inputs) -> Any:
         if is_section(entry.type):
             return section(self.config or self.settings, entry.type)
         if entry.type is Provenance:
             return self._provenance()
-        if entry.type in _OUTSIDE:
-            return _OUTSIDE[entry.type](inputs)
+        if entry.type in OUTSIDE:
+            return OUTSIDE[entry.type](inputs)
         return self._artifact(entry, inputs)
 
-    def _artifact(self, entry: StageInput, inputs: _Inputs) -> Any:
+    def _artifact(self, entry: StageInput, inputs: Inputs) -> Any:
         brought = self.samples if entry.type is Samples else None
         path = brought or self.store.path(entry.type)
         if entry.optional and not self._expected(entry.type):
@@ -393,7 +300,7 @@ class Runner:
         ]
 
     def _lend_run(
-        self, stage: Stage, arguments: dict[str, Any], inputs: _Inputs, unchanged: frozenset[str]
+        self, stage: Stage, arguments: dict[str, Any], inputs: Inputs, unchanged: frozenset[str]
     ) -> Parts | None:
         """Hand workers, finished parts and progress to a stage that asks for them."""
         if stage.lends_run is None:
@@ -413,7 +320,7 @@ class Runner:
         self.interrupted()
         self._cut_short = True
 
-    def _stamp(self, stage: Stage, inputs: _Inputs, started: float) -> Stamp:
+    def _stamp(self, stage: Stage, inputs: Inputs, started: float) -> Stamp:
         sections: dict[str, str] = {}
         seeds = []
         if self.config is not None:

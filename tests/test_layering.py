@@ -14,8 +14,8 @@ import paramreduce_cli
 PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
     {"cli", "__main__", "api"},
-    {"workflow", "runner"},
-    {"sweep"},
+    {"workflow", "runner", "in_memory"},
+    {"sweep", "taken"},
     {"pipeline"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},

@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
+from paramreduce_cli.artifacts.places import SHARES
 from paramreduce_cli.errors import ArtifactError
 
 
@@ -57,8 +58,6 @@ def missing(path: Path, hint: str = "") -> ArtifactError:
     return ArtifactError(f"{path}: there is no such file.{' ' + remedy if remedy else ''}")
 
 
-SHARES = ".parts"
-"""Ending of folders with parts of an artifact that is not whole yet."""
 _LEFT = re.compile(r"\..+\.\w{8}\.tmp")
 """Names of temporary files."""
 

@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import SHARES
 from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp, reading, write
+from paramreduce_cli.artifacts.places import SHARES
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Share, Trajectory
 

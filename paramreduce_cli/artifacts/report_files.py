@@ -9,11 +9,11 @@ from typing import Any
 
 from paramreduce_cli.artifacts.atomic import atomically, check_is_file, missing
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
+from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 
 _LISTING = ".exported.json"
-SUMMARY = "report/summary.json"
 
 
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:

@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import SHARES
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
+from paramreduce_cli.artifacts.places import SHARES
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.joined import JoinedSet

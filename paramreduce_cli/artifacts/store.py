@@ -14,8 +14,8 @@ import filelock
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import (
-    SUMMARY,
     load_json,
     save_report,
     summary_stamp,

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import click
 
+from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.5
@@ -65,5 +66,5 @@ def _own_arguments(words: Sequence[str]) -> str:
 
 def results_below(folder: Path, command: str) -> str:
     """What may have been meant where a folder holds no results itself; empty if nothing is near."""
-    found = sorted(path.parents[1] for path in folder.glob("*/report/summary.json"))
+    found = sorted(path.parents[1] for path in folder.glob(f"*/{SUMMARY}"))
     return f" Did you mean `paramreduce {command} {shlex.quote(str(found[0]))}`?" if found else ""

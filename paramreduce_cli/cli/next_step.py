@@ -4,10 +4,10 @@ import re
 import shlex
 from pathlib import Path
 
+from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.texts import share
 
-_SUMMARY = Path("report/summary.json")
 _READ = 100_000
 """Characters of a file in which a config must have begun."""
 _MOST = 8
@@ -30,7 +30,7 @@ def next_steps(folder: Path) -> list[str]:
             "",
             "paramreduce --help lists all commands.",
         ]
-    configs.sort(key=lambda path: not (folder / _results(path) / _SUMMARY).exists())
+    configs.sort(key=lambda path: not (folder / _results(path) / SUMMARY).exists())
     lines = [line for path in configs[:_MOST] for line in _robot(folder, path)]
     if len(configs) > _MOST:
         lines.append(f"and {len(configs) - _MOST} more")
@@ -61,7 +61,7 @@ def _robot(folder: Path, path: Path) -> list[str]:
     """What was made of a robot, and the next command."""
     results, shown = _results(path), shlex.quote(str(path))
     made = sorted(file.name for file in (folder / results).glob("*.h5"))
-    if not (folder / results / _SUMMARY).exists():
+    if not (folder / results / SUMMARY).exists():
         state = f"begun ({', '.join(made)}); go on" if made else "not run yet"
         return [f"{path}: {state}: paramreduce run {shown}"]
     from paramreduce_cli.artifacts.report_files import load_summary  # it loads HDF5

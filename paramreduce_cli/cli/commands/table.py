@@ -6,7 +6,8 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.atomic import atomically
-from paramreduce_cli.artifacts.report_files import SUMMARY, load_summary
+from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, emit, say
 from paramreduce_cli.errors import ArtifactError, ConfigError

@@ -1,0 +1,41 @@
+"""Runs stages on records, without files."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from paramreduce_cli.config import Config
+from paramreduce_cli.config.schema import Settings
+from paramreduce_cli.config.sections import is_section, section
+from paramreduce_cli.pipeline import Stage
+from paramreduce_cli.records import UNSHARED, WHOLE, Run, Share, Shares
+from paramreduce_cli.taken import OUTSIDE, Inputs, called
+
+
+def made_in_memory(
+    stage: Stage, config: Config | Settings, records: Mapping[type, Any], run: Run
+) -> Any:
+    """Run a stage.
+
+    Args:
+        stage: Which one.
+        config: Whose sections it takes.
+        records: What other stages have made, by type.
+        run: Workers and an audience.
+
+    Raises:
+        TypeError: A record that it needs is not among them.
+        ParamreduceError: It fails.
+    """
+    inputs = Inputs(config if isinstance(config, Config) else None)
+    lent: dict[type, Any] = {Run: run, Share: WHOLE, Shares: UNSHARED, **records}
+    arguments: dict[str, Any] = {}
+    for entry in stage.inputs:
+        if is_section(entry.type):
+            arguments[entry.name] = section(config, entry.type)
+        elif entry.type in OUTSIDE:
+            arguments[entry.name] = OUTSIDE[entry.type](inputs)
+        elif lent.get(entry.type) is not None or entry.optional:
+            arguments[entry.name] = lent.get(entry.type)
+        else:
+            raise TypeError(f"{stage.name} needs a {entry.type.__name__}")
+    return called(stage, arguments)

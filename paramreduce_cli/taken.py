@@ -1,0 +1,69 @@
+"""What a stage takes that no other stage makes: files of the user's own, noted by their digests."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
+from paramreduce_cli.artifacts.log_files import load_log
+from paramreduce_cli.artifacts.store import file_digest
+from paramreduce_cli.config import Config
+from paramreduce_cli.config.concerns import explained
+from paramreduce_cli.errors import ConcernError
+from paramreduce_cli.pipeline import Stage, brought_files
+from paramreduce_cli.records import Coefficients, RawLogs, Recording, Recordings
+
+
+class Inputs:
+    """What one stage has read so far: files by their digests."""
+
+    def __init__(self, config: Config | None) -> None:
+        self.config = config
+        self.digests: dict[str, str] = {}
+
+    def files(self, kind: type) -> dict[str, Path]:
+        """Files of a kind that the config names, by name; noted as read."""
+        found = brought_files(self.config, kind)
+        for path in found.values():
+            self.digests[str(path)] = file_digest(path)
+        return found
+
+
+def called(stage: Stage, arguments: dict[str, Any]) -> Any:
+    """What a stage makes of its arguments; concerns are told by the config's keys.
+
+    Raises:
+        ParamreduceError: It fails.
+    """
+    try:
+        return stage.function(**arguments)
+    except ConcernError as error:
+        raise explained(error) from error
+
+
+def _logs(inputs: Inputs) -> RawLogs:
+    found = {name: load_log(path) for name, path in inputs.files(RawLogs).items()}
+    held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
+    training = tuple(log for name, log in found.items() if name.startswith("training"))
+    return RawLogs(training, held_out)
+
+
+def _coefficients(inputs: Inputs) -> Coefficients | None:
+    paths = inputs.files(Coefficients)
+    return load_coefficients(paths["coefficients"]) if paths else None
+
+
+def _recordings(inputs: Inputs) -> Recordings:
+    assert inputs.config is not None
+    found: dict[str, Recording | None] = {"estimation": None, "validation": None}
+    for name, path in inputs.files(Recordings).items():
+        found[name] = load_recording(path, inputs.config.n_dof)
+    return Recordings(**found)
+
+
+OUTSIDE: dict[type, Callable[[Inputs], Any]] = {
+    Coefficients: _coefficients,
+    Recordings: _recordings,
+    RawLogs: _logs,
+}
+"""What stages read from files of the user's own."""
