@@ -34,6 +34,7 @@ from paramreduce_cli.records import (
     Samples,
     Share,
     Shares,
+    Tell,
     Trajectories,
 )
 from paramreduce_cli.taken import OUTSIDE, Inputs, called
@@ -132,7 +133,11 @@ class Runner:
         parts = self._lend_run(stage, arguments, inputs, unchanged)
         shares = StoredShares(path)
         found = () if force else self._shares(stage, inputs, shares)
-        self._hand(stage, arguments, {stage.output: previous, Share: WHOLE, Shares: Shares(found)})
+        self._hand(
+            stage,
+            arguments,
+            {Tell: self.progress, stage.output: previous, Share: WHOLE, Shares: Shares(found)},
+        )
         record = called(stage, arguments)
         self.check()
         self.store.save(record, self._stamp(stage, inputs, started))
@@ -154,7 +159,11 @@ class Runner:
         inputs = Inputs(self.config)
         arguments = self._arguments(stage, inputs)
         self._lend_run(stage, arguments, inputs, frozenset())
-        self._hand(stage, arguments, {stage.output: None, Share: share, Shares: UNSHARED})
+        self._hand(
+            stage,
+            arguments,
+            {Tell: self.progress, stage.output: None, Share: share, Shares: UNSHARED},
+        )
         record = called(stage, arguments)
         self.check()
         self.store.save(record, self._stamp(stage, inputs, started), path)
@@ -162,10 +171,10 @@ class Runner:
 
     def _arguments(self, stage: Stage, inputs: Inputs) -> dict[str, Any]:
         """What a stage takes from the config and from files, by name."""
-        lent = (Run, stage.output, Share, Shares)
+        lent = (Run, Tell, stage.output, Share, Shares)
         return {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
 
-    def _hand(self, stage: Stage, arguments: dict[str, Any], values: dict[type, Any]) -> None:
+    def _hand(self, stage: Stage, arguments: dict[str, Any], values: dict[Any, Any]) -> None:
         """Add what is lent, by its type, where the stage asks for it."""
         arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
 

@@ -213,7 +213,7 @@ def _shown_progress(quiet: bool, as_json: bool) -> Iterator[Callable[[Progress],
 
 
 class _Lines:
-    """Progress as lines, the last step of a task always, others not too often.
+    """Progress as lines, not too often; the end of a task unless it was brief and says nothing.
 
     Args:
         pause: Between two lines of a task, s.
@@ -230,6 +230,8 @@ class _Lines:
         now = time.monotonic()
         begun = self._begun.setdefault(p.task, now)
         if p.done < p.total and now - self._told.get(p.task, begun) < self._pause:
+            return
+        if p.done >= p.total and not (p.remark or p.task in self._told):
             return
         self._told[p.task] = now
         share = p.done / p.total if p.total else 1.0

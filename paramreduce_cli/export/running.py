@@ -2,15 +2,17 @@
 
 import ctypes
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
 from paramreduce_cli.export.writing import Exported, export, exported_functions
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.functions import Function
-from paramreduce_cli.records import FloatArray, Model, ReducedModel
+from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
 
-_ROUNDS = 20
+_ROUNDS, _TURNS = 20, 9
+"""Evaluations of every state in one go, and how often each model is timed."""
 
 _LOOP = """
 void repeated(long rounds, long n, const double *phi, const double *q, const double *dq,
@@ -70,3 +72,13 @@ class RunningModel:
         started = time.perf_counter()
         self(q, dq, ddq, rounds)
         return (time.perf_counter() - started) / rounds / len(q)
+
+
+def speed(
+    models: Mapping[str, RunningModel], q: FloatArray, dq: FloatArray, ddq: FloatArray
+) -> Speed:
+    """How long models take on the same states, (n_states, n_q) each."""
+    # In turns, and the shortest: whatever else the machine does meets all of them alike.
+    turns = [{name: m.seconds(q, dq, ddq) for name, m in models.items()} for _ in range(_TURNS)]
+    least = {name: min(turn[name] for turn in turns) for name in models}
+    return Speed(least, next(m.language for m in models.values()))

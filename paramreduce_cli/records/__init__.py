@@ -52,7 +52,7 @@ from paramreduce_cli.records.reduction import (
     SelectionMethod,
     Subsets,
 )
-from paramreduce_cli.records.run import Progress, Provenance, Report, Run
+from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Tell
 from paramreduce_cli.records.samples import Block, Recording, Recordings, Samples, SampleSet
 from paramreduce_cli.records.shares import UNSHARED, WHOLE, Share, Shares
 from paramreduce_cli.records.terms import (
@@ -62,7 +62,7 @@ from paramreduce_cli.records.terms import (
     TermModel,
     TermReduction,
 )
-from paramreduce_cli.records.tracking import Paths, Tracking
+from paramreduce_cli.records.tracking import Paths, Speed, Tracking
 from paramreduce_cli.records.trajectories import (
     DISTANCES,
     Coefficients,

@@ -25,6 +25,10 @@ class Progress:
     remark: str = ""
 
 
+Tell = Callable[[Progress], None]
+"""An audience of long work."""
+
+
 @dataclass(frozen=True)
 class Provenance:
     """Where an artifact came from."""
@@ -47,7 +51,7 @@ class Run:
     """Worker processes; 0 for doing all in this one."""
     parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
     """Finished parts of an artifact that is not whole yet, kept across interruptions."""
-    progress: Callable[[Progress], None] = lambda _: None
+    progress: Tell = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""
     unchanged: frozenset[str] = frozenset()

@@ -9,6 +9,16 @@ from paramreduce_cli.records.arrays import FloatArray, IntArray
 
 
 @dataclass(frozen=True)
+class Speed:
+    """How long exported inverse dynamics take on the machine at hand."""
+
+    seconds: Mapping[str, float]
+    """Of one evaluation by model, the full one first, s."""
+    language: str
+    """In which they were evaluated."""
+
+
+@dataclass(frozen=True)
 class Paths:
     """Motions at the times of a controller, each resting at its end while others still move.
 
@@ -31,10 +41,6 @@ class Tracking:
     paths: Paths
     errors: Mapping[str, FloatArray]
     """By the model of the controller: z_d - z, (n_samples, n_paths, n_dof), rad or m."""
-    seconds: Mapping[str, float]
-    """Of one evaluation of the model, s."""
-    language: str
-    """In which it was evaluated."""
 
     def rms(self, model: str) -> FloatArray:
         """Root mean square error over time and joints, (n_paths,), rad or m."""

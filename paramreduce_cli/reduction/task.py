@@ -1,8 +1,11 @@
 """What a heuristic is asked for, and what it answers."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -47,6 +50,8 @@ class SelectionTask:
     progress: Callable[[Progress], None] = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told that a KeyboardInterrupt was met and heeded."""
+    known: dict[Any, FoundSubsets] = field(default_factory=dict)
+    """What was found on the same data before, by heuristic and what was asked of it."""
 
     @cached_property
     def limit(self) -> int:
@@ -64,9 +69,11 @@ class FoundSubsets:
 
 
 def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
-    """Run a heuristic by its name."""
-    found: FoundSubsets = heuristics[heuristic](task)
-    return found
+    """Run a heuristic by its name, unless the same was asked of it before: several begin with others."""
+    asked = (heuristic, task.objective, task.limit, task.smallest, task.effort)
+    if asked not in task.known:
+        task.known[asked] = heuristics[heuristic](task)
+    return task.known[asked]
 
 
 def nested(task: SelectionTask, order: Units) -> FoundSubsets:

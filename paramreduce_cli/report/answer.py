@@ -100,7 +100,7 @@ def _worst_joint(data: ReportData) -> str:
 
 
 def _nanoseconds(data: ReportData) -> str:
-    if data.tracking is None:
+    if data.speed is None:
         return ""
-    full, reduced = (1e9 * seconds for seconds in data.tracking.seconds.values())
-    return f"{reduced:.3g} ns instead of {full:.3g} ns in {data.tracking.language}"
+    full, reduced = (1e9 * seconds for seconds in data.speed.seconds.values())
+    return f"{reduced:.3g} ns instead of {full:.3g} ns in {data.speed.language}"

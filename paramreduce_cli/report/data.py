@@ -13,6 +13,7 @@ from paramreduce_cli.records import (
     Model,
     ReducedModel,
     Reduction,
+    Speed,
     TermReduction,
     Tracking,
     Trajectories,
@@ -66,6 +67,8 @@ class ReportData:
     skeletons: tuple[Skeleton, ...]
     animation: Animation | None
     """Of the motion, where there is a mechanism."""
+    speed: Speed | None
+    """Of the full and of the selected model; None of closed loops and without a robot."""
     tracking: Tracking | None
     """Where it was asked for."""
     log: MeasuredLog | None

@@ -22,15 +22,18 @@ from paramreduce_cli.records import (
     Identification,
     MeasuredLog,
     Model,
+    Progress,
     ReducedModel,
     Samples,
     SampleSet,
+    Tell,
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.reduction.noise import joint_noise
 from paramreduce_cli.texts import share
 
+_STEPS = 3
 _MOST_SHOWN = 1500
 """Samples in figures."""
 _HARDLY = 0.3
@@ -45,6 +48,7 @@ def identify(
     model: Model,
     samples: Samples,
     validation: Validation,
+    tell: Tell = lambda _: None,
 ) -> Identification:
     """Identify base parameters and those of the selected model, with standard deviations.
 
@@ -59,7 +63,9 @@ def identify(
     if identification.estimator != "ordinary":
         deviation = joint_noise(factors, scale, n_samples)
     full, full_fit = _estimate(identification, base_model(model), samples, deviation)
+    tell(Progress("identification", 1, _STEPS, "base parameters"))
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
+    tell(Progress("identification", 2, _STEPS, "selected parameters"))
     mechanism = model.mechanism
     suspected = hints(
         full_fit,
@@ -78,6 +84,8 @@ def identify(
     for text in suspected:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _shown(held_out)
+    consistency = _consistency(identification, model, samples, deviation)
+    tell(Progress("identification", _STEPS, _STEPS))
     return Identification(
         estimator=identification.estimator,
         torque_deviation=deviation,
@@ -85,7 +93,7 @@ def identify(
         full=full,
         reduced=reduced,
         residuals=full_fit.judged_residuals(n_samples),
-        consistency=_consistency(identification, model, samples, deviation),
+        consistency=consistency,
         hints=tuple(suspected),
         comparison=compared(full, reduced),
         shown_time=np.concatenate([block.time for block in shown]),

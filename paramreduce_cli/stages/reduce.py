@@ -27,6 +27,7 @@ from paramreduce_cli.records import (
     FloatArray,
     IntArray,
     Model,
+    Progress,
     Proofs,
     ProofStatus,
     Reduction,
@@ -88,15 +89,18 @@ def reduce(
     known = [one for one in (previous, *shares.found) if one is not None]
     proven = [one.proofs for one in known if one.proofs and np.array_equal(one.factor, factor)]
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
-    objectives: dict[str, Objective] = {}
-    found, proofs = {}, None
+    tasks: dict[str, SelectionTask] = {}
+    found: dict[str, _Selected] = {}
+    proofs = None
     for name in _wanted(reduction.heuristics, share):
+        run.progress(Progress(f"select by {name}", 0, 1))
         method = SelectionMethod.parse(name)
-        if method.criterion not in objectives:
-            objectives[method.criterion] = criteria[method.criterion](problem, inputs)
-        task = _task(objectives[method.criterion], reduction, proven, share, run)
-        found[name], made = _selected(task, method, reduction.stop)
+        if method.criterion not in tasks:
+            objective = criteria[method.criterion](problem, inputs)
+            tasks[method.criterion] = _task(objective, reduction, proven, share, run)
+        found[name], made = _selected(tasks[method.criterion], method, reduction.stop)
         proofs = made if made is not None else proofs
+        run.progress(Progress(f"select by {name}", 1, 1))
     _remark_on_proofs(proofs, share)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)

@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.config.schema import ReductionSection, ReportSection, SamplingSection
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
-from paramreduce_cli.export.running import RunningModel
+from paramreduce_cli.export.running import RunningModel, speed
 from paramreduce_cli.export.writing import export
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -18,11 +18,13 @@ from paramreduce_cli.records import (
     Identification,
     MeasuredLog,
     Model,
+    Progress,
     Provenance,
     Reduction,
     Report,
     Samples,
     Selected,
+    Tell,
     TermReduction,
     Tracking,
     Trajectories,
@@ -57,6 +59,7 @@ def report(
     identification: Identification | None,
     terms: TermReduction | None,
     provenance: Provenance,
+    tell: Tell = lambda _: None,
 ) -> Report:
     """Draw the figures, set the tables and write the page and summary.json.
 
@@ -70,6 +73,7 @@ def report(
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), selected.model, reduction.nominal_torque)
+    running = _running(model, selected)
     data = ReportData(
         title=section.title or provenance.robot,
         known_model=model,
@@ -83,7 +87,8 @@ def report(
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
         animation=None if model is None else _animation(model, motion),
-        tracking=None if model is None else _tracking(section, model, selected, motion),
+        speed=speed(running, motion.z, motion.dz, motion.ddz) if running else None,
+        tracking=_tracking(section, model, running, motion),
         log=log,
         identification=identification,
         terms=terms,
@@ -94,7 +99,10 @@ def report(
     files: dict[str, bytes] = {}
     images = {}
     formats = [str(name) for name in section.formats]
-    for name, draw in _shown(figures, model):
+    drawn = _shown(figures, model)
+    steps = len(drawn) + 1
+    for k, (name, draw) in enumerate(drawn):
+        tell(Progress("figures, tables and page", k, steps, name))
         encoded = render(draw, data, sorted({*formats, "svg"}))
         if encoded:
             images[name] = encoded["svg"]
@@ -107,6 +115,7 @@ def report(
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
+    tell(Progress("figures, tables and page", steps, steps))
     return Report(summary, files)
 
 
@@ -119,15 +128,24 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
     ]
 
 
+def _running(model: Model | None, selected: Selected) -> dict[str, RunningModel]:
+    """The exported code of the full and of the selected model; none of closed loops."""
+    if model is None or model.mechanism.loops is not None:
+        return {}
+    models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
+    return {title: RunningModel(model, chosen) for title, chosen in models.items()}
+
+
 def _tracking(
-    section: ReportSection, model: Model, selected: Selected, motion: ShownMotion
+    section: ReportSection,
+    model: Model | None,
+    running: Mapping[str, RunningModel],
+    motion: ShownMotion,
 ) -> Tracking | None:
     """Control with the exported code of the full and of the selected model."""
-    if section.tracking is None:
+    if section.tracking is None or model is None:
         return None
-    models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
-    controllers = {title: RunningModel(model, chosen) for title, chosen in models.items()}
-    return tracked(section.tracking, model, controllers, motion.z, motion.dz)
+    return tracked(section.tracking, model, running, motion.z, motion.dz)
 
 
 def _code(

@@ -27,6 +27,7 @@ from paramreduce_cli.multibody.observation import (
     standard_deviation,
 )
 from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.multibody.told import ToldSet
 from paramreduce_cli.records import (
     UNSHARED,
     WHOLE,
@@ -40,6 +41,7 @@ from paramreduce_cli.records import (
     SampleSet,
     Share,
     Shares,
+    Tell,
     Trajectories,
 )
 
@@ -58,6 +60,7 @@ def sample(
     trajectories: Trajectories | None,
     recordings: Recordings,
     log: MeasuredLog | None = None,
+    tell: Tell = lambda _: None,
     share: Share = WHOLE,
     shares: Shares = UNSHARED,
 ) -> Samples:
@@ -93,10 +96,16 @@ def sample(
     validation = observed("validation", recordings.validation, sampling.validation_points)
     if isinstance(estimation, ObservedSet) and isinstance(validation, ObservedSet):
         estimation, validation = estimation.restricted(share), validation.restricted(share)
-    if not share.whole:
-        return _samples(model, None, None, estimation, validation)
-    scales = _nominal_torque(model, estimation), _nominal_acceleration(sampling, model, estimation)
-    return _samples(model, *scales, estimation, validation)
+    scales: tuple[FloatArray | None, FloatArray | None] = (None, None)
+    if share.whole:
+        torque = _nominal_torque(model, estimation)
+        scales = torque, _nominal_acceleration(sampling, model, estimation)
+    return _samples(
+        model,
+        *scales,
+        ToldSet(estimation, "estimation set", tell),
+        ToldSet(validation, "validation set", tell),
+    )
 
 
 def _samples(

@@ -17,6 +17,7 @@ from paramreduce_cli.judgement.verdict import remarks, verdict
 from paramreduce_cli.lean.counting import COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
+from paramreduce_cli.multibody.told import told
 from paramreduce_cli.records import (
     CountedDynamics,
     CrossValidation,
@@ -26,6 +27,7 @@ from paramreduce_cli.records import (
     HeuristicValidation,
     IntArray,
     Model,
+    Progress,
     Reduction,
     Run,
     Samples,
@@ -33,6 +35,7 @@ from paramreduce_cli.records import (
     Selected,
     SelectionMethod,
     Stability,
+    Tell,
     Validation,
 )
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
@@ -85,7 +88,7 @@ def validate(
     elif model is None:
         measured = _torques_alone(samples, reduction)
     else:
-        measured = _measured(model, samples, reduction, counted)
+        measured = _measured(model, samples, reduction, counted, run.progress)
     heuristics, full = measured.heuristics, measured.full
     crossed = None
     if wanted.cross_validation:
@@ -131,7 +134,7 @@ class _Measured:
 
 
 def _measured(
-    model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics
+    model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, tell: Tell
 ) -> _Measured:
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
@@ -142,19 +145,25 @@ def _measured(
     models = _Models(reduction, model.values)
     _check_coordinates(model, samples)
 
-    def errors_on(sample_set: SampleSet) -> tuple[NormErrors, AccelerationErrors]:
-        torque = torque_errors(sample_set.blocks(), models.values, reduction.nominal_torque)
-        every = -(-sample_set.n_samples // _MOST_ACCELERATIONS)
-        spread = thinned_blocks(sample_set.blocks(), every)
+    def errors_on(sample_set: SampleSet, name: str) -> tuple[NormErrors, AccelerationErrors]:
+        n = sample_set.n_samples
+        blocks = told(sample_set.blocks(), n, f"torques of the {name} set", tell)
+        torque = torque_errors(blocks, models.values, reduction.nominal_torque)
+        blocks = told(sample_set.blocks(), n, f"accelerations of the {name} set", tell)
+        spread = thinned_blocks(blocks, -(-n // _MOST_ACCELERATIONS))
         acceleration = acceleration_errors(spread, dynamics.direct, models.values, nominal)
         return torque, acceleration
 
-    estimation, validation = errors_on(samples.estimation), errors_on(samples.validation)
+    estimation = errors_on(samples.estimation, "estimation")
+    validation = errors_on(samples.validation, "validation")
     counts = Counts(model, counted)
-    heuristics = {}
+    heuristics: dict[str, HeuristicValidation] = {}
+    total = len(reduction.heuristics)
     for name, found in reduction.heuristics.items():
+        tell(Progress("count operations", len(heuristics), total, name))
         operations = np.array([counts.all(reduction.model(name, k)) for k in range(found.n.size)])
         heuristics[name] = _judged(found.n, operations, estimation, validation, models.rows[name])
+    tell(Progress("count operations", total, total))
     full = _full_model(model, counts, estimation[1], validation[1])
     return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
 
@@ -316,7 +325,8 @@ def _cross_validation(
     problem = selection_problem(reduction.factor, model, grouped)
     quick = dataclasses.replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
     found = {}
-    for name, heuristic in methods.items():
+    for k, (name, heuristic) in enumerate(methods.items()):
+        run.progress(Progress("cross-validation", k, len(methods), name))
 
         def select(other: SelectionProblem, heuristic: str = heuristic) -> Sequence[IntArray]:
             task = SelectionTask(TorqueObjective(other), reduction.rank, effort=quick)
@@ -326,6 +336,7 @@ def _cross_validation(
         result = cross_validated(problem, folds, select)
         if result.n.size:
             found[name] = result
+    run.progress(Progress("cross-validation", len(methods), len(methods)))
     if not found:
         raise ConfigError(
             "finds no size of subset that comes up with every part left out; ask for more parameters in "
@@ -371,4 +382,4 @@ def _stability(
             blocks = thinned_blocks(samples.estimation.blocks(), every)
             thinned = DataVariant(DataChange.THINNED, every)
             variants.append((thinned, factor(joint_factors(blocks))))
-    return stability(problem, variants, chosen)
+    return stability(problem, variants, chosen, run.progress)

@@ -13,8 +13,6 @@ from paramreduce_cli.records import FloatArray, Model, Tracking
 from paramreduce_cli.tracking.control import Arm, advanced, simulate
 from paramreduce_cli.tracking.paths import point_to_point
 
-_TURNS = 9
-"""How often each model is timed."""
 _SHARE = 0.8
 """Of the range and speed of a motion that the paths keep to."""
 
@@ -22,15 +20,8 @@ _SHARE = 0.8
 class ControllerModel(Protocol):
     """Inverse dynamics as a controller has it."""
 
-    @property
-    def language(self) -> str:
-        """In which it runs."""
-
     def __call__(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Torques of some states, (n_states, n_dof)."""
-
-    def seconds(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> float:
-        """Of one evaluation, s."""
 
 
 def tracked(
@@ -57,15 +48,8 @@ def tracked(
         low + inset, high - inset, speed, section.moves, section.control_period, seeds
     )
     arm = _arm(model, section.control_period)
-    along = [x[: paths.samples[0], 0] for x in (paths.z, paths.dz, paths.ddz)]
-    # In turns, and the shortest: whatever else the machine does meets all of them alike.
-    turns = [{name: c.seconds(*along) for name, c in controllers.items()} for _ in range(_TURNS)]
-    return Tracking(
-        paths,
-        {name: simulate(paths, c, arm, section.bandwidth) for name, c in controllers.items()},
-        {name: min(turn[name] for turn in turns) for name in controllers},
-        next(c.language for c in controllers.values()),
-    )
+    errors = {name: simulate(paths, c, arm, section.bandwidth) for name, c in controllers.items()}
+    return Tracking(paths, errors)
 
 
 def _arm(model: Model, period: float) -> Arm:

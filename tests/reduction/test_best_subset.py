@@ -5,8 +5,12 @@ import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import Effort, dependent_problem, found, problem
 
+from paramreduce_cli.reduction.best_subset import kernel
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.heuristics import swap
+from paramreduce_cli.reduction.task import SelectionTask, run
 
 KINDS = ("generic", "sparse", "proportional", "dependent", "near-dependent", "nearly-parallel")
 
@@ -176,13 +180,41 @@ def test_without_any_time_there_are_subsets_and_bounds():
 def test_an_interruption_ends_the_search_and_keeps_what_is_known():
     told = []
 
-    def interrupt(_):
-        raise KeyboardInterrupt
+    def interrupt(step):
+        if step.task == "best-subset":
+            raise KeyboardInterrupt
 
     asked = {"progress": interrupt, "interrupted": lambda: told.append(1)}
     result = found("best-subset", hard_problem(), **asked)
     assert told == [1]
     assert len(result.subsets) == 30
+
+
+def test_a_decomposition_that_does_not_converge_leaves_the_bound_as_it_was(monkeypatch):
+    def diverging(*_, **__):
+        raise ValueError("Internal algorithm failed to converge.")
+
+    search = Search(unit_problem(hard_problem()), 3, 1.0, np.zeros(0, np.int64))
+    state = search._state
+    sheet, numbers, errors = state.sheets[0], state.numbers[0], state.errors[0].copy()
+    before = sheet.copy()
+    monkeypatch.setattr(np.linalg, "svd", diverging)
+    kernel._fit_anew.py_func(sheet, numbers, state.errors[0], state, search._data)
+    assert (
+        numbers[kernel.NEAR] == 1
+    )  # so nothing is included by force, and the next exclusion tries again
+    assert state.errors[0].tolist() == errors.tolist()
+    assert np.array_equal(sheet, before)
+
+
+def test_what_swaps_find_is_not_looked_for_twice(monkeypatch):
+    times, original = [], swap.swap
+    monkeypatch.setattr(swap, "swap", lambda task: times.append(1) or original(task))
+    task = SelectionTask(TorqueObjective(dependent_problem(0)))
+    started = run("swap", task)
+    proven = run("best-subset", task)
+    assert times == [1]
+    assert len(proven.subsets) >= len(started.subsets)
 
 
 @pytest.mark.parametrize("condition", [1e6, 1e8])

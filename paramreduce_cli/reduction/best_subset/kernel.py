@@ -178,14 +178,26 @@ def _exclude(
 def _fit_anew(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
 ) -> None:
-    """The fit with all included and free columns, from the columns themselves."""
+    """The fit with all included and free columns, from the columns themselves.
+
+    Now and then the decomposition of a large matrix does not converge. Then the bound of more columns
+    stays, and the next exclusion begins anew.
+    """
     n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
     rows = np.empty((free + count, data.chi.size))
     for j in range(free):
         rows[j] = data.columns[numbers[FIRST + j]]
     for k in range(count):
         rows[free + k] = data.columns[s.included[k]]
-    left, values, right = np.linalg.svd(rows, full_matrices=True)
+    left, values, right = np.empty((0, 0)), np.empty(0), np.empty((0, 0))
+    converged = True
+    try:
+        left, values, right = np.linalg.svd(rows, full_matrices=True)
+    except Exception:
+        converged = False
+    if not converged:
+        numbers[NEAR] = 1
+        return
     rank = 0
     while rank < values.size and values[rank] > DEPENDENT * values[0]:
         rank += 1

@@ -21,8 +21,10 @@ from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.task import SelectionTask
 
-_SLICE = 20_000
-"""Nodes between two looks at the clock."""
+_FIRST_SLICE, _LARGEST_SLICE = 200, 20_000
+"""Nodes between two looks at the clock: few at first, as those of nearly dependent columns take long,"""
+_PATIENCE = 0.5
+"""and then as many as pass in this time, s."""
 _FIRST_ROUND, _GROWTH = 30_000, 8
 """Nodes for each size in the first round, and how many times more in each further one."""
 _UNLIMITED = 10**15
@@ -201,10 +203,14 @@ class ProofSearch:
     ) -> Iterator[int]:  # fmt: skip
         """Numbers of nodes to go on for, until there is a reason to stop."""
         started = time.perf_counter()
+        before = search.nodes
+        slice_ = _FIRST_SLICE
         while search.nodes < nodes and not (search.finished or stop.is_set()):
             if time.monotonic() > deadline:
                 break
-            yield min(_SLICE, nodes - search.nodes)
+            yield min(slice_, nodes - search.nodes)
+            rate = (search.nodes - before) / (time.perf_counter() - started)
+            slice_ = min(_LARGEST_SLICE, max(1, int(_PATIENCE * rate)))
         proof.seconds += time.perf_counter() - started
 
     def _raise_bounds(

@@ -4,14 +4,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from paramreduce_cli.records import IntArray
+from paramreduce_cli.records import IntArray, Progress, Tell
 from paramreduce_cli.reduction.heuristics.backward_elimination import backward_elimination
 from paramreduce_cli.reduction.heuristics.forward_selection import forward_selection
 from paramreduce_cli.reduction.heuristics.forward_selection_2 import forward_selection_2
 from paramreduce_cli.reduction.heuristics.torque_only.qr import qr
 from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import TIE
-from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, by_size
+from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, by_size, run
 
 _KICKED = 3
 """Parameters that a random change replaces."""
@@ -31,11 +31,11 @@ def swap(task: SelectionTask) -> FoundSubsets:
         for start in (forward_selection, forward_selection_2, backward_elimination, qr):
             search.offer_all(start(replace(task, effort=Effort())).subsets)
     else:
-        search.offer_all(swap(replace(task, objective=cheap)).subsets)
+        search.offer_all(run("swap", replace(task, objective=cheap)).subsets)
         search.offer_all(forward_selection(task).subsets)
     search.neighbours()
     if cheap is None:
-        search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed))
+        search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed), task.progress)
     return by_size(task.objective, search.best.values())
 
 
@@ -90,11 +90,12 @@ class _Exchanges:
         shorter = self.objective.without_least(kept)
         return self.objective.width(shorter) >= self.smallest and self.offer(shorter)
 
-    def kick(self, times: int, random: np.random.Generator) -> None:
+    def kick(self, times: int, random: np.random.Generator, tell: Tell) -> None:
         """Replace a few parameters by random ones and improve that."""
         everything = np.arange(len(self.objective.units))
         better = False
-        for n in sorted(self.best):
+        for done, n in enumerate(sorted(self.best)):
+            tell(Progress("random changes", done, len(self.best)))
             for _ in range(times):
                 kept = np.array(self.best[n])
                 rest = np.setdiff1d(everything, kept)
@@ -103,5 +104,6 @@ class _Exchanges:
                 kept[out] = random.choice(rest, count, replace=False)
                 same = self.objective.width(tuple(kept.tolist())) == n
                 better |= bool(same and self.offer(tuple(kept.tolist())))
+        tell(Progress("random changes", len(self.best), len(self.best)))
         if better:
             self.neighbours()

@@ -11,8 +11,8 @@ from paramreduce_cli.report.style import joint_label, joint_style, legend_beside
 @placed(PageSection.TRACKING, 1)
 def tracking(data: ReportData) -> Figure | None:
     """Computed-torque control on paths that are in neither set: the first of them, and how far each joint is off it with the full and with the selected model in the controller; errors over all paths, and what one evaluation of the exported model takes."""
-    result = data.tracking
-    if result is None:
+    result, speed = data.tracking, data.speed
+    if result is None or speed is None:
         return None
     drawn = Figure(figsize=(8.4, 4.6))
     top, *below = drawn.subplots(
@@ -35,7 +35,7 @@ def tracking(data: ReportData) -> Figure | None:
         axes.set_title(
             f"{name}: {np.median(rms):.2g} mrad rms ({rms.min():.2g} to {rms.max():.2g} over {rms.size} "
             f"paths), at most {1e3 * float(np.abs(errors).max()):.2g}; "
-            f"{1e9 * result.seconds[name]:.3g} ns a step in {result.language}",
+            f"{1e9 * speed.seconds[name]:.3g} ns a step in {speed.language}",
             fontsize=9.5,
             loc="left",
         )

@@ -1,8 +1,7 @@
 """The best subset of every size by branch and bound."""
 
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.reduction.heuristics.swap import swap
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, run
 
 
 def best_subset(task: SelectionTask) -> FoundSubsets:
@@ -11,6 +10,6 @@ def best_subset(task: SelectionTask) -> FoundSubsets:
     Starts from what the swap search finds. When time or nodes run out, or on Ctrl-C, the best
     subset found and a lower bound of the error stand; a later run goes on from there.
     """
-    search = ProofSearch(task, swap(task).subsets)
+    search = ProofSearch(task, run("swap", task).subsets)
     search.run()
     return FoundSubsets(by_size(task.objective, search.subsets()).subsets, search.record())

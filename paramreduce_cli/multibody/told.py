@@ -1,0 +1,42 @@
+"""Samples that tell an audience how far the reading of them has come."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from paramreduce_cli.records import Block, FloatArray, Progress, SampleSet, Tell
+
+
+def told(blocks: Iterable[Block], n_samples: int, what: str, tell: Tell) -> Iterator[Block]:
+    """Blocks as they are, with an audience that hears how far the reading has come."""
+    done = 0
+    for block in blocks:
+        yield block
+        done += block.time.size
+        tell(Progress(what, done, n_samples))
+
+
+@dataclass(frozen=True)
+class ToldSet:
+    """A sample set whose samples are computed as they are read, with an audience."""
+
+    computed: SampleSet
+    what: str
+    tell: Tell
+
+    @property
+    def n_samples(self) -> int:
+        """How many samples it yields in all."""
+        return self.computed.n_samples
+
+    @property
+    def recomputable(self) -> bool:
+        """Whether each sample's state and the model give its rows of the observation matrix back."""
+        return self.computed.recomputable
+
+    def blocks(self) -> Iterator[Block]:
+        """Yield the samples in order; every call starts anew."""
+        return told(self.computed.blocks(), self.n_samples, self.what, self.tell)
+
+    def factors(self) -> FloatArray:
+        """Triangular factors of [W | tau] per trajectory and joint."""
+        return self.computed.factors()
