@@ -132,18 +132,18 @@ identification: $(VENV)/.installed-dev
 controllers: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.controllers
 
-# Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
-SHARE ?= 1
 # The site into site/, with warnings as errors; then every command and snippet of the tutorial and its
-# neighbours from a wheel in an empty folder.
+# neighbours from a wheel in an empty folder, also for another interpreter: DOCS="--python python3.13".
 $(VENV)/.installed-docs: $(VENV)/.installed
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[docs]'
 	@touch $@
 
 docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet
-	PYTHONPATH=tests $(BIN)/python -m tests.docs
+	PYTHONPATH=tests $(BIN)/python -m tests.docs $(DOCS)
 
+# Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
+SHARE ?= 1
 torture: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.torture --share $(SHARE)
 

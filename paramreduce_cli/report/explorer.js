@@ -497,5 +497,7 @@
   addEventListener("hashchange", () => { if (/[#&](heuristic|n)=/.test(location.hash)) { fromAddress(); follow(); } });
   fromAddress();
   follow();
+  // The browser has gone to a section before there was an explorer above it, or when it was hidden.
+  document.getElementById(location.hash.slice(1))?.scrollIntoView();
   root.dataset.ready = "true";
 })();

@@ -1,5 +1,6 @@
 """What the docs tell to type, typed: from a wheel, each page in an empty folder of its own."""
 
+import argparse
 import os
 import re
 import subprocess
@@ -36,11 +37,16 @@ def steps(text):
 
 
 def main():
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument(
+        "--python", default=sys.executable, help="Interpreter to install the wheel for."
+    )
+    given = parser.parse_args()
     table = rich.table.Table("page", "what is typed", "seconds", "exit code")
     failed = False
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        environment = installed(folder)
+        environment = installed(folder, given.python)
         for page in PAGES:
             here = folder / page.removesuffix(".md")
             here.mkdir()
@@ -60,11 +66,11 @@ def main():
     sys.exit(failed)
 
 
-def installed(folder):
+def installed(folder, interpreter):
     """A wheel in an environment of its own; what is set to run its programs."""
     python = folder / "venv" / "bin" / "python"
     pip = [python, "-m", "pip", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([sys.executable, "-m", "venv", folder / "venv"], check=True)
+    subprocess.run([interpreter, "-m", "venv", folder / "venv"], check=True)
     subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", ROOT], check=True)
     (wheel,) = (folder / "wheel").glob("*.whl")
     extra = ["nbclient>=0.10,<1", "ipykernel>=6.29,<8"]

@@ -135,3 +135,16 @@ def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
         assert all(chart.size["width"] <= width for chart in charts)
         assert len(charts) >= 3
         assert complaints(driver) == []
+
+
+@in_browser
+@pytest.mark.parametrize("place", ["explorer", "provenance"])
+def test_an_address_with_a_section_leads_there(page, place):
+    with opened(page, place=place) as driver:
+        top = driver.execute_script(
+            f"return document.getElementById('{place}').getBoundingClientRect().top"
+        )
+        end = driver.execute_script(
+            "return document.documentElement.scrollHeight - innerHeight - scrollY"
+        )
+    assert abs(top) < 60 or end < 2
