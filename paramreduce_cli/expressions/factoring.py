@@ -9,8 +9,14 @@ import heapq
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator, Sequence
 from itertools import combinations
+from typing import NamedTuple
 
 from paramreduce_cli.expressions.graph import Graph
+
+_HARDLY = 1000
+"""One operation in so many: what less than that is saved by ends the factoring."""
+_CLOSE = 0.002
+"""Share of the operations by which a way of writing may be behind after one pass and still catch up."""
 
 
 class _Terms:
@@ -82,24 +88,52 @@ def factored(graph: Graph, outputs: Sequence[int], target: Graph) -> list[int]:
     return _Assembly(graph, terms, target).built(outputs)
 
 
-def least(graph: Graph, outputs: list[int]) -> tuple[Graph, list[int]]:
-    """Factor values until it saves nothing any more.
+class Written(NamedTuple):
+    """Values in a graph in which signs are free."""
+
+    graph: Graph
+    outputs: list[int]
+
+    @property
+    def n_operations(self) -> int:
+        """Operations that they take."""
+        return self.graph.count(self.outputs)
+
+    def factored(self) -> "Written":
+        """The same values in a graph of their own, factored once."""
+        target = Graph()
+        return Written(target, factored(self.graph, self.outputs, target))
+
+
+def least(ways: Sequence[Written]) -> Written:
+    """Factor values until it saves hardly anything.
 
     Args:
-        graph: Where the values are; one in which signs are free.
-        outputs: The values.
+        ways: The same values, written in one or several ways.
 
     Returns:
-        Another graph and the values in it.
+        What takes the fewest operations.
     """
-    count = graph.count(outputs)
+    counted = [(way.n_operations, way) for way in ways]
+    once = [_fewer(*one) for one in counted] if len(ways) > 1 else counted
+    best = min(count for count, _ in once)
+    close = [one for one in once if one[0] <= (1 + _CLOSE) * best + 1]
+    return min((_to_the_end(*one) for one in close), key=lambda one: one[0])[1]
+
+
+def _to_the_end(count: int, way: Written) -> tuple[int, Written]:
     while True:
-        target = Graph()
-        changed = factored(graph, outputs, target)
-        fewer = target.count(changed)
-        if fewer >= count:
-            return graph, outputs
-        count, graph, outputs = fewer, target, changed
+        fewer, changed = _fewer(count, way)
+        saved, count, way = count - fewer, fewer, changed
+        if saved <= count // _HARDLY:
+            return count, way
+
+
+def _fewer(count: int, way: Written) -> tuple[int, Written]:
+    """After one more pass, if that saves anything."""
+    changed = way.factored()
+    after = changed.n_operations
+    return (after, changed) if after < count else (count, way)
 
 
 def _take_out_factors(terms: _Terms) -> None:

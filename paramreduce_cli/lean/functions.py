@@ -5,7 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
@@ -91,7 +91,7 @@ class LeanFunctions:
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
         K = Argument("K", (z, n), "torques for unit values of the parameters")
         text = "Torques as a linear map of the parameters: tau = K phi."
-        return self._function("regressor", text, (K,), *least(graph, outputs))
+        return self._function("regressor", text, (K,), *least([Written(graph, outputs)]))
 
     def _model(
         self, model: Callable[..., Program], project: Callable[..., list[int]]
@@ -126,7 +126,7 @@ class LeanFunctions:
         outputs = Program.of_stored(simplified.program).rebuilt(graph, substitute)
         if self._mechanism.loops is not None and not simplified.projected:
             outputs = project(self._mechanism, graph, outputs)
-        return Program.of_graph(*least(graph, outputs))
+        return Program.of_graph(*least([Written(graph, outputs)]))
 
     def _function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]
@@ -160,7 +160,7 @@ class LeanFunctions:
         def new(name: str, text: str, inputs: list, outputs: list, *results: Argument) -> Function:
             function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
             graph = Graph()
-            graph, values = least(graph, Program.of_function(function).rebuilt(graph))
+            graph, values = least([Written(graph, Program.of_function(function).rebuilt(graph))])
             states = self._states[: len(inputs)]
             return Function(name, text, states, results, Program.of_graph(graph, values))
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.choices import from_data
@@ -138,18 +138,20 @@ class LeanModels:
             Different programs, the leanest first.
         """
         variants = self._direct if direct else self._inverse
-        made = [self._rearranged(program, model, constant=False) for program in variants.programs]
+        written = [self._written(program, model, constant=False) for program in variants.programs]
+        made = [Program.of_graph(*least([one])) for one in written]
         made.sort(key=lambda program: program.n_operations)
         return list(dict.fromkeys(made))[:most]
 
     def _leanest(self, variants: _Variants, model: ReducedModel, constant: bool) -> Program:
         """The formulation with the fewest operations."""
         promising = variants.promising(self._dropped(model.kept))
-        candidates = [self._rearranged(program, model, constant) for program in promising]
-        return min(candidates, key=lambda program: program.n_operations)
+        return Program.of_graph(
+            *least([self._written(program, model, constant) for program in promising])
+        )
 
-    def _rearranged(self, program: Program, model: ReducedModel, constant: bool) -> Program:
-        """A formulation for a model, its sums and products rearranged."""
+    def _written(self, program: Program, model: ReducedModel, constant: bool) -> Written:
+        """A formulation for a model, without what is zero then."""
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())
         graph = Graph()
@@ -163,4 +165,4 @@ class LeanModels:
                 return graph.constant(float(values[position]))
             return graph.input(ties.get(position, position))
 
-        return Program.of_graph(*least(graph, program.rebuilt(graph, substitute)))
+        return Written(graph, program.rebuilt(graph, substitute))

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import least
+from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
@@ -105,7 +105,7 @@ class _Way:
         """A program on the way, its sums and products rearranged."""
         graph = Graph()
         outputs = self.tape.rebuilt(fit.mask).rebuilt(graph)
-        program = Program.of_graph(*least(graph, outputs))
+        program = Program.of_graph(*least([Written(graph, outputs)]))
         return Simplified(self.start, self.operations_start, program, fit.beta)
 
 
