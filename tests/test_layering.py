@@ -28,7 +28,7 @@ LAYERS = [
     {"robots"},
     {"fields"},
     {"records"},
-    {"registry", "texts"},
+    {"registry", "texts", "processes"},
     {"errors"},
 ]
 LEVEL = {name: k for k, names in enumerate(LAYERS) for name in names}

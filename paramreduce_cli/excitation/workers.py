@@ -1,29 +1,22 @@
 """Many trajectories in parallel processes, each with one BLAS thread and a seed of its own.
 
 The result of a trajectory depends on its key alone, so it is the same whatever the number
-of processes. Worker processes ignore Ctrl-C; their parent stops them.
+of processes.
 """
 
 from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import queue
-import signal
 import threading
-import time
-import warnings
 import zlib
 from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
 from multiprocessing.queues import Queue
 
 import numpy as np
 
-from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.loads import Loads
 from paramreduce_cli.excitation.objective import Excitation
@@ -33,6 +26,7 @@ from paramreduce_cli.multibody.drives import smoothed
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.processes import as_done, workers
 from paramreduce_cli.records import (
     BaseParameters,
     Constraint,
@@ -112,50 +106,27 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
             found[key] = run.parts[key] = made
             run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
         return found
-    with _pool(task, min(run.jobs, len(missing)), run) as pool:
-        with _interruption_held():  # so that new processes are born without it
-            futures = {pool.submit(_optimise, key): key for key in missing}
-        try:
-            for future in as_completed(futures):
-                key = futures[future]
-                found[key] = run.parts[key] = future.result()
-                run.progress(Progress(key, 1.0, 1.0, f"kappa {found[key].kappa:.4g}"))
-        except BrokenProcessPool as error:
-            raise DataError(
-                "a worker process died, perhaps for want of memory. Finished trajectories are "
-                "kept; run the same command again, with fewer jobs."
-            ) from error
+    with (
+        _audience(run) as news,
+        workers(min(run.jobs, len(missing)), _start_worker, task, news) as pool,
+    ):
+        for key, made in as_done(pool, _optimise, missing):
+            found[key] = run.parts[key] = made
+            run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
     return found
 
 
 @contextlib.contextmanager
-def _pool(task: ExcitationTask, jobs: int, run: Run) -> Iterator[ProcessPoolExecutor]:
-    context = multiprocessing.get_context("spawn")
-    news: Queue[Progress | None] = context.Queue()
+def _audience(run: Run) -> Iterator[Queue[Progress | None]]:
+    """A queue whose news reach the audience of the run."""
+    news: Queue[Progress | None] = multiprocessing.get_context("spawn").Queue()
     listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
     listener.start()
-    pool = ProcessPoolExecutor(jobs, context, _start_worker, (os.getpid(), task, news))
     try:
-        yield pool
-        pool.shutdown()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
-            process.terminate()
-        raise
+        yield news
     finally:
         news.put(None)
         listener.join(timeout=5)
-
-
-@contextlib.contextmanager
-def _interruption_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting; processes started meanwhile never get it."""
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _listen(news: Queue[Progress | None], run: Run) -> None:
@@ -177,21 +148,9 @@ class _Worker:
     news: Queue[Progress | None]
 
 
-def _start_worker(parent: int, task: ExcitationTask, news: Queue[Progress | None]) -> None:
-    # First of all, with the number that the parent gave: it may be gone already.
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
+def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
     _Worker.task, _Worker.news = task, news
     _Worker.excitation = excitation_of(task)
-
-
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone, however that ended."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
-    os._exit(1)
 
 
 def _optimise(key: str) -> Trajectory:

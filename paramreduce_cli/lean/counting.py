@@ -1,10 +1,22 @@
 """Operation counts of reduced models."""
 
+from collections.abc import Sequence
 from functools import cached_property
+
+import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.multibody.plain import PlainDynamics
-from paramreduce_cli.records import BoolArray, CountedDynamics, IntArray, Model, ReducedModel
+from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.records import (
+    BoolArray,
+    CountedDynamics,
+    IntArray,
+    Model,
+    Progress,
+    ReducedModel,
+    Run,
+)
 
 COUNTS = (
     "operations_inverse",
@@ -15,10 +27,14 @@ COUNTS = (
     "operations_direct_paper_rule",
 )
 """What :meth:`Counts.all` counts: lean models, plain recursion, and that by the paper's rule."""
+_MANY = 100_000
+"""Models times parameters, from which on the start of processes pays."""
+_AT_ONCE = 16
+"""Models that a process counts before it tells."""
 
 
 class Counts:
-    """Operations of the inverse and direct dynamics; each model is counted once.
+    """Operations of the inverse and direct dynamics.
 
     Args:
         model: Of the robot.
@@ -28,7 +44,6 @@ class Counts:
     def __init__(self, model: Model, counted: CountedDynamics) -> None:
         self._independent = counted is CountedDynamics.INDEPENDENT
         self._model = model
-        self._known: dict[bytes, list[int]] = {}
 
     @cached_property
     def _plain(self) -> PlainDynamics:
@@ -51,16 +66,66 @@ class Counts:
     def all(self, model: ReducedModel) -> list[int]:
         """All of :data:`COUNTS`; the values of a model do not matter."""
         model = model.restricted(self._model.affecting)
-        ties = model.ties
-        key = bytes(str([ties.get(k, k) for k in model.kept.tolist()]), "ascii")
-        if key not in self._known:
-            plain = [
-                count
-                for signs_free in (True, False)
-                for count in self._plain.count_operations(
-                    model, signs_free=signs_free, independent=self._independent
-                )
-            ]
-            lean = [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
-            self._known[key] = lean + plain
-        return self._known[key]
+        plain = [
+            count
+            for signs_free in (True, False)
+            for count in self._plain.count_operations(
+                model, signs_free=signs_free, independent=self._independent
+            )
+        ]
+        lean = [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
+        return lean + plain
+
+
+def count_all(
+    model: Model, counted: CountedDynamics, chosen: Sequence[ReducedModel], run: Run
+) -> IntArray:
+    """All of :data:`COUNTS` for many models; those that differ in values alone are counted once.
+
+    Args:
+        model: Of the robot.
+        counted: Which functions are counted where there are loops.
+        chosen: The models.
+        run: Workers, who are asked where it takes long, and progress.
+
+    Returns:
+        (n_models, number of counts)
+    """
+    keys = [_structure(one, model) for one in chosen]
+    different = dict(zip(keys, chosen, strict=True))
+    tasks = list(different.items())
+    known: dict[bytes, list[int]] = {}
+    if run.jobs < 2 or len(tasks) * model.mechanism.n_parameters < _MANY:
+        counts = Counts(model, counted)
+        for key, one in tasks:
+            run.progress(Progress("count operations", len(known), len(tasks)))
+            known[key] = counts.all(one)
+    else:
+        parts = [tasks[k : k + _AT_ONCE] for k in range(0, len(tasks), _AT_ONCE)]
+        with workers(min(run.jobs, len(parts)), _start_worker, model, counted) as pool:
+            for _, found in as_done(pool, _count, parts):
+                known |= found
+                run.progress(Progress("count operations", len(known), len(tasks)))
+    run.progress(Progress("count operations", len(tasks), len(tasks)))
+    return np.array([known[key] for key in keys], dtype=np.int64)
+
+
+def _structure(one: ReducedModel, model: Model) -> bytes:
+    """What the operations of a model depend on."""
+    one = one.restricted(model.affecting)
+    ties = one.ties
+    return bytes(str([ties.get(k, k) for k in one.kept.tolist()]), "ascii")
+
+
+class _Worker:
+    """What a worker process knows; set once when it starts."""
+
+    counts: Counts
+
+
+def _start_worker(model: Model, counted: CountedDynamics) -> None:
+    _Worker.counts = Counts(model, counted)
+
+
+def _count(tasks: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:
+    return {key: _Worker.counts.all(one) for key, one in tasks}

@@ -14,7 +14,7 @@ from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
 from paramreduce_cli.judgement.torque import NormErrors, torque_errors
 from paramreduce_cli.judgement.verdict import remarks, verdict
-from paramreduce_cli.lean.counting import COUNTS, Counts
+from paramreduce_cli.lean.counting import COUNTS, count_all
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.multibody.told import told
@@ -35,7 +35,6 @@ from paramreduce_cli.records import (
     Selected,
     SelectionMethod,
     Stability,
-    Tell,
     Validation,
 )
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
@@ -88,7 +87,7 @@ def validate(
     elif model is None:
         measured = _torques_alone(samples, reduction)
     else:
-        measured = _measured(model, samples, reduction, counted, run.progress)
+        measured = _measured(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, measured.full
     crossed = None
     if wanted.cross_validation:
@@ -134,7 +133,7 @@ class _Measured:
 
 
 def _measured(
-    model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, tell: Tell
+    model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, run: Run
 ) -> _Measured:
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
@@ -147,24 +146,28 @@ def _measured(
 
     def errors_on(sample_set: SampleSet, name: str) -> tuple[NormErrors, AccelerationErrors]:
         n = sample_set.n_samples
-        blocks = told(sample_set.blocks(), n, f"torques of the {name} set", tell)
+        blocks = told(sample_set.blocks(), n, f"torques of the {name} set", run.progress)
         torque = torque_errors(blocks, models.values, reduction.nominal_torque)
-        blocks = told(sample_set.blocks(), n, f"accelerations of the {name} set", tell)
+        blocks = told(sample_set.blocks(), n, f"accelerations of the {name} set", run.progress)
         spread = thinned_blocks(blocks, -(-n // _MOST_ACCELERATIONS))
         acceleration = acceleration_errors(spread, dynamics.direct, models.values, nominal)
         return torque, acceleration
 
     estimation = errors_on(samples.estimation, "estimation")
     validation = errors_on(samples.validation, "validation")
-    counts = Counts(model, counted)
-    heuristics: dict[str, HeuristicValidation] = {}
-    total = len(reduction.heuristics)
-    for name, found in reduction.heuristics.items():
-        tell(Progress("count operations", len(heuristics), total, name))
-        operations = np.array([counts.all(reduction.model(name, k)) for k in range(found.n.size)])
-        heuristics[name] = _judged(found.n, operations, estimation, validation, models.rows[name])
-    tell(Progress("count operations", total, total))
-    full = _full_model(model, counts, estimation[1], validation[1])
+    sizes = [found.n.size for found in reduction.heuristics.values()]
+    chosen = [
+        reduction.model(name, k)
+        for name, found in reduction.heuristics.items()
+        for k in range(found.n.size)
+    ]
+    operations = count_all(model, counted, [*chosen, full_model(model), base_model(model)], run)
+    *own, others = np.split(operations, np.cumsum(sizes))
+    heuristics = {
+        name: _judged(found.n, some, estimation, validation, models.rows[name])
+        for some, (name, found) in zip(own, reduction.heuristics.items(), strict=True)
+    }
+    full = _full_model(others, estimation[1], validation[1])
     return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
 
 
@@ -266,9 +269,9 @@ def _judged(
 
 
 def _full_model(
-    model: Model, counts: Counts, estimation: AccelerationErrors, validation: AccelerationErrors
+    counts: IntArray, estimation: AccelerationErrors, validation: AccelerationErrors
 ) -> dict[str, float]:
-    full, base = counts.all(full_model(model)), counts.all(base_model(model))
+    full, base = counts.tolist()
     result: dict[str, float] = dict(zip(COUNTS, full, strict=True))
     result |= {f"base_{name}": value for name, value in zip(COUNTS, base, strict=True)}
     result["mass_matrix_condition"] = float(max(estimation.condition[-1], validation.condition[-1]))
