@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 import click
 import rich.console
 import rich.progress
+import rich.table
 
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 
@@ -95,6 +96,19 @@ def say(message: str) -> None:
     """Print to standard output, without markup."""
     journal.note(message)
     out.print(harmless(message), markup=False)
+
+
+def say_table(table: rich.table.Table, least: int = 0) -> None:
+    """Print a table to standard output.
+
+    Args:
+        table: What to print.
+        least: Columns that it has at least, however narrow the terminal.
+    """
+    with out.capture() as captured:
+        out.print(table, width=max(out.width, least))
+    journal.note(re.sub(r"\x1b\[[0-9;]*m", "", captured.get()))
+    out.print(table, width=max(out.width, least))
 
 
 def complain(message: str) -> None:

@@ -146,6 +146,8 @@ def test_a_log_keeps_what_is_said(invoke, folder):
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d ", line) for line in lines)
     assert "$ paramreduce run configs/two_link.yaml" in lines[0]
     assert said.splitlines()[-1] in lines[-1]
+    for line in said.splitlines():  # the table, too
+        assert any(line.rstrip() in kept for kept in lines)
 
 
 def test_doctor_names_what_is_missing(invoke, monkeypatch):

@@ -7,7 +7,7 @@ import rich.box
 import rich.table
 
 from paramreduce_cli.cli.options import SET
-from paramreduce_cli.cli.terminal import out, remark, say
+from paramreduce_cli.cli.terminal import remark, say, say_table
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.log_template import guessed_columns
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
@@ -62,7 +62,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
             name, f"{z.min():.3g} ... {z.max():.3g}", f"{abs(m.dz[:, j]).max():.3g}", f"{rms:.3g}",
             f"{log.noise[j]:.2g}", share(float(log.noise[j]) / rms if rms else None),
         )  # fmt: skip
-    out.print(table, width=max(out.width, _TABLE_WIDTH))
+    say_table(table, _TABLE_WIDTH)
     if found is not None:
         say(
             f"Excitation: rank {found.rank} of {found.n_base} base parameters, kappa {found.condition:.4g} with "

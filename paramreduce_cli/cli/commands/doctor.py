@@ -18,7 +18,7 @@ import rich.table
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.options import cores
-from paramreduce_cli.cli.terminal import JSON, emit, out
+from paramreduce_cli.cli.terminal import JSON, emit, say_table
 from paramreduce_cli.errors import ParamreduceError
 
 _EXTRAS = {"identify": "cvxpy", "pandas": "pandas", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
@@ -41,7 +41,7 @@ def doctor(as_json: bool) -> int:
         table = rich.table.Table(box=None, pad_edge=False, show_header=False)
         for what, state, found in findings:
             table.add_row(what, _SHOWN[state], rich.markup.escape(found))
-        out.print(table)
+        say_table(table)
     return WRONG if any(state == "wrong" for _, state, _ in findings) else 0
 
 

@@ -13,7 +13,7 @@ import rich.table
 from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.terminal import JSON, emit, harmless, out, say
+from paramreduce_cli.cli.terminal import JSON, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.records import ModelChoice, Reduction, Validation
 
@@ -68,9 +68,7 @@ def _say_contents(file: Path, as_json: bool) -> None:
     table.add_column("content", overflow="fold")
     for row in datasets:
         table.add_row(*(rich.markup.escape(harmless(cell)) for cell in row))
-    out.print(
-        table, width=max(out.width, *(len(name) + len(shape) + 20 for name, shape, _ in datasets))
-    )
+    say_table(table, max(len(name) + len(shape) + 20 for name, shape, _ in datasets))
 
 
 def _say_model(title: str, model: ReducedModel, relations: bool, as_json: bool) -> None:

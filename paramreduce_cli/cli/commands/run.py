@@ -26,10 +26,10 @@ from paramreduce_cli.cli.terminal import (
     VERBOSE,
     emit,
     interruption,
-    out,
     progress_bars,
     remark,
     say,
+    say_table,
 )
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import stages_to_run
@@ -144,7 +144,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
     found = summary["identification"]
     table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
-    out.print(table, width=max(out.width, _TABLE_WIDTH))
+    say_table(table, _TABLE_WIDTH)
     for one in summary["terms"]:
         name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
         errors = [share(error) for error in one["torque_error"].values() if error is not None]
