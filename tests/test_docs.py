@@ -2,9 +2,13 @@
 
 import importlib.util
 import re
+import shlex
+import textwrap
 
+import click
 import h5py
 import pytest
+import yaml
 from conftest import ROOT
 
 from paramreduce_cli.cli import cli
@@ -76,3 +80,59 @@ def test_links_lead_somewhere(generated):
                 page.name,
                 link,
             )
+
+
+def blocks(*kinds):
+    """What is in fenced blocks of all pages, with the page's name."""
+    for page in (*sorted(DOCS.glob("*.md")), ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        for kind, text in re.findall(r"```(\w*)\n(.*?)```", page.read_text(), re.DOTALL):
+            if kind in kinds:
+                yield page.name, textwrap.dedent(text)
+
+
+def test_every_command_on_any_page_can_be_called(tmp_path, monkeypatch):
+    """Name, options and arguments; tutorial, how-tos and the page on Python are typed by make docs."""
+    monkeypatch.chdir(tmp_path)
+    found = [
+        (page, line, shlex.split(words, comments=True))
+        for page, text in blocks("", "sh")
+        for line, words in re.findall(r"^(\S*paramreduce +(\S.*))$", text, re.MULTILINE)
+    ]
+    assert len(found) > 50
+    for page, line, (name, *words) in found:
+        command = cli.get_command(None, name)
+        assert command is not None, (page, line)
+        try:
+            command.parse_args(click.Context(command), words)
+        except click.ClickException as error:
+            pytest.fail(f"{page}: {line}: {error.format_message()}")
+
+
+def test_every_key_in_an_example_is_known():
+    schema = config_schema()
+    found = list(blocks("yaml"))
+    assert len(found) > 10
+    for page, text in found:
+        content = yaml.safe_load(text)
+        candidates = [schema, *schema["$defs"].values()]
+        sweep = "robots" in content  # has a schema of its own
+        assert sweep or any(fits(content, one, schema) for one in candidates), (page, text)
+
+
+def fits(node, schema, root):
+    """Whether all keys are those of a JSON schema; values are of no concern."""
+    if "$ref" in schema:
+        return fits(node, root["$defs"][schema["$ref"].rpartition("/")[2]], root)
+    if "anyOf" in schema:
+        return any(fits(node, one, root) for one in schema["anyOf"])
+    if isinstance(node, dict):
+        own, other = schema.get("properties", {}), schema.get("additionalProperties", False)
+        return all(
+            fits(value, own[key], root)
+            if key in own
+            else other is True or (other is not False and fits(value, other, root))
+            for key, value in node.items()
+        )
+    if isinstance(node, list) and "items" in schema:
+        return all(fits(value, schema["items"], root) for value in node)
+    return schema.get("type") != "object"
