@@ -162,7 +162,9 @@ def validate(
         reduction: From :func:`reduce`.
         config: What is asked for in ``selected`` and ``validation``; the defaults if None.
         model: Of the robot; without it torques alone are judged.
-        jobs: Threads of proofs, where the selection is repeated on other data.
+        jobs: Threads of proofs, where the selection is repeated on other data, and processes that count
+            the operations of hundreds of models; then a script has its code under
+            ``if __name__ == "__main__":``.
     """
     return _made(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
 

@@ -30,13 +30,14 @@ def workers(
         arguments: Of that.
     """
     context = multiprocessing.get_context("spawn")
+    others = set(multiprocessing.active_children())
     pool = ProcessPoolExecutor(jobs, context, _begin, (os.getpid(), start, arguments))
     try:
         yield pool
         pool.shutdown()
     except BaseException:
         pool.shutdown(wait=False, cancel_futures=True)
-        for process in multiprocessing.active_children():
+        for process in set(multiprocessing.active_children()) - others:
             process.terminate()
         raise
 
@@ -59,8 +60,8 @@ def as_done(
             yield futures[future], future.result()
     except BrokenProcessPool as error:
         raise DataError(
-            "a worker process died, perhaps for want of memory. What was finished before is kept; run "
-            "the same command again, with fewer --jobs."
+            "a worker process died, for want of memory, or because a script asks for jobs outside of "
+            '`if __name__ == "__main__":`, which each of them runs again. Run it again, with fewer jobs.'
         ) from error
 
 

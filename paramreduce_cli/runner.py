@@ -115,13 +115,13 @@ class Runner:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
         """
         path = self.store.path(stage.output)
+        self._cut_short = False
         self.store.refuse_to_replace(stage.output, self._robot)
         self._look_at_inputs(stage)
         if not share.whole:
             return self._run_share(stage, share, force)
         previous = self._previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
-        self._cut_short = False
         if not force and not better and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
@@ -154,15 +154,18 @@ class Runner:
         inputs.digests |= self._input_digests(stage)
         path = shares.path(share)
         stamp = self._stamp(stage, inputs, started)
-        if not force and (self.is_current(stage) or shares.is_current(share, stamp)):
+        if not force and (self.is_current(stage) or shares.is_finished(share, stamp)):
             return Outcome(stage.name, path, True, 0.0)
         inputs = Inputs(self.config)
         arguments = self._arguments(stage, inputs)
         self._lend_run(stage, arguments, inputs, frozenset())
+        previous = None
+        if stage.previous is not None and not force and shares.is_usable(share, stamp):
+            previous = load_file(path, stage.output, self._robot, stage.name)[0]
         self._hand(
             stage,
             arguments,
-            {Tell: self.progress, stage.output: None, Share: share, Shares: UNSHARED},
+            {Tell: self.progress, stage.output: previous, Share: share, Shares: UNSHARED},
         )
         record = called(stage, arguments)
         self.check()

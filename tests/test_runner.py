@@ -1,5 +1,6 @@
 import contextlib
 import signal
+import warnings
 
 import h5py
 import pytest
@@ -9,7 +10,7 @@ from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.cli.terminal import Interruption
 from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
 from paramreduce_cli.pipeline import pipeline, stages_to_run
-from paramreduce_cli.records import Reduction
+from paramreduce_cli.records import Reduction, Share
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.runner import Runner
 
@@ -81,6 +82,35 @@ def test_a_kill_ends_more_than_a_search_for_proofs(two_link_copy, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])
     assert not (two_link_copy / "reduction.h5").exists()
+
+
+def test_ctrl_c_while_the_selection_is_repeated_ends_the_stage(two_link_copy, monkeypatch):
+    """There is nothing worth keeping; a spoilt validation would count as current."""
+    (two_link_copy / "validation.h5").unlink()
+
+    def ended(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ProofSearch, "_round", ended)
+    config = config_of("two_link", "selected.heuristic=best-subset")
+    with pytest.raises(KeyboardInterrupt):
+        Runner(config, Store(two_link_copy)).run(STAGES["validate"])
+    assert not (two_link_copy / "validation.h5").exists()
+
+
+def test_a_share_that_ctrl_c_cut_short_is_gone_on_with(two_link_copy, monkeypatch):
+    (two_link_copy / "reduction.h5").unlink()
+    runner, share = Runner(config_of("two_link"), Store(two_link_copy)), Share(1, 2)
+
+    def ended(*_):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch, warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParamreduceWarning)
+        patch.setattr(ProofSearch, "_round", ended)
+        assert not runner.run(STAGES["reduce"], share=share).current
+    assert not runner.run(STAGES["reduce"], share=share).current
+    assert runner.run(STAGES["reduce"], share=share).current
 
 
 def test_what_a_swallowed_interruption_may_have_spoilt_is_not_written(two_link_copy, monkeypatch):

@@ -86,18 +86,29 @@ class StoredShares:
         """Where a share is kept."""
         return self.folder / f"{_SHARE}{share.number:04d}-of-{share.count:04d}.h5"
 
-    def is_current(self, share: Share, stamp: Stamp) -> bool:
+    def is_finished(self, share: Share, stamp: Stamp) -> bool:
+        """Whether a share was made from just this, is whole, and was not cut short by Ctrl-C."""
+        known = self._stamp(share)
+        return known is not None and not known.cut_short and self.is_usable(share, stamp)
+
+    def is_usable(self, share: Share, stamp: Stamp) -> bool:
         """Whether a share was made from just this, and is whole."""
-        path = self.path(share)
+        known = self._stamp(share)
+        if known is None or _origin(known) != _origin(stamp):
+            return False
         try:
-            known = read_stamp(path) if path.exists() else None
-            if known is None or _origin(known) != _origin(stamp):
-                return False
-            with reading(path) as reader:
+            with reading(self.path(share)) as reader:
                 reader.verify()
         except ArtifactError:
             return False
         return True
+
+    def _stamp(self, share: Share) -> Stamp | None:
+        path = self.path(share)
+        try:
+            return read_stamp(path) if path.exists() else None
+        except ArtifactError:
+            return None
 
     def found(self, stamp: Stamp, command: str) -> list[Path]:
         """Files of all shares, in their order; none where no job has begun.
@@ -115,7 +126,7 @@ class StoredShares:
             counts[number] = max(counts.get(number, 0), path.stat().st_mtime_ns)
         for count in sorted(counts, key=lambda n: -counts[n]):
             shares = [Share(number, count) for number in range(1, count + 1)]
-            good = [self.is_current(share, stamp) for share in shares]
+            good = [self.is_usable(share, stamp) for share in shares]
             if not any(good):
                 continue
             if not all(good):

@@ -163,7 +163,8 @@ class Interruption:
             signal.signal(number, self._note)
 
     def _note(self, number: int, _: object) -> None:
-        self._met = number
+        if self._met != signal.SIGTERM:  # after a kill nothing is a wish to go on
+            self._met = number
         raise KeyboardInterrupt
 
     def heeded(self) -> None:
@@ -245,10 +246,14 @@ class _Lines:
         begun = self._begun.setdefault(p.task, now)
         if p.done < p.total and now - self._told.get(p.task, begun) < self._pause:
             return
-        if p.done >= p.total and not (p.remark or p.task in self._told):
-            return
-        self._told[p.task] = now
         share = p.done / p.total if p.total else 1.0
+        if p.done >= p.total:
+            told = self._told.pop(p.task, None) is not None
+            del self._begun[p.task]
+            if not (told or p.remark) and now - begun < self._pause:
+                return
+        else:
+            self._told[p.task] = now
         self._tell(p, (now - begun) * (1 - share) / share if 0 < share < 1 else None)
 
 

@@ -124,6 +124,9 @@ def _audience(run: Run) -> Iterator[Queue[Progress | None]]:
     listener.start()
     try:
         yield news
+    except BaseException:
+        news.cancel_join_thread()  # a worker that was stopped may hold the lock for ever
+        raise
     finally:
         news.put(None)
         listener.join(timeout=5)

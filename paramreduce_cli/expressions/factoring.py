@@ -7,7 +7,7 @@ computed once [Breuer1969], and all is put together again. Results differ by rou
 
 import heapq
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import combinations
 from typing import NamedTuple
 
@@ -105,35 +105,33 @@ class Written(NamedTuple):
         return Written(target, factored(self.graph, self.outputs, target))
 
 
-def least(ways: Sequence[Written]) -> Written:
+def least(ways: Iterable[Written]) -> Written:
     """Factor values until it saves hardly anything.
 
     Args:
-        ways: The same values, written in one or several ways.
+        ways: The same values, written in one or several ways; those that are far behind after one pass
+            are dropped.
 
     Returns:
-        What takes the fewest operations.
+        What takes the fewest operations of all that were tried to the end.
     """
-    counted = [(way.n_operations, way) for way in ways]
-    once = [_fewer(*one) for one in counted] if len(ways) > 1 else counted
-    best = min(count for count, _ in once)
+    once = [_once_more(way.n_operations, way) for way in ways]
+    best = min(count for count, _, _ in once)
     close = [one for one in once if one[0] <= (1 + _CLOSE) * best + 1]
     return min((_to_the_end(*one) for one in close), key=lambda one: one[0])[1]
 
 
-def _to_the_end(count: int, way: Written) -> tuple[int, Written]:
-    while True:
-        fewer, changed = _fewer(count, way)
-        saved, count, way = count - fewer, fewer, changed
-        if saved <= count // _HARDLY:
-            return count, way
+def _to_the_end(count: int, way: Written, saved: int) -> tuple[int, Written]:
+    while saved > count // _HARDLY:
+        count, way, saved = _once_more(count, way)
+    return count, way
 
 
-def _fewer(count: int, way: Written) -> tuple[int, Written]:
-    """After one more pass, if that saves anything."""
+def _once_more(count: int, way: Written) -> tuple[int, Written, int]:
+    """After one more pass, if that saves anything, and what it has saved."""
     changed = way.factored()
     after = changed.n_operations
-    return (after, changed) if after < count else (count, way)
+    return (after, changed, count - after) if after < count else (count, way, 0)
 
 
 def _take_out_factors(terms: _Terms) -> None:

@@ -147,7 +147,7 @@ class LeanModels:
         """The formulation with the fewest operations."""
         promising = variants.promising(self._dropped(model.kept))
         return Program.of_graph(
-            *least([self._written(program, model, constant) for program in promising])
+            *least(self._written(program, model, constant) for program in promising)
         )
 
     def _written(self, program: Program, model: ReducedModel, constant: bool) -> Written:

@@ -33,6 +33,10 @@ class Effort:
     """Threads that search for proofs."""
 
 
+def _passed_on() -> None:
+    raise KeyboardInterrupt
+
+
 @dataclass(frozen=True)
 class SelectionTask:
     """A criterion to select by, and how far to go."""
@@ -48,8 +52,8 @@ class SelectionTask:
     share: Share = WHOLE
     """Which of the sizes are to be proven, of several jobs."""
     progress: Callable[[Progress], None] = lambda _: None
-    interrupted: Callable[[], None] = lambda: None
-    """Told that a KeyboardInterrupt was met and heeded."""
+    interrupted: Callable[[], None] = _passed_on
+    """Told that a KeyboardInterrupt was met; raises it again where nothing is worth keeping."""
     known: dict[Any, FoundSubsets] = field(default_factory=dict)
     """What was found on the same data before, by heuristic and what was asked of it."""
 

@@ -129,11 +129,15 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
 
 
 def _running(model: Model | None, selected: Selected) -> dict[str, RunningModel]:
-    """The exported code of the full and of the selected model; none of closed loops."""
+    """The exported code of the full and of the selected model; none of closed loops, and none in doubt."""
     if model is None or model.mechanism.loops is not None:
         return {}
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
-    return {title: RunningModel(model, chosen) for title, chosen in models.items()}
+    try:
+        return {title: RunningModel(model, chosen) for title, chosen in models.items()}
+    except FormulationError as error:
+        warnings.warn(f"nothing is timed: {error}", ParamreduceWarning, stacklevel=2)
+        return {}
 
 
 def _tracking(
@@ -143,7 +147,7 @@ def _tracking(
     motion: ShownMotion,
 ) -> Tracking | None:
     """Control with the exported code of the full and of the selected model."""
-    if section.tracking is None or model is None:
+    if section.tracking is None or model is None or not running:
         return None
     return tracked(section.tracking, model, running, motion.z, motion.dz)
 

@@ -112,3 +112,14 @@ def test_the_laws_of_sums_and_products(terms, expected):
         outputs.append(value)
     target, changed = least([Written(graph, outputs)])
     assert target.count(changed) == expected
+
+
+def test_of_two_ways_the_least_takes_no_more_than_either():
+    graph = Graph()
+    a, b, c, d = (graph.input(k) for k in range(4))
+    products = [graph.multiply(x, y) for x, y in ((a, c), (a, d), (b, c), (b, d))]
+    long = [graph.add(graph.add(products[0], products[1]), graph.add(products[2], products[3]))]
+    short = [graph.multiply(graph.add(a, b), graph.add(c, d))]
+    ways = [Written(graph, long), Written(graph, short)]
+    assert least(ways).n_operations <= min(least([way]).n_operations for way in ways)
+    assert least(ways).n_operations == 3

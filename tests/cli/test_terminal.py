@@ -1,0 +1,70 @@
+"""What is said of long work, and which interruptions are kept in mind."""
+
+import signal
+
+import pytest
+
+from paramreduce_cli.cli import terminal
+from paramreduce_cli.records import Progress
+
+
+@pytest.fixture
+def lines(monkeypatch):
+    """Steps at given times, and the lines that they make."""
+    now, told = [0.0], []
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
+    shown = terminal._Lines(10.0, lambda p, left: told.append((p.done, left)))
+
+    def at(time, done, total=10.0, remark=""):
+        now[0] = time
+        shown.show(Progress("work", done, total, remark))
+        return told
+
+    return at
+
+
+def test_what_is_brief_is_not_told(lines):
+    lines(0, 0)
+    lines(1, 5)
+    assert lines(2, 10) == []
+
+
+def test_what_says_something_at_its_end_is(lines):
+    lines(0, 0)
+    assert lines(1, 10, remark="kappa 3") == [(10, None)]
+
+
+def test_long_work_is_told_with_the_time_that_is_left(lines):
+    lines(0, 0)
+    lines(11, 2)
+    assert lines(12, 3) == [(2, 44.0)]
+    assert lines(50, 10) == [(2, 44.0), (10, None)]
+
+
+def test_the_end_of_long_work_without_steps_is_told(lines):
+    lines(0, 0)
+    assert lines(30, 10) == [(10, None)]
+
+
+def test_a_second_task_of_a_name_begins_anew(lines):
+    lines(0, 0)
+    lines(30, 10)
+    lines(100, 0)
+    assert lines(105, 10) == [(10, None)]
+
+
+def test_after_a_kill_ctrl_c_is_no_wish_to_go_on():
+    interruption = terminal.Interruption()
+    for number in (signal.SIGTERM, signal.SIGINT):
+        with pytest.raises(KeyboardInterrupt):
+            interruption._note(number, None)
+    with pytest.raises(KeyboardInterrupt):
+        interruption.heeded()
+
+
+def test_after_ctrl_c_work_can_go_on():
+    interruption = terminal.Interruption()
+    with pytest.raises(KeyboardInterrupt):
+        interruption._note(signal.SIGINT, None)
+    interruption.heeded()
+    interruption.check()
