@@ -1,13 +1,16 @@
 """Computed-torque control on a pendulum whose answer is known, and in the report."""
 
+import re
 from functools import partial
 
 import numpy as np
 import pytest
 from conftest import CONFIGS, TWO_LINK
 
+from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.export import running
 from paramreduce_cli.records import Paths, Tracking
+from paramreduce_cli.stages import report
 from paramreduce_cli.tracking.control import advanced, simulate
 from paramreduce_cli.tracking.paths import point_to_point
 
@@ -89,6 +92,23 @@ def test_without_a_compiler_the_controller_is_interpreted(invoke, two_link_copy,
     settings = ["report.tracking={moves: 1, control_period: 0.01}", "report.formats=[svg]"]
     invoke("report", TWO_LINK, "--results", two_link_copy, "--force", settings=settings)
     assert (two_link_copy / "report/figures/tracking.svg").exists()
+
+
+def test_every_arms_page_says_how_long_its_model_takes(two_link_results):
+    page = (two_link_results / "report" / "index.html").read_text()
+    assert re.search(r"\d ns instead of [\d.e+]+ ns in (C|Python)", page)
+
+
+def test_a_model_in_doubt_is_not_timed(invoke, two_link_copy, monkeypatch):
+    def doubted(*_):
+        raise FormulationError("two formulations disagree")
+
+    monkeypatch.setattr(report, "RunningModel", doubted)
+    made = invoke(
+        "report", TWO_LINK, "--results", two_link_copy, "--force", settings=["report.formats=[svg]"]
+    )
+    assert "nothing is timed: two formulations disagree" in made.err.replace("\n", " ")
+    assert " ns instead of" not in (two_link_copy / "report" / "index.html").read_text()
 
 
 def test_loops_are_refused(invoke, tmp_path):
