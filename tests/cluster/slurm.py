@@ -11,6 +11,8 @@ from pathlib import Path
 _CONFIGURATION = Path("/etc/slurm/slurm.conf")
 """Where Slurm looks: Snakemake takes all of its variables out of the environment of jobs."""
 _NEEDED = ("slurmctld", "slurmd", "munged", "sbatch", "squeue", "sinfo")
+_PATIENCE = 30.0
+"""Between two looks at what nodes do, s."""
 _CONF = """
 ClusterName=test
 SlurmctldHost={host}
@@ -102,7 +104,13 @@ class Slurm:
         self.controller.wait()
         self.start_controller()
         self._wait()
-        # What ended while it was away it learns when nodes register, which would be in half an hour.
+        self._register()
+
+    def _register(self):
+        """Have nodes register, so that the controller learns what ended while it was away.
+
+        Of itself it would ask in half an hour.
+        """
         self.run("scontrol", "reconfigure")
 
     def run(self, *words):
@@ -113,10 +121,16 @@ class Slurm:
 
     def wait_until_idle(self, limit=1800):
         """Wait until no job is left."""
-        until = time.monotonic() + limit
+        asked = time.monotonic()
+        until = asked + limit
         while time.monotonic() < until:
             time.sleep(2)
             try:
+                if (
+                    time.monotonic() > asked + _PATIENCE
+                ):  # one that ended just then may be missed still
+                    asked = time.monotonic()
+                    self._register()
                 if not self.run("squeue", "-h").strip():
                     return
             except subprocess.CalledProcessError:  # the controller is not there yet
