@@ -12,7 +12,7 @@ _CONFIGURATION = Path("/etc/slurm/slurm.conf")
 """Where Slurm looks: Snakemake takes all of its variables out of the environment of jobs."""
 _NEEDED = ("slurmctld", "slurmd", "munged", "sbatch", "squeue", "sinfo")
 _PATIENCE = 30.0
-"""Between two looks at what nodes do, s."""
+"""Between two looks at what has become of jobs and nodes, s."""
 _CONF = """
 ClusterName=test
 SlurmctldHost={host}
@@ -66,7 +66,7 @@ class Slurm:
 
     def __init__(self, folder):
         self.folder = Path(folder)
-        host = socket.gethostname().split(".")[0]
+        self._host = host = socket.gethostname().split(".")[0]
         for name in ("munge", "state", "spool"):
             (self.folder / name).mkdir(parents=True)
         # munged wants its folders to itself.
@@ -104,14 +104,18 @@ class Slurm:
         self.controller.wait()
         self.start_controller()
         self._wait()
-        self._register()
+        self._attend()
 
-    def _register(self):
-        """Have nodes register, so that the controller learns what ended while it was away.
+    def _attend(self):
+        """What an operator does after a controller was killed.
 
-        Of itself it would ask in half an hour.
+        Nodes register, so that it learns what ended while it was away; of itself it would ask in half an hour. A
+        controller killed between the start of a job and the note of it starts that job twice, and drains the node that
+        refuses the second copy: it is resumed.
         """
         self.run("scontrol", "reconfigure")
+        if "Duplicate jobid" in self.run("sinfo", "-h", "-R"):
+            self.run("scontrol", "update", f"NodeName={self._host}", "State=RESUME")
 
     def run(self, *words):
         """Call one of its commands; returns what it prints."""
@@ -119,23 +123,21 @@ class Slurm:
             list(map(str, words)), env=self.environment, check=True, capture_output=True, text=True
         ).stdout
 
-    def wait_until_idle(self, limit=1800):
+    def wait_until_idle(self, limit=600):
         """Wait until no job is left."""
-        asked = time.monotonic()
-        until = asked + limit
+        attended = time.monotonic()
+        until = attended + limit
         while time.monotonic() < until:
             time.sleep(2)
-            try:
-                if (
-                    time.monotonic() > asked + _PATIENCE
-                ):  # one that ended just then may be missed still
-                    asked = time.monotonic()
-                    self._register()
+            with contextlib.suppress(subprocess.CalledProcessError):  # the controller is not there
+                if time.monotonic() > attended + _PATIENCE:
+                    attended = time.monotonic()
+                    self._attend()
                 if not self.run("squeue", "-h").strip():
                     return
-            except subprocess.CalledProcessError:  # the controller is not there yet
-                continue
-        raise RuntimeError(f"jobs do not end; see {self.folder}")
+        jobs, nodes = self.run("squeue"), self.run("sinfo", "-R")
+        log = (self.folder / "slurmctld.log").read_text()[-3000:]
+        raise RuntimeError(f"jobs do not end:\n{jobs}\n{nodes}\n{log}")
 
     def _started(self, name, *words):
         with (self.folder / f"{name}.out").open("ab") as out:
