@@ -129,6 +129,15 @@ ONE_FORMAT = "report.formats=[svg]"
 """Figures in all formats take longer than all else in a small run."""
 
 
+@pytest.fixture(autouse=True)
+def figures_as_they_fall(request, monkeypatch):
+    """Laying figures out takes half of a small run's report; tests of the report itself have it."""
+    if "matplotlib" in sys.modules and "report" not in request.path.parts:
+        from paramreduce_cli.report import style
+
+        monkeypatch.setitem(style.STYLE, "figure.constrained_layout.use", False)
+
+
 ROUGH_TERMS = ("terms.functions=[inverse]", "terms.torque_error=0.5", "terms.rounds=0")
 
 

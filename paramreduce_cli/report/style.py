@@ -12,7 +12,7 @@ from matplotlib.ticker import MaxNLocator
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.data import ReportData
 
-_STYLE = {
+STYLE = {
     "font.size": 9.5,
     "font.family": "DejaVu Sans",
     "axes.spines.top": False,
@@ -60,7 +60,7 @@ def render(
     draw: Callable[[ReportData], Figure | None], data: ReportData, formats: list[str]
 ) -> dict[str, bytes]:
     """Draw a figure and encode it in each format; nothing where there is nothing to draw."""
-    with mpl.rc_context(_STYLE):
+    with mpl.rc_context(STYLE):
         drawn = draw(data)
         if drawn is None:
             return {}
