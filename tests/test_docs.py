@@ -3,16 +3,20 @@
 import importlib.util
 import re
 import shlex
+import shutil
+import subprocess
 import textwrap
 
 import click
 import h5py
 import pytest
 import yaml
-from conftest import ROOT
+from conftest import ROOT, model_of
 
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config.loading import config_schema
+from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.writing import export
 
 DOCS = ROOT / "docs"
 ENDINGS = r"(_(joint|estimation|validation|inverse|direct|plain|paper_rule|training|held_out))+$"
@@ -91,7 +95,7 @@ def blocks(*kinds):
 
 
 def test_every_command_on_any_page_can_be_called(tmp_path, monkeypatch):
-    """Name, options and arguments; tutorial, how-tos and the page on Python are typed by make docs."""
+    """Name, options and arguments; make docs types them."""
     monkeypatch.chdir(tmp_path)
     found = [
         (page, line, shlex.split(words, comments=True))
@@ -106,6 +110,27 @@ def test_every_command_on_any_page_can_be_called(tmp_path, monkeypatch):
             command.parse_args(click.Context(command), words)
         except click.ClickException as error:
             pytest.fail(f"{page}: {line}: {error.format_message()}")
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def test_calls_of_exported_c_compile(tmp_path):
+    """Those that the docs show, of another robot with loops."""
+    model = model_of("four_bar")
+    chosen, title = chosen_model("full", model, None, None)
+    for name, content in export(model, chosen, title=title, language="c").items():
+        (tmp_path / name).write_bytes(content)
+    (text,) = (text for _, text in blocks("c"))
+    arrays = ["phi", "z", "q", "dq", "ddq", "dz", "ddz", "R", "b", "tau", "M", "delta"]
+    lines = [
+        '#include "four_bar.h"',
+        f"void call({', '.join(f'double *{name}' for name in arrays)}) {{",
+        text.replace("hexaglide_", "four_bar_"),
+        "}",
+    ]
+    (tmp_path / "call.c").write_text("\n".join(lines))
+    words = ["gcc", "-std=c99", "-Wall", "-Wextra", "-Werror", "-fsyntax-only", "call.c"]
+    done = subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 def test_every_key_in_an_example_is_known():

@@ -1,4 +1,4 @@
-"""What the docs tell to type, typed: from a wheel, each page in an empty folder of its own."""
+"""What the docs tell to type, typed, from a wheel."""
 
 import argparse
 import os
@@ -12,12 +12,25 @@ from pathlib import Path
 import rich.console
 import rich.table
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGES = ("tutorial.md", "how-to.md", "python.md")
+from tests.docs import prepared
+from tests.docs.prepared import ROOT
+
+LONG = ("tutorial.md", "how-to.md", "python.md")
+"""Pages that are typed as they stand, each in an empty folder of its own."""
+SHORT = {
+    prepared.paper: ("README.md", "lean.md", "terms.md"),
+    prepared.matrix: ("artifacts.md",),
+    prepared.config: ("cluster.md",),
+    prepared.robot: ("robots.md",),
+    prepared.recorded: ("logs.md",),
+}
+"""Pages that are typed with short configs, by what their readers have in their folder."""
 NOTEBOOK = "tutorial.ipynb"
 _BLOCK = re.compile(
-    r"(?:`(?P<file>[\w.]+\.py)`:\n\n)?```(?P<kind>sh|python)\n(?P<text>.*?)```", re.DOTALL
+    r"(?:`(?P<file>[\w.]+\.py)`:\n\n)?```(?P<kind>\w*)\n(?P<text>.*?)```", re.DOTALL
 )
+_COMMAND = re.compile(r"paramreduce |for |cp |python |make -C ")
+"""Lines that are typed; other targets of Make are those of the repository, and CI's."""
 
 
 def steps(text):
@@ -27,8 +40,11 @@ def steps(text):
         kind, content = block["kind"], block["text"]
         if block["file"]:
             found.append(("file", block["file"], content))
-        elif kind == "sh":
-            found += [("sh", line, line) for line in content.splitlines() if line]
+        elif kind in ("sh", ""):
+            lines = content.replace(".venv/bin/", "").splitlines()
+            found += [("sh", line, line) for line in lines if _COMMAND.match(line)]
+        elif kind != "python":
+            continue
         elif found and found[-1][0] == "python":
             found[-1] = ("python", found[-1][1], found[-1][2] + content)
         else:
@@ -47,15 +63,16 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = installed(folder, given.python)
-        for page in PAGES:
+        for page in LONG:
             here = folder / page.removesuffix(".md")
             here.mkdir()
-            for kind, shown, content in steps((ROOT / "docs" / page).read_text()):
-                if kind == "file":
-                    (here / shown).write_text(content)
-                    continue
-                words = ["bash", "-c", content] if kind == "sh" else ["python", "-c", content]
-                failed |= typed(table, page, shown, words, here, environment)
+            failed |= all_typed(table, page, here, environment)
+        for prepare, pages in SHORT.items():
+            here = folder / prepare.__name__
+            here.mkdir()
+            prepare(here, environment)
+            for page in pages:
+                failed |= all_typed(table, page, here, environment, short=set())
         here = folder / "notebook"
         here.mkdir()
         subprocess.run(["paramreduce", "init", "--example", "two_link"], cwd=here, env=environment, check=True, stdout=subprocess.DEVNULL)  # fmt: skip
@@ -66,6 +83,25 @@ def main():
     sys.exit(failed)
 
 
+def all_typed(table, page, folder, environment, short=None):
+    """Type everything on a page; True if anything fails.
+
+    Args:
+        short: Configs that are short already, where all are to be.
+    """
+    path = ROOT / page if page == "README.md" else ROOT / "docs" / page
+    failed = False
+    for kind, shown, content in steps(path.read_text()):
+        if kind == "file":
+            (folder / shown).write_text(content)
+            continue
+        if short is not None:
+            prepared.shorten(folder, short)
+        words = ["bash", "-c", content] if kind == "sh" else ["python", "-c", content]
+        failed |= typed(table, page, shown, words, folder, environment)
+    return failed
+
+
 def installed(folder, interpreter):
     """A wheel in an environment of its own; what is set to run its programs."""
     python = folder / "venv" / "bin" / "python"
@@ -74,10 +110,10 @@ def installed(folder, interpreter):
     subprocess.run([*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", ROOT], check=True)
     (wheel,) = (folder / "wheel").glob("*.whl")
     extra = ["nbclient>=0.10,<1", "ipykernel>=6.29,<8"]
-    subprocess.run([*pip, "install", f"{wheel}[pandas]", *extra], check=True)
+    subprocess.run([*pip, "install", f"{wheel}[pandas,identify]", *extra], check=True)
     path = f"{python.parent}:{os.environ['PATH']}"
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
-    return {**kept, "PATH": path, "MPLBACKEND": "agg"}
+    return {**kept, "PATH": path, "MPLBACKEND": "agg", "BROWSER": "true %s"}
 
 
 def typed(table, page, shown, words, folder, environment):

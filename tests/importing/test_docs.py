@@ -1,14 +1,13 @@
-"""The way that docs/robots.md describes, from a robot's file to code, run as it stands."""
+"""Closures over an imported tree, as docs/robots.md describes them."""
 
 import re
-import shlex
 from pathlib import Path
 
 import numpy as np
 import pytest
 from conftest import ONE_FORMAT
 from oracles.lagrange import Lagrange, tangent
-from robot_files import ARM, FOUR_BAR
+from robot_files import FOUR_BAR
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -24,22 +23,6 @@ WELD = """\
     independent: [q_crank]
     guess: {q_crank: -1.5, q_coupler: 1, q_rocker: -2, q_pin: -1.5}
 """
-
-
-def test_the_commands_of_the_docs(tmp_path, monkeypatch, invoke):
-    monkeypatch.chdir(tmp_path)
-    Path("robot.urdf").write_text(ARM.replace('name="an arm"', 'name="robot"'))
-    text = (ROOT / "docs" / "robots.md").read_text()
-    blocks = re.findall(r"```\n(paramreduce .*?)```", text, re.DOTALL)
-    commands = [line.split("#")[0] for block in blocks for line in block.strip().split("\n")]
-    assert [shlex.split(c)[1] for c in commands] == ["init", "run", "export", "export"]
-    for command in commands:
-        _, name, *arguments = shlex.split(command)
-        settings = QUICK if name != "init" else ()
-        invoke(name, *arguments, settings=settings)
-    assert Path("results/robot/report/index.html").stat().st_size > 10_000
-    assert Path("results/robot/export/c/robot.h").exists()
-    assert "<inertial>" in Path("results/robot/export/urdf/robot.urdf").read_text()
 
 
 def test_closures_over_an_imported_tree(tmp_path, invoke):
