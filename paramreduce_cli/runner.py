@@ -17,6 +17,7 @@ from typing import Any
 
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
+from paramreduce_cli.artifacts.incumbents import StoredIncumbents
 from paramreduce_cli.artifacts.parts import Parts, StoredShares
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
@@ -158,7 +159,8 @@ class Runner:
             return Outcome(stage.name, path, True, 0.0)
         inputs = Inputs(self.config)
         arguments = self._arguments(stage, inputs)
-        self._lend_run(stage, arguments, inputs, frozenset())
+        told = StoredIncumbents(shares.folder, stamp)
+        self._lend_run(stage, arguments, inputs, incumbents=told)
         previous = None
         if stage.previous is not None and not force and shares.is_usable(share, stamp):
             previous = load_file(path, stage.output, self._robot, stage.name)[0]
@@ -312,9 +314,14 @@ class Runner:
         ]
 
     def _lend_run(
-        self, stage: Stage, arguments: dict[str, Any], inputs: Inputs, unchanged: frozenset[str]
+        self,
+        stage: Stage,
+        arguments: dict[str, Any],
+        inputs: Inputs,
+        unchanged: frozenset[str] = frozenset(),
+        incumbents: StoredIncumbents | None = None,
     ) -> Parts | None:
-        """Hand workers, finished parts and progress to a stage that asks for them."""
+        """Hand workers, finished parts, what other jobs have found and progress to a stage that asks for them."""
         if stage.lends_run is None:
             return None
         parts = None
@@ -324,7 +331,12 @@ class Runner:
             stamp = self._stamp(stage, inputs, time.perf_counter())
             parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
         arguments[stage.lends_run.name] = Run(
-            self.jobs, {} if parts is None else parts, self.progress, self._cut, unchanged
+            jobs=self.jobs,
+            parts={} if parts is None else parts,
+            incumbents={} if incumbents is None else incumbents,
+            progress=self.progress,
+            interrupted=self._cut,
+            unchanged=unchanged,
         )
         return parts
 

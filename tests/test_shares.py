@@ -150,6 +150,18 @@ def test_proofs_of_parts_are_those_of_their_sizes(tmp_path):
     assert runner.store.path(Trajectories).exists()
 
 
+def test_proofs_of_subtrees_make_what_one_job_makes(two_link_results, tmp_path):
+    """Every job takes a part in every proof; what it is told is gone when all is put together."""
+    runner = Runner(config_of("two_link", "reduction.best_subset.parts=subtrees"), Store(tmp_path))
+    for name in ("build-model", "optimize-trajectories", "sample"):
+        runner.run(STAGES[name])
+    for number in (1, 2):
+        runner.run(STAGES["reduce"], share=Share(number, 2))
+    runner.run(STAGES["reduce"])
+    assert digest(tmp_path, "reduction.h5") == digest(two_link_results, "reduction.h5")
+    assert not list(tmp_path.glob("*.parts"))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [("3", "form 3/8"), ("a/b", "form 3/8"), ("0/4", "count from 1"), ("5/4", "count from 1")],

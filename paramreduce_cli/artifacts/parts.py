@@ -39,7 +39,7 @@ class Parts(MutableMapping[str, Trajectory]):
             raise KeyError(key)
         try:
             stamp = read_stamp(path)
-            if stamp is None or _origin(stamp) != _origin(self._stamp):
+            if stamp is None or origin(stamp) != origin(self._stamp):
                 raise KeyError(key)
             with reading(path) as reader:
                 found: Trajectory = layouts.load_table(reader, Trajectory, "part")[0]
@@ -94,7 +94,7 @@ class StoredShares:
     def is_usable(self, share: Share, stamp: Stamp) -> bool:
         """Whether a share was made from just this, and is whole."""
         known = self._stamp(share)
-        if known is None or _origin(known) != _origin(stamp):
+        if known is None or origin(known) != origin(stamp):
             return False
         try:
             with reading(self.path(share)) as reader:
@@ -147,5 +147,6 @@ class StoredShares:
             self.folder.rmdir()
 
 
-def _origin(stamp: Stamp) -> tuple[Any, ...]:
+def origin(stamp: Stamp) -> tuple[Any, ...]:
+    """What an artifact was made from, and by what."""
     return (stamp.schema, stamp.robot, stamp.versions, stamp.sections, stamp.inputs)

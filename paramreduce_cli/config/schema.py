@@ -239,6 +239,8 @@ class BestSubset(Section):
     """For all sizes together, s; what is not proven then is reported with a lower bound, and the next run goes on."""
     node_limit: Count | None = None
     """Nodes of the search tree for each size: ends at the same place on every machine."""
+    parts: Literal["sizes", "subtrees"] = "sizes"
+    """What `--part` deals among jobs: sizes, or the subtrees of every size, where few of them are hard."""
 
 
 class OperationsCriterion(Section):

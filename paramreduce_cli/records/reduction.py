@@ -190,6 +190,8 @@ class Proofs(BySize):
     """Nodes of the search tree that were visited, (m,)."""
     logs: tuple[IntArray, ...]
     """Where each unfinished search stopped, to go on from there."""
+    dealt: IntArray
+    """Digest of the subtrees that a search was dealt as among several jobs, 0 where it was not, (m,)."""
 
 
 @dataclass(frozen=True)

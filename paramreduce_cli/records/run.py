@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from paramreduce_cli.records.arrays import IntArray
 from paramreduce_cli.records.trajectories import Trajectory
 
 
@@ -51,6 +52,8 @@ class Run:
     """Worker processes; 0 for doing all in this one."""
     parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
     """Finished parts of an artifact that is not whole yet, kept across interruptions."""
+    incumbents: MutableMapping[int, IntArray] = field(default_factory=dict)
+    """Best subsets by size, which jobs that search for the same tell each other."""
     progress: Tell = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""

@@ -32,6 +32,7 @@ def effort(wanted: ReductionSection, run: Run) -> Effort:
         seed=wanted.swap.seed,
         time_limit=wanted.best_subset.time_limit,
         node_limit=wanted.best_subset.node_limit,
+        subtrees=wanted.best_subset.parts == "subtrees",
         jobs=max(1, run.jobs),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, MutableMapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -29,6 +29,8 @@ class Effort:
     """Of proofs, s."""
     node_limit: int | None = None
     """Of the proof of one size; unlike time it stops every machine at the same place."""
+    subtrees: bool = False
+    """Whether a share of the work is one of every proof, instead of some proofs."""
     jobs: int = 1
     """Threads that search for proofs."""
 
@@ -50,7 +52,9 @@ class SelectionTask:
     previous: Proofs | None = None
     """What an earlier run has proven on the same data."""
     share: Share = WHOLE
-    """Which of the sizes are to be proven, of several jobs."""
+    """Which of the proofs are to be found, of several jobs."""
+    incumbents: MutableMapping[int, IntArray] = field(default_factory=dict)
+    """Best subsets by size, which jobs tell each other."""
     progress: Callable[[Progress], None] = lambda _: None
     interrupted: Callable[[], None] = _passed_on
     """Told that a KeyboardInterrupt was met; raises it again where nothing is worth keeping."""

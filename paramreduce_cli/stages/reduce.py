@@ -38,7 +38,7 @@ from paramreduce_cli.records import (
     Shares,
     Subsets,
 )
-from paramreduce_cli.reduction.best_subset.merging import merged
+from paramreduce_cli.reduction.best_subset.merging import joined, merged
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
@@ -67,7 +67,8 @@ def reduce(
 
     Works on any samples.h5, also one that a user brings: without a model all columns that
     are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
-    same command goes on from there. A share of the work are the proofs of some sizes.
+    same command goes on from there. A share of the work are the proofs of some sizes, or a part of
+    every proof.
     """
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
@@ -86,8 +87,10 @@ def reduce(
         )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
-    known = [one for one in (previous, *shares.found) if one is not None]
-    proven = [one.proofs for one in known if one.proofs and np.array_equal(one.factor, factor)]
+    before = [] if previous is None else [previous]
+    proven = _proofs_on(factor, before)
+    others = _proofs_on(factor, shares.found)
+    proven += [joined(others)] if others and reduction.best_subset.parts == "subtrees" else others
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
@@ -104,6 +107,11 @@ def reduce(
     _remark_on_proofs(proofs, share)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)
+
+
+def _proofs_on(factor: FloatArray, found: Sequence[Reduction]) -> list[Proofs]:
+    """Proofs that hold, as they are of the same data."""
+    return [one.proofs for one in found if one.proofs and np.array_equal(one.factor, factor)]
 
 
 def _wanted(heuristics: Sequence[str], share: Share) -> Sequence[str]:
@@ -229,6 +237,7 @@ def _task(
         effort=effort(wanted, run),
         previous=merged(proven) if proven else None,
         share=share,
+        incumbents=run.incumbents,
         progress=run.progress,
         interrupted=run.interrupted,
     )

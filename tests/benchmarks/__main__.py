@@ -8,13 +8,13 @@ import rich.box
 import rich.console
 import rich.table
 
-from tests.benchmarks import gradients, growth, lean_code, long_logs, memory, selection
+from tests.benchmarks import gradients, growth, lean_code, long_logs, memory, selection, subtrees
 
 
 def main():
     title, look = "Ratios, all measured in this run", rich.box.SIMPLE
     table = rich.table.Table("what", "ratio", "at most", "", title=title, box=look)
-    for benchmark in (selection, gradients, growth, memory, long_logs, lean_code):
+    for benchmark in (selection, subtrees, gradients, growth, memory, long_logs, lean_code):
         for what, ratio, limit in benchmark.rows():
             shown = f"{ratio:.3f}" if ratio > 0.01 else f"1/{1 / ratio:.0f}"
             most = f"{limit:g}" if limit >= 1 else f"1/{1 / limit:.0f}"

@@ -1,12 +1,18 @@
 """Proofs against exhaustive search, and searches that are stopped and continued."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import Effort, dependent_problem, found, problem
 
-from paramreduce_cli.reduction.best_subset import kernel
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.records import Share
+from paramreduce_cli.reduction.best_subset import kernel, parts
+from paramreduce_cli.reduction.best_subset.merging import joined
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
+from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.heuristics import swap
@@ -135,6 +141,74 @@ def test_a_split_search_leaves_nothing_out():
         assert min(part.squared_error for part in parts) == pytest.approx(whole.squared_error)
         assert whole.squared_error < known
         assert all(part.split() is None for part in parts)
+
+
+@pytest.mark.parametrize("many", [1, 4, 1000])
+def test_subtrees_dealt_to_jobs_leave_nothing_out(monkeypatch, many):
+    """Each job searches its own alone; one of them finds the best, and none does the work of all."""
+    monkeypatch.setattr(parts, "_SUBTREES", many)
+    p = unit_problem(hard_problem())
+    whole = Search(p, 8, *start(p, 8))
+    whole.advance(10**9)
+    jobs = [PartedSearch(lambda log: Search(p, 8, *start(p, 8), log=log), BEGINNING) for _ in "123"]
+    digests = {job.deal(Share(number, 3)) for number, job in enumerate(jobs, 1)}
+    assert len(digests) == 1
+    logs = [set(map(bytes, parts.taken_apart(job.log))) for job in jobs]
+    assert not logs[0] & logs[1] | logs[1] & logs[2] | logs[0] & logs[2] - {b""}
+    for job in jobs:
+        while not job.finished:
+            job.advance(10**6, threads=1)
+    assert min(job.squared_error for job in jobs) == pytest.approx(whole.squared_error, rel=1e-9)
+    if many == 4:
+        assert max(job.nodes for job in jobs) < 0.8 * whole.nodes
+
+
+def shares_of(problem, count, **effort):
+    """What jobs prove of the same, each of its subtrees."""
+    wanted = Effort(subtrees=True, **effort)
+    for number in range(1, count + 1):
+        yield found("best-subset", problem, share=Share(number, count), effort=wanted).proofs
+
+
+@pytest.mark.parametrize("limit", [None, 40])
+def test_proofs_of_subtrees_are_one_proof_together_that_can_be_gone_on_with(monkeypatch, limit):
+    monkeypatch.setattr(parts, "_SUBTREES", 4)
+    given = hard_problem()
+    whole = found("best-subset", given).proofs
+    shares = list(shares_of(given, 3, node_limit=limit))
+    together = joined(shares)
+    assert np.all(together.lower_bound <= whole.torque_error * (1 + 1e-9))
+    for one in shares:
+        assert np.all(together.torque_error <= one.torque_error)
+    if limit:
+        assert "best-found" in set(together.status)
+        together = found("best-subset", given, previous=together).proofs
+    assert set(together.status) == {"optimal"}
+    np.testing.assert_allclose(together.torque_error, whole.torque_error, rtol=1e-9, atol=1e-12)
+    assert not together.dealt.any()
+
+
+def test_jobs_that_split_differently_are_not_put_together():
+    shares = list(shares_of(hard_problem(), 2))
+    other = dataclasses.replace(shares[1], dealt=shares[1].dealt + 1)
+    with pytest.raises(DataError, match=r"parts 1/2 and 2/2 have split .*subset\.parts: sizes"):
+        joined([shares[0], other])
+
+
+def test_jobs_tell_each_other_what_they_find():
+    given = hard_problem()
+    best = found("best-subset", given).proofs
+    rows = np.arange(best.n.size)
+    poor = [np.arange(n) for n in best.n]
+    task = SelectionTask(TorqueObjective(given), effort=Effort(node_limit=3))
+    task.incumbents[8] = best.subsets[7]
+    heard = ProofSearch(task, poor)
+    heard.run()
+    assert heard.record().torque_error[7] == pytest.approx(best.torque_error[7])
+    assert heard.record().torque_error[8] > 1.01 * best.torque_error[8] or len(rows) < 9
+    task = SelectionTask(TorqueObjective(given))
+    ProofSearch(task, poor).run()
+    assert sorted(task.incumbents[8]) == sorted(best.subsets[7])
 
 
 def test_a_search_for_less_proves_a_lower_bound():

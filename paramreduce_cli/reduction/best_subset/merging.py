@@ -4,7 +4,48 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import Proofs, ProofStatus
+from paramreduce_cli.reduction.best_subset.parts import together
+
+
+def joined(shares: Sequence[Proofs]) -> Proofs:
+    """Searches of which each job has done a share of the subtrees, as one.
+
+    Args:
+        shares: Of all jobs, on the same data.
+
+    Raises:
+        DataError: They were not dealt the same subtrees.
+    """
+    first = shares[0]
+    for number, one in enumerate(shares, 1):
+        if not (_alike(one, first) and np.array_equal(one.dealt, first.dealt)):
+            raise DataError(
+                f"parts 1/{len(shares)} and {number}/{len(shares)} have split the search into other subtrees, as "
+                "machines do that calculate differently. Make both again on machines of one kind, or write "
+                "reduction.best_subset.parts: sizes."
+            )
+    best = np.argmin([one.torque_error for one in shares], axis=0)
+    error = np.min([one.torque_error for one in shares], axis=0)
+    return Proofs(
+        units=first.units,
+        n=first.n,
+        subsets=tuple(shares[k].subsets[row] for row, k in enumerate(best)),
+        torque_error=error,
+        lower_bound=np.minimum(error, np.min([one.lower_bound for one in shares], axis=0)),
+        status=tuple(_of_all([one.status[row] for one in shares]) for row in range(first.n.size)),
+        seconds=np.sum([one.seconds for one in shares], axis=0),
+        nodes=np.sum([one.nodes for one in shares], axis=0),
+        logs=tuple(together([one.logs[row] for one in shares]) for row in range(first.n.size)),
+        dealt=np.zeros_like(first.n),
+    )
+
+
+def _of_all(found: Sequence[ProofStatus]) -> ProofStatus:
+    """What is proven where every share must be."""
+    order = (ProofStatus.UNCERTIFIED, ProofStatus.BEST_FOUND, ProofStatus.OPTIMAL)
+    return min(found, key=order.index)
 
 
 def merged(proofs: Sequence[Proofs]) -> Proofs:
@@ -39,6 +80,7 @@ def merged(proofs: Sequence[Proofs]) -> Proofs:
         seconds=np.sum([one.seconds for one in proofs], axis=0),
         nodes=np.sum([one.nodes for one in proofs], axis=0),
         logs=tuple(one.logs[k] for k, one in enumerate(best)),
+        dealt=np.array([one.dealt[k] for k, one in enumerate(best)], dtype=np.int64),
     )
 
 

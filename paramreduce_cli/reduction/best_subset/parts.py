@@ -1,16 +1,22 @@
-"""One search in parts that threads take side by side: a branch that waits becomes a search itself."""
+"""One search in parts, for threads side by side or for several jobs: a branch that waits becomes a search itself."""
 
-from collections.abc import Callable, Iterator
+import heapq
+import zlib
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
+from itertools import count, pairwise
 
 import numpy as np
 
-from paramreduce_cli.records import IntArray
+from paramreduce_cli.records import IntArray, Share
 from paramreduce_cli.reduction.best_subset.search import Search
 
 _NEXT = np.iinfo(np.int64).max
 """Stands between the logs of two parts."""
+_SUBTREES, _MOST_SUBTREES = 256, 16_384
+"""Dealt to each job, for all to have as much to do, and to all jobs together."""
+_GLANCE = 1
+"""Nodes after which a subtree is large enough to be split, or done."""
 
 
 class PartedSearch:
@@ -22,9 +28,10 @@ class PartedSearch:
     """
 
     def __init__(self, search: Callable[[IntArray], Search], log: IntArray) -> None:
-        self._open = [search(part) for part in _taken_apart(log)]
+        self._open = [search(part) for part in taken_apart(log)]
         self._ended: list[Search] = []
         self._best = self._open[0]
+        self._glances = 0
 
     def advance(self, nodes: int, threads: int) -> None:
         """Go on for at most so many nodes on every thread; what one finds, all know afterwards."""
@@ -45,6 +52,42 @@ class PartedSearch:
     def _split(self) -> Search | None:
         return next((new for part in self._open if (new := part.split()) is not None), None)
 
+    def deal(self, share: Share) -> int:
+        """Keep some of the subtrees that the search is split into, for other jobs to take the others.
+
+        Those nearest to the root are split first, until there are many; what is done on the way is done
+        by every job. They are dealt like cards, those of the lowest bounds first.
+
+        Returns:
+            A digest of all subtrees: jobs with the same one have the same cards.
+        """
+        many = min(_SUBTREES * share.count, _MOST_SUBTREES)
+        number = count()  # older ones first where depths are equal
+        heap = [(0, next(number), part) for part in self._open]
+        while 0 < len(heap) < many:
+            _, _, part = heapq.heappop(heap)
+            for one in (part, part.split()):
+                if one is None:
+                    continue
+                while one.depth is None and not one.finished:
+                    one.advance(_GLANCE)
+                if one.depth is None:
+                    self._ended.append(one)
+                else:
+                    heapq.heappush(heap, (one.depth, next(number), one))
+        cards = [part for _, _, part in sorted(heap, key=lambda card: (card[2].bound, card[1]))]
+        self._best = min([*cards, *self._ended], key=lambda part: part.squared_error)
+        self._glances = sum(part.nodes for part in cards)
+        self._open = cards[share.number - 1 :: share.count]
+        self._glances -= sum(part.nodes for part in self._open)
+        self.learn(self.squared_error, self.subset)
+        return zlib.crc32(b"".join(part.log.tobytes() for part in cards))
+
+    def learn(self, squared_error: float, subset: IntArray) -> None:
+        """Take over what another search of the same size has found."""
+        for part in self._open:
+            part.learn(squared_error, subset)
+
     @property
     def finished(self) -> bool:
         """Whether nothing is left to search."""
@@ -52,8 +95,8 @@ class PartedSearch:
 
     @property
     def nodes(self) -> int:
-        """Nodes visited by all parts."""
-        return sum(part.nodes for part in self._parts())
+        """Nodes visited by all parts, and in subtrees that are other jobs'."""
+        return sum(part.nodes for part in self._parts()) + self._glances
 
     @property
     def squared_error(self) -> float:
@@ -78,15 +121,22 @@ class PartedSearch:
     @property
     def log(self) -> IntArray:
         """Where all open parts stand, to go on from there another time."""
-        if not self._open:
-            return np.zeros(0, np.int64)
-        return np.concatenate([np.append(part.log, _NEXT) for part in self._open])[:-1]
+        return together([part.log for part in self._open])
 
     def _parts(self) -> list[Search]:
         return [*self._open, *self._ended]
 
 
-def _taken_apart(log: IntArray) -> Iterator[IntArray]:
+def together(logs: Sequence[IntArray]) -> IntArray:
+    """Logs of several searches as one; those that are empty are of none."""
+    logs = [log for log in logs if log.size]
+    if not logs:
+        return np.zeros(0, np.int64)
+    return np.concatenate([np.append(log, _NEXT) for log in logs])[:-1]
+
+
+def taken_apart(log: IntArray) -> Iterator[IntArray]:
+    """The logs of several searches that one log holds."""
     ends = [-1, *np.flatnonzero(log == _NEXT).tolist(), log.size]
     for before, end in pairwise(ends):
         yield log[before + 1 : end]

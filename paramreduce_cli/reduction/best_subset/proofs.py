@@ -12,6 +12,7 @@ from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import (
     BEGINNING,
+    RESOLUTION,
     Search,
     UnitProblem,
     compile_search,
@@ -52,6 +53,7 @@ class _Proof:
     seconds: float = 0.0
     nodes: int = 0
     log: IntArray = field(default_factory=BEGINNING.copy)
+    dealt: int = 0
 
     def take(self, subset: IntArray, squared_error: float) -> None:
         """Remember a better subset."""
@@ -75,6 +77,7 @@ class ProofSearch:
         self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._proofs: dict[int, _Proof] = {}
         self._spent: dict[int, int] = {}
+        self._by_subtrees: bool = task.effort.subtrees and not task.share.whole
         for columns in starts:
             self._start(self._numbered(columns))
         if task.previous is not None:
@@ -110,6 +113,7 @@ class ProofSearch:
             proof.squared_bound = float(previous.lower_bound[k]) ** 2
             proof.status, proof.log = previous.status[k], previous.logs[k]
             proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
+            proof.dealt = int(previous.dealt[k]) if self._by_subtrees else 0
 
     def run(self) -> None:
         """Search until all is proven, or time or nodes run out, or the user has enough.
@@ -129,7 +133,8 @@ class ProofSearch:
                         break
                     budget *= _GROWTH
                 more = max(_LEAST_TIME, _SHARE_OF_TIME * self._task.effort.time_limit)
-                self._raise_bounds(pool, time.monotonic() + more, stop)
+                if not self._by_subtrees:  # a bound of a share of a tree is none of its size
+                    self._raise_bounds(pool, time.monotonic() + more, stop)
             except KeyboardInterrupt:
                 stop.set()
                 self._task.interrupted()
@@ -152,9 +157,10 @@ class ProofSearch:
             tell(1)
 
     def _open(self) -> list[_Proof]:
+        sizes = sorted(self._proofs)
         return [
             proof
-            for n in self._task.share.dealt(sorted(self._proofs))
+            for n in (sizes if self._by_subtrees else self._task.share.dealt(sizes))
             if (proof := self._proofs[n]).status == ProofStatus.BEST_FOUND
             and proof.squared_error > FULL_PRECISION**2
         ]
@@ -170,6 +176,7 @@ class ProofSearch:
             search = self._search(proof)
             for nodes in self._slices(proof, search, budget - before, deadline, stop):
                 search.advance(nodes, self._threads(len(waiting)))
+                self._exchange(proof, search)
             self._spent[proof.n] = before + search.nodes
             self._take_over(proof, search)
             waiting.remove(proof)
@@ -195,7 +202,21 @@ class ProofSearch:
         def part(log: IntArray) -> Search:
             return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
 
-        return PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
+        search = PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
+        if self._by_subtrees and not proof.log.size:
+            proof.dealt = search.deal(self._task.share)
+        return search
+
+    def _exchange(self, proof: _Proof, search: PartedSearch) -> None:
+        """Tell other jobs of a better subset, or hear of one; what is heard is calculated anew."""
+        told = self._task.incumbents.get(proof.n, proof.subset[:0])
+        usable = 0 < told.size <= proof.n and set(told.tolist()) <= self._place.keys()
+        subset = self._numbered(told) if usable else proof.subset
+        known = self._squared_error(subset) if usable else proof.squared_error
+        if known < search.squared_error * (1 - RESOLUTION):
+            search.learn(known, subset)
+        elif search.squared_error < known * (1 - RESOLUTION):
+            self._task.incumbents[proof.n] = self._problem.columns[search.subset]
 
     def _slices(
         self, proof: _Proof, search: PartedSearch, nodes: int, deadline: float,
@@ -275,7 +296,8 @@ class ProofSearch:
         for _, proof in sorted(self._proofs.items(), reverse=True):
             if proof.squared_error <= FULL_PRECISION**2:
                 proof.status = ProofStatus.OPTIMAL
-            proof.squared_bound = bound = max(bound, proof.squared_bound)
+            if not self._by_subtrees:
+                proof.squared_bound = bound = max(bound, proof.squared_bound)
 
     def subsets(self) -> list[Units]:
         """The best subset found of just each size, after :meth:`run`."""
@@ -294,4 +316,5 @@ class ProofSearch:
             seconds=np.array([p.seconds for p in proofs]),
             nodes=np.array([p.nodes for p in proofs], dtype=np.int64),
             logs=tuple(p.log for p in proofs),
+            dealt=np.array([p.dealt for p in proofs], dtype=np.int64),
         )

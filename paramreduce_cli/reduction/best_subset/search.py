@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -53,6 +54,16 @@ class UnitProblem:
     condition: float
     nearest: float
     rank: int
+
+    @cached_property
+    def fit(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
+        """Of all columns: (X'X)^+, a basis of the null space, the solution, and the squared error left."""
+        X, rank = self.X, self.rank
+        U, s, Vt = np.linalg.svd(X, full_matrices=True)
+        V = Vt[:rank].T
+        solution = V @ ((U[:, :rank].T @ self.chi) / s[:rank])
+        left = self.chi - X @ solution
+        return (V / s[:rank] ** 2) @ V.T, Vt[rank:], solution, float(left @ left)
 
     @property
     def certifiable(self) -> bool:
@@ -142,19 +153,16 @@ class Search:
     def _root(
         self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
     ) -> State:
-        kernel, X, chi, rank = self._kernel, problem.X, problem.chi, problem.rank
+        kernel, X, chi = self._kernel, problem.X, problem.chi
         n, levels = X.shape[1], min(places, int(problem.unit[-1]) + 1) + 2
-        U, s, Vt = np.linalg.svd(X, full_matrices=True)
-        V, null = Vt[:rank].T, Vt[rank:]
-        solution = V @ ((U[:, :rank].T @ chi) / s[:rank])
-        left = chi - X @ solution
+        inverse, null, solution, left = problem.fit
         sheets = np.zeros((levels, 2 * n + len(null) + 2, n))
-        sheets[0] = np.vstack([X.T @ X, (V / s[:rank] ** 2) @ V.T, null, X.T @ chi, solution])
+        sheets[0] = np.vstack([X.T @ X, inverse, null, X.T @ chi, solution])
         numbers = np.zeros((levels, kernel.FIRST + n), np.int64)
         numbers[0, kernel.FREE], numbers[0, kernel.NULLITY] = n, len(null)
         numbers[0, kernel.FIRST :] = np.arange(n)
         errors = np.zeros((levels, 2))
-        errors[0] = chi @ chi, left @ left
+        errors[0] = chi @ chi, left
         found = np.full(n, -1, np.int64)
         found[: subset.size] = subset
         return kernel.State(
@@ -175,13 +183,17 @@ class Search:
         self.nodes += visited
         self.finished = status == self._kernel.DONE
 
+    @property
+    def depth(self) -> int | None:
+        """Decisions above the branch that waits nearest to the root, if one waits."""
+        marks = np.flatnonzero(self.log == 0)
+        return int(marks[0]) if marks.size and not self.finished else None
+
     def split(self) -> Search | None:
         """Make the branch that waits nearest to the root a search of its own, if there is one."""
-        log = self.log
-        marks = np.flatnonzero(log == 0)
-        if self.finished or not marks.size:
+        log, first = self.log, self.depth
+        if first is None:
             return None
-        first = int(marks[0])
         given = self._from(log[: first + 2])
         self._kernel.go_back(given._state, given._data)
         # Without its mark the branch is a decision like those before it, and nothing waits there.
