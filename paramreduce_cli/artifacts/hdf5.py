@@ -38,6 +38,8 @@ _LARGEST_HEADER = 60_000
 """Bytes that a header can be made to hold; text beyond that is an array with one entry."""
 _READ_AT_ONCE = 1 << 24
 """Bytes."""
+_STRETCH = 1 << 20
+"""Bytes that are read together of rows that are read one after the other."""
 _MOST_COMPRESSED = 1000
 """A dataset that declares more numbers for what it holds is none that was written."""
 
@@ -299,6 +301,40 @@ class Reader:
                 "holds hardly any."
             )
         return found
+
+
+class StoredRows:
+    """A numeric dataset in a file, of which slices are read; an array of it is made where one is asked for.
+
+    Args:
+        reader: Of the file.
+        name: Of the dataset.
+    """
+
+    def __init__(self, reader: Reader, name: str) -> None:
+        data = reader.rows(name)
+        self._path, self._name = reader.path, name
+        self.shape, self.dtype, self.ndim, self.size = data.shape, data.dtype, data.ndim, data.size
+        self._first = 0
+        self._stretch: np.ndarray = np.zeros((0, *self.shape[1:]), self.dtype)
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, step = rows.indices(len(self))
+        last = self._first + len(self._stretch)
+        if not self._first <= start <= stop <= last:
+            # Slices follow each other: the next ones are read with this one.
+            size = max(1, _STRETCH * len(self) // (self.size * self.dtype.itemsize))
+            with reading(self._path) as reader:
+                self._stretch = reader.rows(self._name)[start : max(stop, start + size)]
+            self._first = start
+        return self._stretch[start - self._first : stop - self._first : step]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        with reading(self._path) as reader:
+            return reader.array(self._name).astype(dtype or self.dtype, copy=False)
 
 
 @contextlib.contextmanager

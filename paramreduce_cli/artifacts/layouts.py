@@ -13,10 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.hdf5 import Reader, Writer
+from paramreduce_cli.artifacts.hdf5 import Reader, StoredRows, Writer
 from paramreduce_cli.artifacts.plain import dtype_of, from_plain, to_plain
 from paramreduce_cli.records import (
     Columns,
+    MeasuredMotions,
     Model,
     Proofs,
     ReducedModel,
@@ -59,6 +60,8 @@ _BY_SIZE = {
     *((Proofs, name) for name in ("subsets", "logs")),
 }
 """Arrays, one for each subset: datasets named by its size."""
+_BY_ROWS, _LARGE = {MeasuredMotions}, 1 << 22
+"""Records whose arrays are not loaded, but read by rows, from so many bytes on."""
 _TIMINGS = {"seconds", "cpu_seconds", "nodes"}
 """How long something took, which is no part of what a file holds; nodes depend on the number of threads."""
 _KEYS: dict[tuple[type, str], str] = {(Trajectory, "kappa_variants"): "scalings"}
@@ -170,6 +173,8 @@ def load(reader: Reader, record: type, prefix: str = "") -> Any:
         elif (record, name) in _BY_SIZE:
             arrays = (reader.array(f"{path}/{n}") for n in values["n"])
             values[name] = tuple(arrays)
+        elif record in _BY_ROWS and reader.rows(path).nbytes > _LARGE:
+            values[name] = StoredRows(reader, path)
         else:
             values[name] = _load_value(reader, hint, path)
     return record(**values)

@@ -1,5 +1,6 @@
 """Measured motions as a sample set: torques and observation matrix through one low-pass."""
 
+from bisect import bisect_left
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
@@ -20,7 +21,65 @@ from paramreduce_cli.multibody.observation import (
 )
 from paramreduce_cli.records import Block, FloatArray, IntArray, MeasuredLog, MeasuredMotions
 
+_LOOKED_AT = 1 << 16
+"""Samples that are looked at together, to see where folds begin."""
 _STATES = ("time", "z", "dz", "ddz", "q", "dq", "ddq")
+
+
+@dataclass(frozen=True)
+class _Stretch:
+    """An uninterrupted motion: where it stands, and what is taken of it."""
+
+    first: int
+    """Number of its first sample among all."""
+    size: int
+    outputs: range
+    """Samples, counted from its first, that are used and have all the neighbours that the low-pass needs."""
+    edges: IntArray
+    """First sample of each fold in it."""
+    folds: IntArray
+
+    def fold_of(self, samples: IntArray) -> IntArray:
+        """Folds of some of its samples."""
+        found: IntArray = self.folds[np.searchsorted(self.edges, samples, side="right") - 1]
+        return found
+
+
+def _stretches(motions: MeasuredMotions, k: int, every: int) -> Iterator[_Stretch]:
+    """The uninterrupted motions, for a low-pass of 2 k + 1 taps of which every so many samples are taken."""
+    starts, pieces, folds = _runs(motions)
+    for piece in np.unique(pieces):
+        own = np.flatnonzero(pieces == piece)
+        first, stop = int(starts[own[0]]), int(starts[own[-1] + 1])
+        used = own[folds[own] != UNUSED]
+        outputs = range(0)
+        if used.size:
+            begin, end = int(starts[used[0]]) - first, int(starts[used[-1] + 1]) - first
+            late = max(0, -((begin - k) // every)) * every  # the first with k samples before it
+            outputs = range(begin + late, min(end, stop - first - k), every)
+        yield _Stretch(first, stop - first, outputs, starts[own] - first, folds[own])
+
+
+def _runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
+    """Where samples of another piece or fold begin, and the end; and pieces and folds there."""
+    total = motions.time.size
+    starts, pieces, folds = [0], [], []
+    for begin in range(0, total, _LOOKED_AT):
+        # With the last one before, to see a change there too.
+        rows = slice(max(0, begin - 1), min(begin + _LOOKED_AT, total))
+        piece, fold = motions.piece[rows], motions.fold[rows]
+        changes = np.flatnonzero((np.diff(piece) != 0) | (np.diff(fold) != 0)) + 1
+        at = [0, *changes.tolist()] if begin == 0 else changes.tolist()
+        starts += [rows.start + c for c in changes.tolist()]
+        pieces += piece[at].tolist()
+        folds += fold[at].tolist()
+    return np.array([*starts, total]), np.array(pieces), np.array(folds)
+
+
+def _ends(edges: IntArray, outputs: range) -> list[int]:
+    """A sample of every fold that has any among some samples."""
+    later = [bisect_left(outputs, int(edge)) for edge in edges]
+    return sorted({outputs[k] for k in (*later, len(outputs) - 1) if 0 <= k < len(outputs)})
 
 
 @dataclass
@@ -28,7 +87,8 @@ class LoggedSet:
     """Samples of measured motions, computed as they are read; folds are their trajectories.
 
     Where torques pass a low-pass, every column of the observation matrix passes the same one, so that
-    the model stays linear and exact [Gautier1997]; states are those at the sample's own time.
+    the model stays linear and exact [Gautier1997]; states are those at the sample's own time. Of the
+    motions only slices are read.
     """
 
     motions: MeasuredMotions
@@ -37,78 +97,68 @@ class LoggedSet:
     dynamics: Dynamics
     source: str
     """What the states are, for messages."""
+    measured: np.ndarray | None = None
+    """Joints whose torques are measured, the others' are zero, (n_dof,); all if left out."""
 
     def __post_init__(self) -> None:
         self._taps = filters.low_pass(self.log.torque_cutoff, self.log.rate)
-        self._every = round(self.log.rate / self.log.output_rate)
-        self._first = np.searchsorted(self.motions.piece, np.unique(self.motions.piece))
-
-        present = [
-            self.motions.fold[self._rows(k)][self._outputs(k)] for k in range(self._first.size)
-        ]
+        every = round(self.log.rate / self.log.output_rate)
+        self._stretches = list(_stretches(self.motions, self._taps.size // 2, every))
+        ends = [s.fold_of(np.array(_ends(s.edges, s.outputs))) for s in self._stretches]
         # Folds of which the low-pass leaves nothing are none.
-        numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *present]))
+        numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))
         self._folds = {int(fold): k for k, fold in enumerate(numbers)}
 
     @property
     def n_samples(self) -> int:
         """How many samples it yields in all."""
-        return sum(self._outputs(k).size for k in range(self._first.size))
+        return sum(len(stretch.outputs) for stretch in self._stretches)
 
     @property
     def recomputable(self) -> bool:
         """Not what passed a low-pass."""
         return self._taps.size == 1
 
-    def _rows(self, piece: int) -> slice:
-        ends = [*self._first.tolist(), self.motions.time.size]
-        return slice(ends[piece], ends[piece + 1])
-
-    def _outputs(self, piece: int) -> IntArray:
-        """Samples of a piece that are used and have all the neighbours that the low-pass needs."""
-        fold = self.motions.fold[self._rows(piece)]
-        used = np.flatnonzero(fold != UNUSED)
-        k = self._taps.size // 2
-        picked = used[:: self._every]
-        result: IntArray = picked[(picked >= k) & (picked < fold.size - k)]
-        return result
+    def _torques(self, rows: slice) -> FloatArray:
+        tau = self.motions.tau[rows]
+        return tau if self.measured is None else np.where(self.measured, tau, 0.0)
 
     def blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        ends = [*self._first.tolist(), self.motions.time.size]
         observed = ObservedSet(
-            spans(np.diff(ends).tolist()), self._states_at, self.dynamics,
+            spans([stretch.size for stretch in self._stretches]), self._states_at, self.dynamics,
             np.zeros(self.dynamics.mechanism.n_parameters), self.source,
         )  # fmt: skip
-        for piece, blocks in groupby(observed.blocks(), attrgetter("trajectory")):
-            yield from self._low_passed(piece, blocks)
+        for number, blocks in groupby(observed.blocks(), attrgetter("trajectory")):
+            yield from self._low_passed(self._stretches[number], blocks)
 
     def states(self) -> Iterator[StateBlock]:
         """Yield states and low-passed torques of the samples alone."""
         m = self.motions
         k = self._taps.size // 2
-        for piece in range(self._first.size):
-            outputs = self._outputs(piece)
-            first = self._rows(piece).start
-            for start in range(0, outputs.size, BLOCK_SAMPLES):
-                some = outputs[start : start + BLOCK_SAMPLES]
+        for number, stretch in enumerate(self._stretches):
+            for start in range(0, len(stretch.outputs), BLOCK_SAMPLES):
+                some = np.array(stretch.outputs[start : start + BLOCK_SAMPLES])
                 needed = slice(int(some[0]) - k, int(some[-1]) + k + 1)
-                rows = m.tau[first + needed.start : first + needed.stop]
+                rows = self._torques(
+                    slice(stretch.first + needed.start, stretch.first + needed.stop)
+                )
                 tau = filters.thinned_low_pass(rows, needed.start, self._taps, some)
-                at = first + some
-                yield StateBlock(piece, m.time[at], m.z[at], m.dz[at], m.ddz[at], tau)
+                part = slice(stretch.first + int(some[0]), stretch.first + int(some[-1]) + 1)
+                own = some - some[0]
+                z, dz, ddz = m.z[part][own], m.dz[part][own], m.ddz[part][own]
+                yield StateBlock(number, m.time[part][own], z, dz, ddz, tau)
 
     def _states_at(self, span: Span) -> StateBlock:
         """States, also those that only serve the low-pass, and torques as measured."""
-        m, first = self.motions, self._rows(span.trajectory).start
+        m, first = self.motions, self._stretches[span.trajectory].first
         part = slice(first + span.start, first + span.stop)
         states = m.time[part], m.z[part], m.dz[part], m.ddz[part]
-        return StateBlock(span.trajectory, *states, m.tau[part])
+        return StateBlock(span.trajectory, *states, self._torques(part))
 
-    def _low_passed(self, piece: int, blocks: Iterator[Block]) -> Iterator[Block]:
+    def _low_passed(self, stretch: _Stretch, blocks: Iterator[Block]) -> Iterator[Block]:
         """Blocks of the samples that are used; only what the low-pass still needs is held."""
-        waiting = self._outputs(piece)
-        fold = self.motions.fold[self._rows(piece)]
+        waiting = stretch.outputs
         k = self._taps.size // 2
         held: list[Block] = []
         first = 0
@@ -116,11 +166,12 @@ class LoggedSet:
         for block in blocks:
             held.append(block)
             end += block.time.size
-            count = int(np.searchsorted(waiting, end - k))
-            ready, waiting = waiting[:count], waiting[count:]
-            for number in np.unique(fold[ready]).tolist():
-                yield self._made(held, first, ready[fold[ready] == number], self._folds[number])
-            needed = int(waiting[0]) - k if waiting.size else end
+            count = bisect_left(waiting, end - k)
+            ready, waiting = np.array(waiting[:count], dtype=np.int64), waiting[count:]
+            fold = stretch.fold_of(ready)
+            for number in np.unique(fold).tolist():
+                yield self._made(held, first, ready[fold == number], self._folds[number])
+            needed = waiting[0] - k if waiting else end
             while held and first + held[0].time.size <= needed:
                 first += held.pop(0).time.size
 

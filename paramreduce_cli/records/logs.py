@@ -35,7 +35,10 @@ class RawLogs:
 
 @dataclass(frozen=True)
 class MeasuredMotions:
-    """Measured motions one after the other, evenly spaced in time within each piece."""
+    """Measured motions one after the other, evenly spaced in time within each piece.
+
+    Long ones in a file are no arrays, but give slices as arrays do, and one by ``numpy.asarray``.
+    """
 
     time: FloatArray
     """(n_samples,), s."""

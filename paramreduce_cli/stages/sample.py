@@ -213,8 +213,8 @@ def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str
     if log is None:
         raise DataError("there is no log.h5; make it with `paramreduce process-log`.")
     motions = log.training if name == "estimation" else log.held_out
-    tau = _measured(model, "the log", motions.tau)
-    found = LoggedSet(replace(motions, tau=tau), log, dynamics, f"{name} set")
+    measured = np.isfinite(model.nominal_torque)
+    found = LoggedSet(motions, log, dynamics, f"{name} set", measured)
     if found.n_samples == 0:
         raise ConfigError(
             f"leaves no sample for the {name} set: at {log.torque_cutoff:.3g} Hz the low-pass is longer than "

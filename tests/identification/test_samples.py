@@ -2,13 +2,16 @@ import numpy as np
 import pytest
 from simulated_logs import two_link_log
 
+from paramreduce_cli.artifacts import hdf5, layouts
+from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.identification import samples
 from paramreduce_cli.identification.processing import UNUSED, processed
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
-from paramreduce_cli.records import RawLog, RawLogs
+from paramreduce_cli.records import MeasuredLog, Model, RawLog, RawLogs
 
 
 @pytest.fixture(scope="module")
@@ -47,6 +50,30 @@ def test_torques_and_columns_pass_the_same_filter(arm):
     assert np.allclose(found["W"].reshape(rows.size, -1), W[rows], rtol=0, atol=1e-9)
     assert np.array_equal(fold, m.fold[rows])
     assert np.diff(found["time"]).min() == pytest.approx(1 / log.output_rate)
+
+
+def read(folder, record):
+    return load_file(Store(folder).path(record), record, None, "")[0]
+
+
+def test_motions_that_are_read_by_rows_are_those_in_memory(measured_results, monkeypatch):
+    """Whatever is read together, and wherever folds begin."""
+    folder = measured_results / "results"
+    log, model = (read(folder, kind) for kind in (MeasuredLog, Model))
+    monkeypatch.setattr(layouts, "_LARGE", 0)
+    monkeypatch.setattr(hdf5, "_STRETCH", 5000)
+    monkeypatch.setattr(samples, "_LOOKED_AT", 77)
+    stored = read(folder, MeasuredLog)
+    assert not isinstance(stored.training.z, np.ndarray)
+    assert np.array_equal(np.asarray(stored.held_out.tau), log.held_out.tau)
+    dynamics = Dynamics(model.mechanism)
+    for one, other in ((log.training, stored.training), (log.held_out, stored.held_out)):
+        sets = [LoggedSet(motions, log, dynamics, "x") for motions in (one, other)]
+        assert sets[0].n_samples == sets[1].n_samples > 50
+        assert np.array_equal(sets[0].factors(), sets[1].factors())
+        for a, b in zip(*(found.states() for found in sets), strict=True):
+            assert np.array_equal(a.tau, b.tau)
+            assert np.array_equal(a.ddz, b.ddz)
 
 
 @pytest.mark.parametrize("cutoff", ["none", 5])
