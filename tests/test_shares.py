@@ -1,15 +1,18 @@
 """Stages as several jobs: what they make is what one job makes, and what is missing is named."""
 
+from types import SimpleNamespace
+
 import h5py
 import numpy as np
 import pytest
 from conftest import ONE_FORMAT, TWO_LINK, config_of
 
 from paramreduce_cli.artifacts.store import Store
-from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.pipeline import pipeline, stages_to_run
-from paramreduce_cli.records import Reduction, Samples, Share, Trajectories
+from paramreduce_cli.records import Proofs, ProofStatus, Reduction, Samples, Share, Trajectories
 from paramreduce_cli.runner import Runner
+from paramreduce_cli.stages.reduce import _of_jobs
 
 STAGES = {stage.name: stage for stage in pipeline()}
 SHARED = ("optimize-trajectories", "sample", "reduce")
@@ -160,6 +163,27 @@ def test_proofs_of_subtrees_make_what_one_job_makes(two_link_results, tmp_path):
     runner.run(STAGES["reduce"])
     assert digest(tmp_path, "reduction.h5") == digest(two_link_results, "reduction.h5")
     assert not list(tmp_path.glob("*.parts"))
+
+
+def test_shares_of_a_proof_hold_together_alone():
+    """Parts of other last digits are left out where they are proofs of their own sizes, and missed else."""
+    factor = np.eye(3)
+    both = [shared_proofs(factor), shared_proofs(factor * (1 + 1e-16) + 1e-16)]
+    with pytest.raises(DataError, match=r"1 of the 2 parts are of samples .* other last digits"):
+        _of_jobs(factor, both)
+    assert len(_of_jobs(factor, [shared_proofs(factor), shared_proofs(factor)])) == 1
+    alone = [shared_proofs(found.factor, dealt=0) for found in both]
+    assert _of_jobs(factor, alone) == [alone[0].proofs]
+
+
+def shared_proofs(factor, dealt=5):
+    one = np.ones(1)
+    proofs = Proofs(
+        units=(np.arange(1),), n=np.array([1]), subsets=(np.arange(1),), torque_error=one,
+        lower_bound=one, status=(ProofStatus.OPTIMAL,), seconds=one, nodes=np.array([1]),
+        logs=(np.zeros(0, int),), dealt=np.array([dealt]),
+    )  # fmt: skip
+    return SimpleNamespace(factor=factor, proofs=proofs)
 
 
 @pytest.mark.parametrize(

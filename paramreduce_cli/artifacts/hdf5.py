@@ -304,7 +304,7 @@ class Reader:
 
 
 class StoredRows:
-    """A numeric dataset in a file, of which slices are read; an array of it is made where one is asked for.
+    """A numeric dataset in a file, of which forward slices are read; an array is made where one is asked for.
 
     Args:
         reader: Of the file.
@@ -323,6 +323,9 @@ class StoredRows:
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         start, stop, step = rows.indices(len(self))
+        stop = max(start, stop)
+        if step < 1:
+            raise ValueError("rows are read forwards")
         last = self._first + len(self._stretch)
         if not self._first <= start <= stop <= last:
             # Slices follow each other: the next ones are read with this one.

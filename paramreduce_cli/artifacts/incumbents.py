@@ -1,5 +1,6 @@
 """Best subsets that jobs which search for the same tell each other, through files in a folder of theirs."""
 
+import contextlib
 from collections.abc import Iterator, MutableMapping
 from pathlib import Path
 
@@ -51,7 +52,9 @@ class StoredIncumbents(MutableMapping[int, IntArray]):
             return None
 
     def __setitem__(self, size: int, subset: IntArray) -> None:
-        write(self._path(size), self._stamp, lambda writer: writer.dataset("subset", subset))
+        # Nothing is lost if it cannot be written but time of other jobs.
+        with contextlib.suppress(ArtifactError):
+            write(self._path(size), self._stamp, lambda writer: writer.dataset("subset", subset))
 
     def __delitem__(self, size: int) -> None:
         self._path(size).unlink()

@@ -238,7 +238,7 @@ class BestSubset(Section):
     time_limit: Annotated[Number, Field(ge=0)] = 60.0
     """For all sizes together, s; what is not proven then is reported with a lower bound, and the next run goes on."""
     node_limit: Count | None = None
-    """Nodes of the search tree for each size: ends at the same place on every machine."""
+    """Nodes of the search tree for each size: ends at the same place on every machine, but where jobs share subtrees."""
     parts: Literal["sizes", "subtrees"] = "sizes"
     """What `--part` deals among jobs: sizes, or the subtrees of every size, where few of them are hard."""
 

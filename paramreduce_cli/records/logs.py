@@ -37,7 +37,7 @@ class RawLogs:
 class MeasuredMotions:
     """Measured motions one after the other, evenly spaced in time within each piece.
 
-    Long ones in a file are no arrays, but give slices as arrays do, and one by ``numpy.asarray``.
+    Long ones in a file are no arrays, but give forward slices as arrays do, and one by ``numpy.asarray``.
     """
 
     time: FloatArray

@@ -87,10 +87,8 @@ def reduce(
         )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
-    before = [] if previous is None else [previous]
-    proven = _proofs_on(factor, before)
-    others = _proofs_on(factor, shares.found)
-    proven += [joined(others)] if others and reduction.best_subset.parts == "subtrees" else others
+    proven = _proofs_on(factor, [] if previous is None else [previous])
+    proven += _of_jobs(factor, shares.found)
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
@@ -112,6 +110,24 @@ def reduce(
 def _proofs_on(factor: FloatArray, found: Sequence[Reduction]) -> list[Proofs]:
     """Proofs that hold, as they are of the same data."""
     return [one.proofs for one in found if one.proofs and np.array_equal(one.factor, factor)]
+
+
+def _of_jobs(factor: FloatArray, found: Sequence[Reduction]) -> list[Proofs]:
+    """Proofs of several jobs; those of which each job has done a share hold together alone.
+
+    Raises:
+        DataError: Shares of one proof are of other numbers.
+    """
+    usable = _proofs_on(factor, found)
+    if not any(one.proofs is not None and one.proofs.dealt.any() for one in found):
+        return usable
+    if len(usable) < len(found):
+        raise DataError(
+            f"{len(found) - len(usable)} of the {len(found)} parts are of samples that were added up to other last "
+            "digits, as machines do that calculate differently. Make them again on machines of the kind of this one, or "
+            "do without them with --force."
+        )
+    return [joined(usable)]
 
 
 def _wanted(heuristics: Sequence[str], share: Share) -> Sequence[str]:

@@ -104,7 +104,8 @@ class Slurm:
         self.controller.wait()
         self.start_controller()
         self._wait()
-        self._attend()
+        with contextlib.suppress(subprocess.CalledProcessError):
+            self._attend()
 
     def _attend(self):
         """What an operator does after a controller was killed.
@@ -154,6 +155,8 @@ class Slurm:
             )  # fmt: skip
             if state.stdout.strip() in ("idle", "mix", "alloc"):
                 return
+            with contextlib.suppress(subprocess.CalledProcessError):  # it may not answer yet
+                self._attend()
             time.sleep(0.5)
         raise RuntimeError(f"Slurm does not come up; see {self.folder}")
 

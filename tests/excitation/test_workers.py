@@ -26,7 +26,7 @@ def test_finished_parts_are_not_made_again(optimise):
     made = optimise(first)
     del first.parts["estimation-0001"]
     kept = first.parts["estimation-0000"]
-    again = optimise(Run(2, first.parts, lambda p: seen.append((p.task, p.remark))))
+    again = optimise(Run(2, first.parts, progress=lambda p: seen.append((p.task, p.remark))))
     assert again.estimation[0] is kept
     assert np.array_equal(again.estimation[1].coefficients, made.estimation[1].coefficients)
     assert ("estimation-0000", "kept from before") in seen

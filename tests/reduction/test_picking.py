@@ -65,7 +65,7 @@ def test_of_equal_models_the_last_heuristics_is_taken():
 def test_what_is_proven_necessary():
     zero, bound = np.zeros(3, int), np.array([0.5, 0.1, 0.001])
     empty, status = (zero[:0],) * 3, ("optimal",) * 3
-    found = Proofs(np.array([1, 2, 4]), (), empty, bound, bound, status, zero, zero, empty)
+    found = Proofs(np.array([1, 2, 4]), (), empty, bound, bound, status, zero, zero, empty, zero)
     assert proven_necessary(found, 4, 0.05)
     assert not proven_necessary(found, 4, 0.2)
     assert proven_necessary(found, 3, 0.05)

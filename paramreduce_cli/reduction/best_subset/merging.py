@@ -5,8 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import Proofs, ProofStatus
+from paramreduce_cli.records import IntArray, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import together
+from paramreduce_cli.reduction.best_subset.search import BEGINNING
 
 
 def joined(shares: Sequence[Proofs]) -> Proofs:
@@ -19,11 +20,11 @@ def joined(shares: Sequence[Proofs]) -> Proofs:
         DataError: They were not dealt the same subtrees.
     """
     first = shares[0]
-    for number, one in enumerate(shares, 1):
-        if not (_alike(one, first) and np.array_equal(one.dealt, first.dealt)):
+    for row, n in enumerate(first.n.tolist()):
+        if not all(_alike(one, first) for one in shares) or len(_deals(shares, row)) > 1:
             raise DataError(
-                f"parts 1/{len(shares)} and {number}/{len(shares)} have split the search into other subtrees, as "
-                "machines do that calculate differently. Make both again on machines of one kind, or write "
+                f"the {len(shares)} parts have not split the search for {n} parameters into the same subtrees, as "
+                "machines do that calculate differently. Make all again on machines of one kind, or write "
                 "reduction.best_subset.parts: sizes."
             )
     best = np.argmin([one.torque_error for one in shares], axis=0)
@@ -37,9 +38,25 @@ def joined(shares: Sequence[Proofs]) -> Proofs:
         status=tuple(_of_all([one.status[row] for one in shares]) for row in range(first.n.size)),
         seconds=np.sum([one.seconds for one in shares], axis=0),
         nodes=np.sum([one.nodes for one in shares], axis=0),
-        logs=tuple(together([one.logs[row] for one in shares]) for row in range(first.n.size)),
+        logs=tuple(_where_all_stand(shares, row) for row in range(first.n.size)),
         dealt=np.zeros_like(first.n),
     )
+
+
+def _has_begun(one: Proofs, row: int) -> bool:
+    return one.status[row] is not ProofStatus.BEST_FOUND or one.logs[row].size > 0
+
+
+def _deals(shares: Sequence[Proofs], row: int) -> set[int]:
+    """What jobs that have begun were dealt the subtrees of."""
+    return {int(one.dealt[row]) for one in shares if _has_begun(one, row)}
+
+
+def _where_all_stand(shares: Sequence[Proofs], row: int) -> IntArray:
+    """Where all jobs have stopped; the beginning where some have not begun, as no log has their subtrees."""
+    if not all(_has_begun(one, row) for one in shares):
+        return BEGINNING
+    return together([one.logs[row] for one in shares])
 
 
 def _of_all(found: Sequence[ProofStatus]) -> ProofStatus:

@@ -13,8 +13,10 @@ from paramreduce_cli.reduction.best_subset.search import Search
 
 _NEXT = np.iinfo(np.int64).max
 """Stands between the logs of two parts."""
-_SUBTREES, _MOST_SUBTREES = 256, 16_384
+_SUBTREES, _MOST_SUBTREES = 256, 2048
 """Dealt to each job, for all to have as much to do, and to all jobs together."""
+_EASY = 2000
+"""Nodes of a search that every job does by itself."""
 _GLANCE = 1
 """Nodes after which a subtree is large enough to be split, or done."""
 
@@ -56,11 +58,16 @@ class PartedSearch:
         """Keep some of the subtrees that the search is split into, for other jobs to take the others.
 
         Those nearest to the root are split first, until there are many; what is done on the way is done
-        by every job. They are dealt like cards, those of the lowest bounds first.
+        by every job, and easy searches as a whole. They are dealt like cards, those of the lowest bounds first.
 
         Returns:
-            A digest of all subtrees: jobs with the same one have the same cards.
+            A digest of all subtrees: jobs with the same one have the same cards; 0 where there are none.
         """
+        (whole,) = self._open
+        whole.advance(_EASY)
+        if whole.finished:
+            self._ended, self._open = [whole], []
+            return 0
         many = min(_SUBTREES * share.count, _MOST_SUBTREES)
         number = count()  # older ones first where depths are equal
         heap = [(0, next(number), part) for part in self._open]

@@ -48,6 +48,8 @@ class _Proof:
     subset: IntArray
     """The best one of at most this size."""
     squared_error: float
+    start: tuple[float, IntArray]
+    """Error and subset that all jobs start from, whatever they have found since."""
     squared_bound: float = 0.0
     status: ProofStatus = ProofStatus.BEST_FOUND
     seconds: float = 0.0
@@ -95,7 +97,7 @@ class ProofSearch:
 
     def _start(self, subset: IntArray) -> None:
         error = self._squared_error(subset)
-        self._proofs[subset.size] = _Proof(subset.size, subset, subset, error)
+        self._proofs[subset.size] = _Proof(subset.size, subset, subset, error, (error, subset))
 
     def _remember(self, previous: Proofs) -> None:
         """Take over what an earlier run has found and proven on the same units."""
@@ -110,10 +112,12 @@ class ProofSearch:
             error = self._squared_error(subset)
             if error < proof.squared_error:
                 proof.take(subset, error)
+            if previous.dealt[k] and not self._by_subtrees:
+                continue  # of a share of the tree
             proof.squared_bound = float(previous.lower_bound[k]) ** 2
             proof.status, proof.log = previous.status[k], previous.logs[k]
             proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
-            proof.dealt = int(previous.dealt[k]) if self._by_subtrees else 0
+            proof.dealt = int(previous.dealt[k])
 
     def run(self) -> None:
         """Search until all is proven, or time or nodes run out, or the user has enough.
@@ -172,6 +176,8 @@ class ProofSearch:
         waiting = self._open()
 
         def work(proof: _Proof) -> None:
+            if stop.is_set() or time.monotonic() > deadline:
+                return  # to deal subtrees alone would take a while
             before = self._spent.get(proof.n, 0)
             search = self._search(proof)
             for nodes in self._slices(proof, search, budget - before, deadline, stop):
@@ -199,12 +205,16 @@ class ProofSearch:
         return 1 if effort.node_limit else max(1, effort.jobs // waiting)
 
     def _search(self, proof: _Proof, factor: float = 1.0) -> PartedSearch:
+        dealing = self._by_subtrees and not proof.log.size
+        known = proof.start if dealing else (proof.squared_error, proof.subset)
+
         def part(log: IntArray) -> Search:
-            return Search(self._problem, proof.n, proof.squared_error, proof.subset, factor, log)
+            return Search(self._problem, proof.n, *known, factor, log)
 
         search = PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
-        if self._by_subtrees and not proof.log.size:
+        if dealing:
             proof.dealt = search.deal(self._task.share)
+            search.learn(proof.squared_error, proof.subset)
         return search
 
     def _exchange(self, proof: _Proof, search: PartedSearch) -> None:
