@@ -128,7 +128,7 @@ class Runner:
             stamp = self.store.stamp(stage.output)
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
-        inputs = Inputs(self.config)
+        inputs = Inputs(self.config, self.progress)
         arguments = self._arguments(stage, inputs)
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
@@ -157,7 +157,7 @@ class Runner:
         stamp = self._stamp(stage, inputs, started)
         if not force and (self.is_current(stage) or shares.is_finished(share, stamp)):
             return Outcome(stage.name, path, True, 0.0)
-        inputs = Inputs(self.config)
+        inputs = Inputs(self.config, self.progress)
         arguments = self._arguments(stage, inputs)
         told = StoredIncumbents(shares.folder, stamp)
         self._lend_run(stage, arguments, inputs, incumbents=told)

@@ -11,14 +11,19 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
 from paramreduce_cli.errors import ConcernError
 from paramreduce_cli.pipeline import Stage, brought_files
-from paramreduce_cli.records import Coefficients, RawLogs, Recording, Recordings
+from paramreduce_cli.records import Coefficients, Progress, RawLogs, Recording, Recordings, Tell
 
 
 class Inputs:
-    """What one stage has read so far: files by their digests."""
+    """What one stage has read so far: files by their digests.
 
-    def __init__(self, config: Config | None) -> None:
-        self.config = config
+    Args:
+        config: Names the files.
+        tell: Told of long reading.
+    """
+
+    def __init__(self, config: Config | None, tell: Tell = lambda _: None) -> None:
+        self.config, self.tell = config, tell
         self.digests: dict[str, str] = {}
 
     def files(self, kind: type) -> dict[str, Path]:
@@ -42,7 +47,12 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
 
 
 def _logs(inputs: Inputs) -> RawLogs:
-    found = {name: load_log(path) for name, path in inputs.files(RawLogs).items()}
+    files = inputs.files(RawLogs)
+    found = {}
+    for k, (name, path) in enumerate(files.items()):
+        inputs.tell(Progress("read logs", k, len(files), path.name))
+        found[name] = load_log(path)
+    inputs.tell(Progress("read logs", len(files), len(files)))
     held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
     training = tuple(log for name, log in found.items() if name.startswith("training"))
     return RawLogs(training, held_out)

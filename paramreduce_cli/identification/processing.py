@@ -17,10 +17,12 @@ from paramreduce_cli.records import (
     IntArray,
     MeasuredLog,
     MeasuredMotions,
+    Progress,
     RawLog,
     RawLogs,
     ShownSignals,
     Spectra,
+    Tell,
 )
 
 UNUSED = -1
@@ -37,6 +39,8 @@ _FEWEST_USED = 20
 _MOST_SHOWN = 1500
 """Samples in figures."""
 _SAME_RATE = 0.01
+_WORK = ("clean", "spectra", "low-pass and differentiate", "look at them")
+"""What is told of."""
 
 
 @dataclass(frozen=True)
@@ -48,19 +52,27 @@ class _Cutoffs:
 _TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut off less."
 
 
-def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> MeasuredLog:
+def processed(
+    logs: RawLogs, wanted: LogSection, names: Sequence[str], tell: Tell = lambda _: None
+) -> MeasuredLog:
     """Make logs ready to identify from.
 
     Args:
         logs: As recorded.
         wanted: What is where, and what is to be done.
         names: Of the independent coordinates.
+        tell: Told how far it is.
 
     Raises:
         DataError: They cannot be used; the message names file, row and column.
         ConfigError: What is asked does not fit the robot.
     """
+
+    def begin(k: int) -> None:
+        tell(Progress("make logs ready", k, len(_WORK), _WORK[k] if k < len(_WORK) else ""))
+
     steps: list[str] = []
+    begin(0)
     training, rate = _read(logs.training, wanted, names, steps)
     held_out, other_rate = _read(logs.held_out, wanted, names, steps)
     if held_out and abs(other_rate - rate) > _SAME_RATE * rate:
@@ -76,6 +88,7 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
         learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
     _check_left(learned_from, logs, wanted)
     longest = max((p.signals for part in learned_from for p in part), key=lambda p: p.time.size)
+    begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
     thin = _thinning(wanted, cutoffs, rate)
@@ -85,12 +98,21 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
         return _motions([_ready(p, rate, cutoffs, thin) for part in parts for p in part], folds)
 
     steps.append(_said_of_states(longest, thin, rate / thin))
+    begin(2)
     learned, tested = ready(learned_from, wanted.folds), ready(tested_on, 1)
     _check_enough(learned, tested)
     steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
     noise = _noise(learned, cutoffs, rate / thin)
     used = learned.tau[learned.fold != UNUSED]
-    return MeasuredLog(
+    begin(3)
+    shown = _ready(Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals
+    suspected = (
+        text
+        for pieces in (*training, *held_out)
+        for piece in pieces
+        for text in doubts(piece, rate, names)
+    )
+    found = MeasuredLog(
         training=learned,
         held_out=tested,
         rate=rate / thin,
@@ -101,20 +123,13 @@ def processed(logs: RawLogs, wanted: LogSection, names: Sequence[str]) -> Measur
         delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
-        shown=_shown(
-            longest, _ready(Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals, rate
-        ),
+        shown=_shown(longest, shown, rate),
         spectra=spectra,
         steps=tuple(steps),
-        doubts=tuple(
-            dict.fromkeys(
-                text
-                for pieces in (*training, *held_out)
-                for piece in pieces
-                for text in doubts(piece, rate, names)
-            )
-        ),
+        doubts=tuple(dict.fromkeys(suspected)),
     )
+    begin(4)
+    return found
 
 
 def _read(

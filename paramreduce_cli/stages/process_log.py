@@ -5,10 +5,12 @@ import warnings
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.identification.processing import processed
-from paramreduce_cli.records import MeasuredLog, Model, RawLogs
+from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
 
 
-def process_log(log: LogSection | None, model: Model, logs: RawLogs) -> MeasuredLog:
+def process_log(
+    log: LogSection | None, model: Model, logs: RawLogs, tell: Tell = lambda _: None
+) -> MeasuredLog:
     """Make logs ready: clean, low-pass, differentiate, and split them.
 
     What was done to them, and what looks wrong in them, is part of the result.
@@ -18,7 +20,7 @@ def process_log(log: LogSection | None, model: Model, logs: RawLogs) -> Measured
             "is missing: it says where the logs are; `paramreduce init ROBOT.urdf --log FILE` writes it.",
             ("sampling", "log"),
         )
-    found = processed(logs, log, model.mechanism.coordinate_names)
+    found = processed(logs, log, model.mechanism.coordinate_names, tell)
     for text in found.doubts:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

@@ -31,6 +31,14 @@ def test_the_last_share_is_held_out_and_folds_are_equal_parts_in_time():
     assert np.ptp(sizes) <= 1
 
 
+def test_it_tells_how_far_it_is():
+    told = []
+    logs = RawLogs((RawLog("log.csv", two_link_log(), 2),), ())
+    processed(logs, LogSection(files=["log.csv"], columns=COLUMNS), NAMES, told.append)
+    assert [(p.done, p.total) for p in told] == [(k, 4) for k in range(5)]
+    assert all(p.remark for p in told[:-1])
+
+
 def test_nothing_is_learned_from_what_is_held_out():
     """Another end of the log changes nothing in what is learned from, cut-offs included."""
     one, two = two_link_log(), two_link_log()
