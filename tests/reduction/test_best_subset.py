@@ -143,7 +143,7 @@ def test_a_split_search_leaves_nothing_out():
         assert all(part.split() is None for part in parts)
 
 
-@pytest.mark.parametrize("many", [1, 4, 1000])
+@pytest.mark.parametrize("many", [1, 4, 100])
 def test_subtrees_dealt_to_jobs_leave_nothing_out(monkeypatch, many):
     """Each job searches its own alone; one of them finds the best, and none does the work of all."""
     monkeypatch.setattr(parts, "_SUBTREES", many)
@@ -234,7 +234,9 @@ def test_a_job_that_knows_more_is_dealt_the_same(monkeypatch):
     assert np.count_nonzero(dealt[0]) > 5
 
 
-def test_jobs_that_split_differently_are_not_put_together():
+def test_jobs_that_split_differently_are_not_put_together(monkeypatch):
+    monkeypatch.setattr(parts, "_SUBTREES", 4)
+    monkeypatch.setattr(parts, "_EASY", 1)
     shares = list(shares_of(hard_problem(), 2))
     other = dataclasses.replace(shares[1], dealt=shares[1].dealt + 1)
     with pytest.raises(DataError, match=r"the 2 parts have not split .*subset\.parts: sizes"):

@@ -175,6 +175,7 @@ class Search:
             basis=np.zeros((n, chi.size)),
             best=np.array([squared_error]),
             subset=found,
+            spare=np.zeros(n),
         )
 
     def advance(self, nodes: int) -> None:
