@@ -24,10 +24,6 @@ from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Leve
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits, Trajectory
 
-_ENOUGH = 25
-"""Points for every harmonic that all levels but the last get by with: on six legs with two harmonics kappa is then as
-good as with twice as many."""
-
 
 @dataclass(frozen=True)
 class Step:
@@ -110,14 +106,7 @@ class Settings:
 
     def basis(self, finer: int = 1) -> FourierBasis:
         """The series on the grid, or on one so many times finer."""
-        return self._basis_on(finer * self.points)
-
-    def coarse_basis(self) -> FourierBasis:
-        """The series on a grid that is fine enough to find the way."""
-        return self._basis_on(min(self.points, _ENOUGH * self.harmonics))
-
-    def _basis_on(self, points: int) -> FourierBasis:
-        times = sample_times(self.period, points)
+        times = sample_times(self.period, finer * self.points)
         return fourier_basis(self.period, self.harmonics, times)
 
 
@@ -190,8 +179,10 @@ class _Search:
 
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings
-        self._basis, self._coarse_basis = settings.basis(), settings.coarse_basis()
-        self._limits, self._coarse_limits = self._map(self._basis), self._map(self._coarse_basis)
+        self._basis = settings.basis()
+        self._limits = LimitMap(
+            settings.limits, self._basis, settings.mapping, rest_to_rest=settings.rest_to_rest
+        )
         mechanism = excitation.coordinates.mechanism
         bounded = bool(excitation.quantities.constraints) or excitation.loads.limited
         self._bounded = bounded or mechanism.loops is not None
@@ -209,18 +200,12 @@ class _Search:
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
 
-    def _map(self, basis: FourierBasis) -> LimitMap:
-        settings = self._settings
-        return LimitMap(
-            settings.limits, basis, settings.mapping, rest_to_rest=settings.rest_to_rest
-        )
-
     def starts(self, seed: list[int]) -> list[_Candidate]:
         """Random series, each with what the first level's objective says of it."""
         result = []
         for start in range(self._settings.starts * self.plan.drawn):
             free = self._drawn(np.random.default_rng([*seed, start]))
-            value, _ = self._objective(self.plan.steps[0])(free.ravel())
+            value, _ = self._objective(self.plan.steps[0].level)(free.ravel())
             result.append(_Candidate(free, free, value if np.isfinite(value) else np.inf))
         return result
 
@@ -234,7 +219,7 @@ class _Search:
         free[:, 1:] /= limits.shares(self._mixing @ free).max()
         still = np.zeros_like(free)
         still[:, 0] = np.linalg.solve(self._mixing, limits.resting_offset(self._rest))
-        return feasible_start(free, still, self._objective(self.plan.steps[0]))
+        return feasible_start(free, still, self._objective(self.plan.steps[0].level))
 
     def kappa_start(self, candidate: _Candidate) -> float:
         """The condition number that a candidate began with."""
@@ -249,7 +234,7 @@ class _Search:
     def descend(self, candidate: _Candidate, step: Step) -> int:
         """Take a candidate through one step; the iterations it took."""
         end = minimise(
-            self._objective(step),
+            self._objective(step.level),
             candidate.free.ravel(),
             min(self._settings.max_iterations, step.most),
             candidate.curvature,
@@ -261,12 +246,11 @@ class _Search:
         candidate.status = end.status
         return end.iterations
 
-    def _objective(self, step: Step) -> FreeObjective:
+    def _objective(self, level: Level) -> FreeObjective:
         positions = Follower(self._excitation.coordinates)
-        basis, limits = self._coarse_basis, self._coarse_limits
-        if step is self.plan.steps[-1]:
-            basis, limits = self._basis, self._limits
-        return FreeObjective(self._excitation, basis, limits, step.level, positions, self._mixing)
+        return FreeObjective(
+            self._excitation, self._basis, self._limits, level, positions, self._mixing
+        )
 
     def result(self, candidate: _Candidate) -> FloatArray:
         """The candidate's series, exactly on its limits and inside its bounds."""

@@ -8,10 +8,9 @@ from conftest import config_and_model, slope
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.excitation.ipopt import LOOSE
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
-from paramreduce_cli.excitation.optimiser import Step, _Search, optimise_trajectory
+from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
@@ -34,7 +33,7 @@ def test_gradient_with_the_barrier_against_finite_differences(case):
     search = _Search(excitation, settings)
     (start,) = search.starts([3])
     assert search.kappa_start(start) < 1e5  # beyond, round-off in the Gram matrix shows
-    objective = search._objective(Step(Level(4, 80, 50, 0.1), 1.0, LOOSE))
+    objective = search._objective(Level(4, 80, 50, 0.1))
     x = start.free.ravel()
     value, gradient = objective(x)
     assert np.isfinite(value)

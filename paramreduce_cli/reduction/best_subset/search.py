@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import DEPENDENT, independent_columns
+from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.problem import SelectionProblem
 
@@ -22,11 +22,6 @@ RESOLUTION = 1e-9
 """Relative difference of squared errors that a proof does not resolve."""
 _UPDATES = 1e-14
 """Round-off of the square root of a bound, for every unit of the condition number."""
-_FEW_DEPENDENT = 8
-"""Columns that others explain, up to which those are branched on first: a parallel robot's searches
-take half the nodes (6 of 70), those of an arm several times as many (18 of 63)."""
-_PART = 1e-8
-"""Coefficient from which on a column is made of another."""
 BEGINNING: IntArray = np.zeros(0, np.int64)
 """The log of a search that has not begun."""
 _SLACK = 1e-12
@@ -90,24 +85,6 @@ def _nearest(X: FloatArray) -> float:
     return min(sine for sine in sines if sine > DEPENDENT)
 
 
-def _turns(problem: UnitProblem, subset: IntArray) -> IntArray:
-    """In which turn columns that depend on each other are branched on, the largest first.
-
-    The best subset known is completed to a basis. Those outside come first, the more columns of the
-    basis they are made of the earlier; the basis follows, the subset itself last.
-    """
-    X, n = problem.X, problem.X.shape[1]
-    if not 0 < n - problem.rank <= _FEW_DEPENDENT:
-        return np.zeros(0, np.int64)
-    taken = independent_columns(X, np.concatenate([subset, np.setdiff1d(np.arange(n), subset)]))
-    outside = np.setdiff1d(np.arange(n), taken)
-    made_of = np.abs(np.linalg.lstsq(X[:, taken], X[:, outside])[0]) > _PART
-    turn = np.zeros(n, np.int64)
-    turn[np.setdiff1d(taken, subset)] = 1
-    turn[outside] = 2 + made_of.sum(axis=0)
-    return turn
-
-
 class Search:
     """Branch and bound for the best subset of at most so many columns.
 
@@ -143,7 +120,6 @@ class Search:
             factor=factor * (1 - RESOLUTION),
             uncertainty=_UPDATES * problem.condition,
             slack=_SLACK,
-            turn=_turns(problem, subset),
         )
         self._state = self._root(problem, places, squared_error, subset)
         self.finished = False
