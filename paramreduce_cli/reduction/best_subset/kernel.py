@@ -553,9 +553,9 @@ def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
     n, row = sheet.shape[1], sheet.shape[0] - 2
     best, chosen = -1.0, numbers[FIRST]
     for j in range(numbers[FREE]):
-        own = sheet[j, j]
-        if own > GONE:
-            value = (sheet[row, j] * sheet[row + 1, j]) ** 2 / (own * sheet[n + j, j])
+        own, inverse = sheet[j, j], sheet[n + j, j]
+        if own > GONE and inverse > 0:  # round-off may leave none of it
+            value = (sheet[row, j] * sheet[row + 1, j]) ** 2 / (own * inverse)
             if value > best:
                 best, chosen = value, numbers[FIRST + j]
     return int(chosen)
