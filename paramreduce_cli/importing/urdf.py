@@ -141,7 +141,7 @@ class _Reader:
         for key, text in reversed(list(zip(("rx", "ry", "rz"), texts, strict=True))):
             angle = meant(text)
             if abs(angle - float(text)) > _SNAPPED:
-                self._remarks.append(f"{owner}: {key} {text} is taken for {angle:.10g}")
+                self._remarks.append(f"{owner}: {key} {text} is taken for {angle:.15g}")
             if angle:
                 steps.append((key, angle))
         return tuple(steps)
