@@ -1,6 +1,6 @@
 """The proof of one hard size dealt to eight jobs as subtrees: nodes of the longest job over an eighth of those of one job.
 
-Correlated random columns (neighbours by 0.9), sizes whose search takes a million nodes or so. Jobs start from what swaps
+Correlated random columns (neighbours by 0.9), sizes whose search takes hundreds of thousands of nodes. Jobs start from what swaps
 find, go on in turns, and tell each other what is better.
 """
 
@@ -14,7 +14,8 @@ from paramreduce_cli.reduction.task import SelectionTask, run
 from tests.selecting import problem
 
 JOBS, COLUMNS, CORRELATION = 8, 60, 0.9
-CASES = ((0, 16), (1, 16), (2, 17), (3, 16), (4, 17), (5, 18))
+CASES = ((0, 16), (1, 16), (2, 17), (3, 16), (5, 18))
+"""Seeds and sizes; no size of seed 4 takes more than 86,000 nodes, too few for eight shares."""
 _TURN = 2000
 """Nodes between two looks at what others have found."""
 
