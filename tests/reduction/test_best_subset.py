@@ -147,6 +147,7 @@ def test_a_split_search_leaves_nothing_out():
 def test_subtrees_dealt_to_jobs_leave_nothing_out(monkeypatch, many):
     """Each job searches its own alone; one of them finds the best, and none does the work of all."""
     monkeypatch.setattr(parts, "_SUBTREES", many)
+    monkeypatch.setattr(parts, "_MOST_SUBTREES", 200)
     monkeypatch.setattr(parts, "_EASY", 1)
     p = unit_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))

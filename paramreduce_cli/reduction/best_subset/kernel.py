@@ -12,8 +12,7 @@ kept over the free columns, both brought up to date in O(n^2) when one is includ
 The search goes depth first and stops after a number of nodes; its state is all in arrays, and
 the log repeats the way to where it stands.
 
-A node is three arrays, which are handed from function to function because Numba copies the
-counters of every array in a tuple:
+A node is three arrays:
 
 * ``sheet``, one free column a column: n rows of the Gram matrix, n of the inverse, the basis of
   the null space, then moments and solution;
