@@ -4,6 +4,9 @@ Many starts are drawn and the best of them kept; level by level the objective sh
 most promising go on, with IPOPT's stopping rules tightened at the end. The numbers were chosen by
 measurement, on serial arms for motions that only keep joint limits, on a parallel robot with six legs for those with bounds or loops.
 
+All levels but the last look at fewer points. A motion whose condition number is another one on all of
+them, because it went through a singularity between the few, begins anew on all.
+
 With loops, coordinates are mixed so that equal steps move the whole mechanism equally far:
 left to themselves, some combinations of slides of a parallel robot would turn its platform
 ten times as far as others, and neither random starts nor the solver would find their way.
@@ -23,6 +26,11 @@ from paramreduce_cli.excitation.limits import LimitMap, LimitMapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits, Trajectory
+
+_ENOUGH = 25
+"""Points for every harmonic that all levels but the last get by with."""
+_ASTRAY = 0.25
+"""Relative difference of the condition numbers on few and on all points beyond which a motion is not trusted."""
 
 
 @dataclass(frozen=True)
@@ -106,8 +114,21 @@ class Settings:
 
     def basis(self, finer: int = 1) -> FourierBasis:
         """The series on the grid, or on one so many times finer."""
-        times = sample_times(self.period, finer * self.points)
-        return fourier_basis(self.period, self.harmonics, times)
+        return self._basis_on(finer * self.points)
+
+    def coarse_basis(self) -> FourierBasis:
+        """The series on a grid that is fine enough to find the way."""
+        return self._basis_on(min(self.points, _ENOUGH * self.harmonics))
+
+    def _basis_on(self, points: int) -> FourierBasis:
+        return fourier_basis(self.period, self.harmonics, sample_times(self.period, points))
+
+
+@dataclass(frozen=True)
+class _Grid:
+    basis: FourierBasis
+    limits: LimitMap
+    """To series that keep the limits of the independent coordinates on it."""
 
 
 @dataclass
@@ -179,10 +200,16 @@ class _Search:
 
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings
-        self._basis = settings.basis()
-        self._limits = LimitMap(
-            settings.limits, self._basis, settings.mapping, rest_to_rest=settings.rest_to_rest
+        self._grid, self._coarse = (
+            _Grid(
+                basis,
+                LimitMap(
+                    settings.limits, basis, settings.mapping, rest_to_rest=settings.rest_to_rest
+                ),
+            )
+            for basis in (settings.basis(), settings.coarse_basis())
         )
+        self._limits = self._grid.limits
         mechanism = excitation.coordinates.mechanism
         bounded = bool(excitation.quantities.constraints) or excitation.loads.limited
         self._bounded = bounded or mechanism.loops is not None
@@ -205,7 +232,7 @@ class _Search:
         result = []
         for start in range(self._settings.starts * self.plan.drawn):
             free = self._drawn(np.random.default_rng([*seed, start]))
-            value, _ = self._objective(self.plan.steps[0].level)(free.ravel())
+            value, _ = self._objective(self._coarse, self.plan.steps[0].level)(free.ravel())
             result.append(_Candidate(free, free, value if np.isfinite(value) else np.inf))
         return result
 
@@ -219,7 +246,7 @@ class _Search:
         free[:, 1:] /= limits.shares(self._mixing @ free).max()
         still = np.zeros_like(free)
         still[:, 0] = np.linalg.solve(self._mixing, limits.resting_offset(self._rest))
-        return feasible_start(free, still, self._objective(self.plan.steps[0].level))
+        return feasible_start(free, still, self._objective(self._grid, self.plan.steps[0].level))
 
     def kappa_start(self, candidate: _Candidate) -> float:
         """The condition number that a candidate began with."""
@@ -232,9 +259,34 @@ class _Search:
             return np.inf
 
     def descend(self, candidate: _Candidate, step: Step) -> int:
-        """Take a candidate through one step; the iterations it took."""
+        """Take a candidate through one step, the last on all points; the iterations it took."""
+        if step is not self.plan.steps[-1]:
+            return self._descend(candidate, step, self._coarse)
+        iterations = 0
+        if self._astray(candidate):
+            candidate.free, candidate.curvature = candidate.start, None
+            for earlier in self.plan.steps[:-1]:
+                iterations += self._descend(candidate, earlier, self._grid)
+        return iterations + self._descend(candidate, step, self._grid)
+
+    def _astray(self, candidate: _Candidate) -> bool:
+        """Whether a candidate is not on all points what it is on few."""
+        few, many = self._coarse.basis, self._grid.basis
+        if many.time.size == few.time.size:
+            return False
+        level = self.plan.steps[-1].level
+        if not np.isfinite(self._objective(self._grid, level)(candidate.free.ravel())[0]):
+            return True
+        series, _ = self._limits.admissible(self._mixing @ candidate.free, level.limits)
+        try:
+            ratio = self._kappa_on(few, series) / self._kappa_on(many, series)
+        except DataError:  # closed on all points, but not on few, which may be others
+            return True
+        return not abs(ratio - 1) < _ASTRAY
+
+    def _descend(self, candidate: _Candidate, step: Step, grid: _Grid) -> int:
         end = minimise(
-            self._objective(step.level),
+            self._objective(grid, step.level),
             candidate.free.ravel(),
             min(self._settings.max_iterations, step.most),
             candidate.curvature,
@@ -246,10 +298,10 @@ class _Search:
         candidate.status = end.status
         return end.iterations
 
-    def _objective(self, level: Level) -> FreeObjective:
+    def _objective(self, grid: _Grid, level: Level) -> FreeObjective:
         positions = Follower(self._excitation.coordinates)
         return FreeObjective(
-            self._excitation, self._basis, self._limits, level, positions, self._mixing
+            self._excitation, grid.basis, grid.limits, level, positions, self._mixing
         )
 
     def result(self, candidate: _Candidate) -> FloatArray:
@@ -264,8 +316,13 @@ class _Search:
     def kappa(self, series: FloatArray) -> float:
         """The condition number that the settings ask for."""
         _, q = fine_positions(self._excitation, self._settings, series)
-        _, dz, ddz = self._basis.states(series)
+        _, dz, ddz = self._grid.basis.states(series)
         return self._excitation.condition_numbers(q[::FINER], dz, ddz)[self._settings.scaling]
+
+    def _kappa_on(self, basis: FourierBasis, series: FloatArray) -> float:
+        z, dz, ddz = basis.states(series)
+        q = self._excitation.coordinates.positions(z, None)
+        return self._excitation.condition_numbers(q, dz, ddz)[self._settings.scaling]
 
 
 def fine_positions(

@@ -45,15 +45,16 @@ class Dynamics:
         return None if self.mechanism.loops is None else Projection(self.mechanism)
 
     def _symbols(self, *names: str) -> list[ca.MX]:
-        return [ca.MX.sym(name, self.mechanism.n_q) for name in names]
+        """Of q, which is that of the loops, and of more of its size."""
+        q, *more = (ca.MX.sym(name, self.mechanism.n_q) for name in ("q", *names))
+        return [q if self._loop is None else self._loop.q, *more]
 
     @cached_property
     def _regressor(self) -> BatchFunction:
-        q, dq, ddq = states = self._symbols("q", "dq", "ddq")
-        K = tree_regressor(self.mechanism)(q, dq, ddq).T
-        if self._loop is not None:
-            K = self._loop.pulled(q, K)
-        return BatchFunction(states, [K.T], once=self._once)
+        states = self._symbols("dq", "ddq")
+        tree = tree_regressor(self.mechanism)
+        KT = tree(*states) if self._loop is None else self._loop.projected(tree, *states[1:])
+        return BatchFunction(states, [KT], once=self._once)
 
     def regressor(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         """Single-sample observation matrices K with tau = K phi [Atkeson1986].
@@ -118,21 +119,20 @@ class Dynamics:
     def _rates(self) -> BatchFunction:
         """R, row by row, and b of a mechanism with loops."""
         assert self._loop is not None
-        q, dq = states = self._symbols("q", "dq")
-        R, b = self._loop.whole_tangent(q), self._loop.whole_drift(q, dq)
-        return BatchFunction(states, [R.T, b], once=self._once)
+        q, dq = self._symbols("dq")
+        R, b = self._loop.whole_tangent, self._loop.whole_drift(dq)
+        return BatchFunction([q, dq], [R.T, b], once=self._once)
 
     def observation(self, columns: IntArray) -> ObservationFunction:
         """W of a set of columns along a trajectory, and its adjoint."""
         tree = tree_regressor(self.mechanism, columns.tolist())
         loop = self._loop
         if loop is None:
-            states = self._symbols("q", "dq", "ddq")
-            return ObservationFunction(states, tree(*states).T, lambda q_bar: q_bar)
-        q = loop.q
+            states = self._symbols("dq", "ddq")
+            return ObservationFunction(states, tree(*states), lambda q_bar: q_bar)
         dz, ddz = ca.MX.sym("dz", self.n_dof), ca.MX.sym("ddz", self.n_dof)
-        K = loop.pulled(q, tree(q, *loop.rates(q, dz, ddz)).T)
-        return ObservationFunction([q, dz, ddz], K, lambda q_bar: loop.pulled(q, q_bar))
+        KT = loop.projected(tree, *loop.rates(dz, ddz))
+        return ObservationFunction([loop.q, dz, ddz], KT, loop.pulled)
 
 
 class ObservationFunction:
@@ -140,15 +140,15 @@ class ObservationFunction:
 
     Args:
         states: Symbols of q, dz and ddz.
-        K: Columns of the regressor of one sample in them, (n_dof, n_columns).
+        KT: Columns of the regressor of one sample in them, transposed, (n_columns, n_dof).
         pulled: Takes a derivative by q to one by z.
     """
 
-    def __init__(self, states: list[ca.MX], K: ca.MX, pulled: Callable[[ca.MX], ca.MX]) -> None:
-        self.n_dof, self.n_columns = K.shape
-        self._forward = BatchFunction(states, [K.T])
+    def __init__(self, states: list[ca.MX], KT: ca.MX, pulled: Callable[[ca.MX], ca.MX]) -> None:
+        self.n_columns, self.n_dof = KT.shape
+        self._forward = BatchFunction(states, [KT])
         seed = ca.MX.sym("seed", self.n_columns, self.n_dof)
-        inner = ca.dot(seed, K.T)
+        inner = ca.dot(seed, KT)
         q_bar, dz_bar, ddz_bar = (ca.gradient(inner, state) for state in states)
         self._adjoint = BatchFunction([*states, ca.vec(seed)], [pulled(q_bar), dz_bar, ddz_bar])
 

@@ -55,7 +55,7 @@ class Quantities:
     def _jacobian(self) -> BatchFunction:
         q, loop = self._symbols[0], self._projection
         by_q = ca.jacobian(self._bounded, q)
-        by_z = by_q if loop is None else loop.pulled(q, by_q.T).T
+        by_z = by_q if loop is None else loop.pulled(by_q.T).T
         return BatchFunction([q], [by_z.T])
 
     @cached_property
@@ -68,12 +68,13 @@ class Quantities:
         q = ca.SX.sym("q", self.mechanism.n_q)
         joints = motions(self.mechanism, q)
         inner = ca.Function("measures", [q], [_measure(joints, q, c) for c in self.constraints])
-        symbol = ca.MX.sym("q", self.mechanism.n_q)
+        loop = self._projection
+        symbol = ca.MX.sym("q", self.mechanism.n_q) if loop is None else loop.q
         measures = inner.call([symbol])
         for k, constraint in enumerate(self.constraints):
             if constraint.kind == "singularity":
-                assert self._projection is not None
-                measures[k] = self._projection.distance(symbol)
+                assert loop is not None
+                measures[k] = loop.distance
         return symbol, measures
 
     @cached_property

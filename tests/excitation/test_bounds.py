@@ -33,7 +33,7 @@ def test_gradient_with_the_barrier_against_finite_differences(case):
     search = _Search(excitation, settings)
     (start,) = search.starts([3])
     assert search.kappa_start(start) < 1e5  # beyond, round-off in the Gram matrix shows
-    objective = search._objective(Level(4, 80, 50, 0.1))
+    objective = search._objective(search._grid, Level(4, 80, 50, 0.1))
     x = start.free.ravel()
     value, gradient = objective(x)
     assert np.isfinite(value)
@@ -41,6 +41,23 @@ def test_gradient_with_the_barrier_against_finite_differences(case):
     for direction in rng.normal(size=(3, x.size)):
         found = slope(lambda x: objective(x)[0], [x], direction, step=1e-5)
         assert found == pytest.approx(gradient @ direction, rel=1e-3, abs=1e-2)
+
+
+def test_a_motion_that_few_points_mistake_begins_anew_on_all(case):
+    excitation, settings, _ = case
+    search, all_points = (_Search(excitation, settings) for _ in range(2))
+    all_points._coarse = all_points._grid
+    (found,), (expected,) = search.starts([7]), all_points.starts([7])
+    first, *_, last = search.plan.steps
+    search.descend(found, first)
+    assert not search._astray(found)
+    few = dataclasses.replace(settings, points=2 * settings.harmonics + 1)
+    search._coarse = _Search(excitation, few)._grid
+    assert search._astray(found)
+    search.descend(found, last)
+    for step in all_points.plan.steps:
+        all_points.descend(expected, step)
+    assert found.free == pytest.approx(expected.free, rel=1e-9)
 
 
 def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):

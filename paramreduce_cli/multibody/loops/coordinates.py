@@ -61,27 +61,25 @@ class Coordinates:
     @cached_property
     def _newton(self) -> BatchFunction:
         loop = self._projection
-        gap = loop.equations(loop.q)
-        return self._compiled(gap, -loop.solve(loop.q, gap))
+        return self._compiled(loop.gap, -loop.solve(loop.gap))
 
     @cached_property
     def _tangent(self) -> BatchFunction:
-        return self._compiled(self._projection.tangent(self._projection.q).T)
+        return self._compiled(self._projection.tangent.T)
 
     @cached_property
     def _distance(self) -> BatchFunction:
-        return self._compiled(self._projection.distance(self._projection.q))
+        return self._compiled(self._projection.distance)
 
     @cached_property
     def _jacobian(self) -> BatchFunction:
-        return self._compiled(self._projection.dependent_jacobian(self._projection.q).T)
+        return self._compiled(ca.densify(self._projection.dependent_jacobian).T)
 
     @cached_property
     def _rates(self) -> BatchFunction:
-        q = self._projection.q
         dz, ddz = (ca.MX.sym(name, self.mechanism.n_dof) for name in ("dz", "ddz"))
-        outputs = list(self._projection.rates(q, dz, ddz))
-        return BatchFunction([q, dz, ddz], outputs, once=self._once)
+        outputs = list(self._projection.rates(dz, ddz))
+        return BatchFunction([self._projection.q, dz, ddz], outputs, once=self._once)
 
     def states(
         self, z: FloatArray, dz: FloatArray, ddz: FloatArray, start: FloatArray | None = None

@@ -10,6 +10,7 @@ The sum in delta_z has M_qq, and b its sign, by inserting ddq into d_q = M_qq dd
 the paper prints it without and with the other sign.
 """
 
+from functools import cached_property
 from typing import TypeVar
 
 import casadi as ca
@@ -25,9 +26,9 @@ _SOLVER = "qr"
 
 
 class Projection:
-    """The kinematics of loops as expressions of ``q`` that can be compiled and differentiated.
+    """The kinematics of loops as expressions of its symbol ``q`` that can be compiled and differentiated.
 
-    ``R`` and ``b`` are symbols for what the methods :meth:`tangent` and :meth:`drift` solve for:
+    ``R`` and ``b`` are symbols for what :attr:`tangent` and :meth:`drift` solve for:
     scalar expressions cannot hold a linear solver, expressions of matrices can.
 
     Args:
@@ -45,56 +46,88 @@ class Projection:
         equations = closure_equations(mechanism, q)
         jacobian = ca.jacobian(equations, q)
         gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
-        self.equations = ca.Function("closure", [q], [ca.cse(equations)])
-        """Phi by q, (n_equations,)."""
+        self._equations = ca.Function("closure", [q], [ca.cse(equations)])
         self._jacobian = ca.Function("closure_jacobian", [q], [ca.cse(jacobian)])
         self._gamma = ca.Function("closure_gamma", [q, dq], [ca.cse(gamma)])
 
-    def dependent_jacobian(self, q: ca.MX) -> ca.MX:
-        """Phi_d, (n_d, n_d)."""
-        return ca.densify(self._jacobian(q)[:, self._d])
+    @cached_property
+    def gap(self) -> ca.MX:
+        """Phi, (n_equations,)."""
+        return self._equations(self.q)
 
-    def solve(self, q: ca.MX, right: ca.MX) -> ca.MX:
+    @cached_property
+    def dependent_jacobian(self) -> ca.MX:
+        """Phi_d, (n_d, n_d); sparse."""
+        return self._whole_jacobian[:, self._d]
+
+    @cached_property
+    def _whole_jacobian(self) -> ca.MX:
+        return self._jacobian(self.q)
+
+    def solve(self, right: ca.MX) -> ca.MX:
         """Phi_d^-1 right."""
-        return ca.solve(self._jacobian(q)[:, self._d], right, _SOLVER)
+        return ca.solve(self.dependent_jacobian, right, _SOLVER)
 
-    def tangent(self, q: ca.MX) -> ca.MX:
-        """Derivative of the dependent coordinates by the independent ones, (n_d, n_dof)."""
-        return -self.solve(q, ca.densify(self._jacobian(q)[:, self._z]))
+    @cached_property
+    def tangent(self) -> ca.MX:
+        """Derivative of the dependent coordinates by the independent ones, (n_d, n_dof).
 
-    def whole_tangent(self, q: ca.MX) -> ca.MX:
+        One expression for all that is made of it: solvers are not found to be equal, and a second one would
+        be solved again, once more in every derivative.
+        """
+        return -self.solve(ca.densify(self._whole_jacobian[:, self._z]))
+
+    @property
+    def whole_tangent(self) -> ca.MX:
         """R, (n_q, n_dof)."""
-        return self._whole(self.tangent(q), ca.MX(ca.DM.eye(len(self._z))))
+        return self._whole(self.tangent, ca.MX(ca.DM.eye(len(self._z))))
 
-    def whole_drift(self, q: ca.MX, dq: ca.MX) -> ca.MX:
+    def whole_drift(self, dq: ca.MX) -> ca.MX:
         """Accelerations of all coordinates at ddz = 0, b, (n_q,)."""
-        return self._whole(self.drift(q, dq), ca.MX(len(self._z), 1))
+        return self._whole(self.drift(dq), ca.MX(len(self._z), 1))
 
-    def rates(self, q: ca.MX, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
+    def rates(self, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
         """Velocities dq and accelerations ddq, each (n_q,)."""
-        tangent = self.tangent(q)
-        dq = self._whole(tangent @ dz, dz)
-        return dq, self._whole(tangent @ ddz + self.drift(q, dq), ddz)
+        dq = self._whole(self.tangent @ dz, dz)
+        return dq, self._whole(self.tangent @ ddz + self.drift(dq), ddz)
 
-    def drift(self, q: ca.MX, dq: ca.MX) -> ca.MX:
+    def drift(self, dq: ca.MX) -> ca.MX:
         """Accelerations of the dependent coordinates at ddz = 0, Phi_d^-1 gamma, (n_d,)."""
-        return self.solve(q, self._gamma(q, dq))
+        return self.solve(self._gamma(self.q, dq))
 
-    def pulled(self, q: ca.MX, q_bar: ca.MX) -> ca.MX:
+    def pulled(self, q_bar: ca.MX) -> ca.MX:
         """R' q_bar: derivatives by all coordinates as ones by the independent ones, in columns."""
-        return q_bar[self._z, :] + self.tangent(q).T @ q_bar[self._d, :]
+        return q_bar[self._z, :] + self.tangent.T @ q_bar[self._d, :]
+
+    def projected(self, tree: ca.Function, dq: ca.MX, ddq: ca.MX) -> ca.MX:
+        """The transposed regressor in the independent coordinates, KT R, (n_parameters, n_dof).
+
+        Where the tree's is of scalars, so is the product: most of KT is zero, which derivatives of a product of
+        matrices do not use.
+
+        Args:
+            tree: The open tree's transposed regressor KT by q, dq and ddq, (n_parameters, n_q).
+            dq: Velocities of all coordinates, (n_q,).
+            ddq: Accelerations, same shape.
+        """
+        if not tree.is_a("SXFunction"):
+            return tree(self.q, dq, ddq) @ self.whole_tangent
+        states = [ca.SX.sym(name, self.q.numel()) for name in ("q", "dq", "ddq")]
+        product = ca.Function("projected", [*states, self.R_d], [tree(*states) @ self.R])
+        whole: ca.MX = product(self.q, dq, ddq, self.tangent)
+        return whole
 
     def _whole(self, dependent: Expression, independent: Expression) -> Expression:
         """Put dependent and independent rows where they belong among the generalised ones."""
         order = np.argsort([*self._d, *self._z]).tolist()
         return ca.vertcat(dependent, independent)[order, :]
 
-    def distance(self, q: ca.MX) -> ca.MX:
+    @property
+    def distance(self) -> ca.MX:
         """Distance to singularity n / (|Phi_q| |Phi_d^-1|) in Frobenius norms, n equations.
 
         0 where the dependent coordinates are not determined, 1 at best; smooth.
         """
-        jacobian = self._jacobian(q)
         n = len(self._d)
-        inverse = self.solve(q, ca.MX(ca.DM.eye(n)))
-        return n / ca.sqrt(ca.sumsqr(jacobian) * ca.sumsqr(inverse))
+        inverse = self.solve(ca.MX(ca.DM.eye(n)))
+        return n / ca.sqrt(ca.sumsqr(self._whole_jacobian) * ca.sumsqr(inverse))
