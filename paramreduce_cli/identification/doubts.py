@@ -1,6 +1,6 @@
 """What looks wrong in recorded motions, before any model is asked."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -20,6 +20,8 @@ _SATURATED = 20
 """Samples in a row at the largest torque that tell a limit."""
 _FASTEST = 2.0
 """Hz: motion compared when a recorded speed is held against the positions."""
+_PER_PERIOD = 20
+"""Samples of that."""
 
 
 def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
@@ -52,12 +54,17 @@ def _longest_run(flags: np.ndarray) -> int:
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
+def _slow(columns: Iterable[FloatArray], rate: float) -> FloatArray:
+    """What of signals is slow, at as many samples as that needs."""
+    taps, every = filters.low_pass(_FASTEST, rate), max(1, int(rate / (_PER_PERIOD * _FASTEST)))
+    return np.column_stack([filters.filtered(x[:, None], taps)[::every, 0] for x in columns])
+
+
 def _speeds_against_positions(
     z: FloatArray, dz: FloatArray, rate: float, names: Sequence[str]
 ) -> Iterator[str]:
-    taps = filters.low_pass(_FASTEST, rate)
-    slopes = filters.filtered(np.gradient(z, 1 / rate, axis=0), taps)
-    speeds = filters.filtered(dz, taps)
+    slopes = _slow((np.gradient(column, 1 / rate) for column in z.T), rate)
+    speeds = _slow(dz.T, rate)
     for j, name in enumerate(names):
         lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
         if not lengths[j] > 0:

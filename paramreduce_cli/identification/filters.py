@@ -51,18 +51,20 @@ def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
     """
     k = taps.size // 2
     if k == 0:
-        return x * taps[0]
-    longer = _continued(x, k)
-    result: FloatArray = signal.oaconvolve(longer, taps[:, None], mode="valid", axes=0)
+        return x
+    result = np.empty_like(x)
+    for column, out in zip(x.T, result.T, strict=True):  # one at a time: transforms are large
+        out[:] = signal.oaconvolve(_continued(column, k), taps, mode="valid")
     return result
 
 
 def _continued(x: FloatArray, k: int) -> FloatArray:
-    if x.shape[0] == 1:
-        return np.repeat(x, 2 * k + 1, axis=0)
+    """A column with k samples more at both ends."""
+    if x.size == 1:
+        return np.repeat(x, 2 * k + 1)
     while k > 0:  # in steps where the filter is longer than the signal
-        step = min(k, x.shape[0] - 1)
-        x = np.vstack([2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]])
+        step = min(k, x.size - 1)
+        x = np.concatenate([2 * x[0] - x[step:0:-1], x, 2 * x[-1] - x[-2 : -step - 2 : -1]])
         k -= step
     return x
 
@@ -97,11 +99,14 @@ def thinned_low_pass(
 def spectrum(x: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
     """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Welch1967]."""
     length = max(min(64, x.shape[0]), x.shape[0] // _SEGMENTS)
-    frequency, density = signal.welch(
-        x, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,
-        detrend="linear", axis=0,
-    )  # fmt: skip
-    return frequency, density
+    densities = []
+    for column in x.T:  # one at a time: segments overlap, and are all there at once
+        frequency, density = signal.welch(
+            column, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,
+            detrend="linear",
+        )  # fmt: skip
+        densities.append(density)
+    return frequency, np.column_stack(densities)
 
 
 def band_of_motion(frequency: FloatArray, density: FloatArray) -> float:

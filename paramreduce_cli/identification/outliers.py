@@ -27,10 +27,10 @@ def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
     count = 0
     cleaned = []
     for piece in pieces:
-        changed = {}
+        changed: dict[str, FloatArray] = {}
         for key in ("z", "tau"):
-            values = getattr(piece, key).copy()
-            for column in values.T:
+            values = getattr(piece, key)
+            for j, column in enumerate(values.T):
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
                 sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
@@ -38,8 +38,8 @@ def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
                 if far.any():
                     count += int(far.sum())
                     good = np.flatnonzero(~far)
-                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
-            changed[key] = values
+                    values = changed.setdefault(key, values.copy())
+                    values[far, j] = np.interp(np.flatnonzero(far), good, column[good])
         cleaned.append(replace(piece, **changed))
     return cleaned, count
 

@@ -87,25 +87,28 @@ def processed(
         halves = [split(moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
         learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
     _check_left(learned_from, logs, wanted)
-    longest = max((p.signals for part in learned_from for p in part), key=lambda p: p.time.size)
+    raw = [piece for part in learned_from for piece in part]
+    shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
+    longest = raw[shown].signals
     begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
     thin = _thinning(wanted, cutoffs, rate)
 
-    def ready(parts: list[list[Piece]], folds: int) -> MeasuredMotions:
-        """Nothing of one part is in the other: they are low-passed apart."""
-        return _motions([_ready(p, rate, cutoffs, thin) for part in parts for p in part], folds)
+    def ready(pieces: list[Piece]) -> list[Piece]:
+        """Nothing of one piece is in another: they are low-passed apart."""
+        return [_ready(piece, rate, cutoffs, thin) for piece in pieces]
 
     steps.append(_said_of_states(longest, thin, rate / thin))
     begin(2)
-    learned, tested = ready(learned_from, wanted.folds), ready(tested_on, 1)
+    made = ready(raw)
+    learned = _motions(made, wanted.folds)
+    tested = _motions(ready([piece for part in tested_on for piece in part]), 1)
     _check_enough(learned, tested)
     steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
     noise = _noise(learned, cutoffs, rate / thin)
     used = learned.tau[learned.fold != UNUSED]
     begin(3)
-    shown = _ready(Piece(longest, -np.inf, np.inf), rate, cutoffs, thin).signals
     suspected = (
         text
         for pieces in (*training, *held_out)
@@ -123,7 +126,7 @@ def processed(
         delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
-        shown=_shown(longest, shown, rate),
+        shown=_shown(longest, made[shown].signals, rate),
         spectra=spectra,
         steps=tuple(steps),
         doubts=tuple(dict.fromkeys(suspected)),
@@ -241,17 +244,29 @@ def _check_left(parts: list[list[Piece]], logs: RawLogs, wanted: LogSection) -> 
 
 
 def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
-    """Low-passed, differentiated, thinned."""
+    """Low-passed, differentiated, thinned; joint by joint, as whole signals may be gigabytes."""
     s = piece.signals
-    taps = filters.low_pass(cutoffs.state, rate)
-    z = filters.filtered(s.z, taps)
-    dz = filters.derivative(z, rate) if s.dz is None else filters.filtered(s.dz, taps)
-    ddz = filters.derivative(dz, rate) if s.ddz is None else filters.filtered(s.ddz, taps)
-    tau = s.tau
+    state = filters.low_pass(cutoffs.state, rate)
+    torque = np.ones(1)
     if thin > 1 and np.isfinite(cutoffs.torque):
-        tau = filters.filtered(tau, filters.low_pass(_ANTI_ALIAS * rate / thin, rate))
-    made = Signals(s.time, z, dz, ddz, tau).part(slice(None, None, thin))
-    return Piece(made, piece.first, piece.last)
+        torque = filters.low_pass(_ANTI_ALIAS * rate / thin, rate)
+    time = s.time[::thin]
+    z, dz, ddz, tau = (np.empty((time.size, s.z.shape[1])) for _ in range(4))
+    for j in range(s.z.shape[1]):
+        made = _joint_ready(s.joint(j), rate, state, torque)
+        for whole, values in zip((z, dz, ddz, tau), made, strict=True):
+            whole[:, j] = values[::thin, 0]
+    return Piece(Signals(time, z, dz, ddz, tau), piece.first, piece.last)
+
+
+def _joint_ready(
+    s: Signals, rate: float, state: FloatArray, torque: FloatArray
+) -> tuple[FloatArray, ...]:
+    """z, dz, ddz and tau of one joint, (n_samples, 1) each, through the filters of states and torques."""
+    z = filters.filtered(s.z, state)
+    dz = filters.derivative(z, rate) if s.dz is None else filters.filtered(s.dz, state)
+    ddz = filters.derivative(dz, rate) if s.ddz is None else filters.filtered(s.ddz, state)
+    return z, dz, ddz, filters.filtered(s.tau, torque)
 
 
 def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
@@ -268,10 +283,9 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
         fold[piece.used] = (before + np.arange(size)) * folds // max(1, total)
         before += size
         fold_of.append(fold)
-    joined = {
-        key: np.concatenate([getattr(p.signals, key) for p in pieces])
-        for key in ("time", "z", "dz", "ddz", "tau")
-    }
+    keys = ("time", "z", "dz", "ddz", "tau")
+    parts = {key: [getattr(p.signals, key) for p in pieces] for key in keys}
+    joined = {k: part[0] if len(part) == 1 else np.concatenate(part) for k, part in parts.items()}
     number = np.repeat(np.arange(len(pieces)), [p.signals.time.size for p in pieces])
     return MeasuredMotions(**joined, piece=number, fold=np.concatenate(fold_of))
 

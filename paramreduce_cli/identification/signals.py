@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.interpolate import CubicSpline
@@ -48,6 +48,12 @@ class Signals:
         ddz = None if self.ddz is None else self.ddz[rows]
         return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows])
 
+    def joint(self, j: int) -> "Signals":
+        """Of one joint, (n_samples, 1) each."""
+        dz = None if self.dz is None else self.dz[:, j : j + 1]
+        ddz = None if self.ddz is None else self.ddz[:, j : j + 1]
+        return Signals(self.time, self.z[:, j : j + 1], dz, ddz, self.tau[:, j : j + 1])
+
 
 def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
     """The signals of a file, row by row.
@@ -63,29 +69,36 @@ def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
     """
     columns, units = wanted.columns, wanted.units
     time = _column(log, columns.time) * TIMES[units.time]
-    position = (
-        _matrix(log, columns.position, names, "position", columns.time) * ANGLES[units.position]
-    )
-    tau = _matrix(log, columns.torque, names, "torque", columns.time) * TORQUES[units.torque]
-    dz = ddz = None
-    if columns.velocity is not None:
-        dz = (
-            _matrix(log, columns.velocity, names, "velocity", columns.time) * SPEEDS[units.velocity]
-        )
-    if columns.acceleration is not None:
-        ddz = _matrix(log, columns.acceleration, names, "acceleration", columns.time)
-        ddz = ddz * ACCELERATIONS[units.acceleration]
+
+    def matrix(key: str, factor: float) -> FloatArray | None:
+        where = getattr(columns, key)
+        if where is None:
+            return None
+        values = _matrix(log, where, names, key, columns.time)
+        values *= factor
+        return values
+
+    position, velocity = ANGLES[units.position], SPEEDS[units.velocity]
+    z, dz = matrix("position", position), matrix("velocity", velocity)
+    ddz = matrix("acceleration", ACCELERATIONS[units.acceleration])
+    tau = matrix("torque", TORQUES[units.torque])
+    assert z is not None
+    assert tau is not None
     _check_time(log, columns.time, time)
-    return _of_joints(Signals(time, position, dz, ddz, tau), wanted, len(names))
+    return _of_joints(Signals(time, z, dz, ddz, tau), wanted, len(names))
 
 
 def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
-    """From motors to joints."""
+    """From motors to joints; in place, as they may be gigabytes."""
     sign = _each(wanted, "signs", n_dof)
-    tau = found.tau * sign * _each(wanted, "torque_signs", n_dof)
+    tau = found.tau
+    tau *= sign * _each(wanted, "torque_signs", n_dof)
     if wanted.torque_constants is not None:
-        tau = tau * _each(wanted, "torque_constants", n_dof)
-    motion = [None if a is None else a * sign for a in (found.z, found.dz, found.ddz)]
+        tau *= _each(wanted, "torque_constants", n_dof)
+    motion = [found.z, found.dz, found.ddz]
+    for values in motion:
+        if values is not None:
+            values *= sign
     try:
         gears = wanted.motor_per_joint(n_dof)
     except ValueError as error:
@@ -96,7 +109,8 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
         tau = tau @ gears
     z, dz, ddz = motion
     assert z is not None
-    return replace(found, z=z + _each(wanted, "offsets", n_dof), dz=dz, ddz=ddz, tau=tau)
+    z += _each(wanted, "offsets", n_dof)
+    return Signals(found.time, z, dz, ddz, tau)
 
 
 def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:

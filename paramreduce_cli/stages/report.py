@@ -24,6 +24,7 @@ from paramreduce_cli.records import (
     Report,
     Samples,
     Selected,
+    Speed,
     Tell,
     TermReduction,
     Tracking,
@@ -87,7 +88,7 @@ def report(
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
         animation=None if model is None else _animation(model, motion),
-        speed=speed(running, motion.z, motion.dz, motion.ddz) if running else None,
+        speed=_speed(model, running, motion),
         tracking=_tracking(section, model, running, motion),
         log=log,
         identification=identification,
@@ -129,8 +130,8 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
 
 
 def _running(model: Model | None, selected: Selected) -> dict[str, RunningModel]:
-    """The exported code of the full and of the selected model; none of closed loops, and none in doubt."""
-    if model is None or model.mechanism.loops is not None:
+    """The exported code of the full and of the selected model; none in doubt."""
+    if model is None:
         return {}
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
     try:
@@ -138,6 +139,21 @@ def _running(model: Model | None, selected: Selected) -> dict[str, RunningModel]
     except FormulationError as error:
         warnings.warn(f"nothing is timed: {error}", ParamreduceWarning, stacklevel=2)
         return {}
+
+
+def _speed(
+    model: Model | None, running: Mapping[str, RunningModel], motion: ShownMotion
+) -> Speed | None:
+    """Of the models on the states of a motion."""
+    if model is None or not running:
+        return None
+    mechanism = model.mechanism
+    if mechanism.loops is None:
+        return speed(running, (motion.z, motion.dz, motion.ddz))
+    coordinates = Coordinates(mechanism)
+    rates = coordinates.rates(motion.q, motion.dz, motion.ddz)
+    R = coordinates.tangent(motion.q)[:, list(mechanism.dependent)]
+    return speed(running, (motion.q, *rates, R))
 
 
 def _tracking(

@@ -20,7 +20,7 @@ _SHARE = 0.8
 class ControllerModel(Protocol):
     """Inverse dynamics as a controller has it."""
 
-    def __call__(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+    def __call__(self, q: FloatArray, dq: FloatArray, ddq: FloatArray, /) -> FloatArray:
         """Torques of some states, (n_states, n_dof)."""
 
 

@@ -1,0 +1,67 @@
+"""Proofs on random columns whose neighbours are correlated: which of n <= 20 of 80 are proven in a minute on all cores.
+
+`python -m tests.benchmarks.random_columns`; 240 rows, noise of 0.45 of the signal. How hard a draw is depends on how many
+columns have an effect: where they are more than n, many subsets are nearly as good as the best.
+"""
+
+import itertools
+import os
+import sys
+import time
+
+import numpy as np
+import rich.box
+import rich.console
+import rich.table
+
+from paramreduce_cli.records import ProofStatus
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.task import Effort, SelectionTask, run
+from tests.selecting import problem
+
+COLUMNS, ROWS, LARGEST, NOISE = 80, 240, 20, 0.45
+EFFECTS, CORRELATIONS, SEEDS = (10, 20, 40), (0.5, 0.9), (0, 1, 2)
+TIME_LIMIT = 60.0
+
+
+def drawn(effects, correlation, seed):
+    """Columns as of an autoregressive process of first order, and what some of them explain, with noise."""
+    rng = np.random.default_rng(seed)
+    W = rng.normal(size=(ROWS, COLUMNS))
+    for j in range(1, COLUMNS):
+        W[:, j] = correlation * W[:, j - 1] + np.sqrt(1 - correlation**2) * W[:, j]
+    signal = W[:, rng.choice(COLUMNS, effects, replace=False)] @ rng.normal(size=effects)
+    noise = rng.normal(size=ROWS)
+    return W, signal + NOISE * np.linalg.norm(signal) / np.linalg.norm(noise) * noise
+
+
+def main():
+    time_limit = float(sys.argv[1]) if len(sys.argv) > 1 else TIME_LIMIT
+    effort = Effort(time_limit=time_limit, jobs=os.cpu_count() or 1)
+    run(
+        "best-subset", SelectionTask(TorqueObjective(problem(*drawn(10, 0.5, 9))), largest=2)
+    )  # compile
+    headings = (
+        "with an effect",
+        "correlation",
+        "seed",
+        f"proven of {LARGEST}",
+        "s",
+        "largest gap of the rest, %",
+    )
+    table = rich.table.Table(*headings, box=rich.box.MARKDOWN)
+    for case in itertools.product(EFFECTS, CORRELATIONS, SEEDS):
+        objective = TorqueObjective(problem(*drawn(*case)))
+        started = time.perf_counter()
+        proofs = run("best-subset", SelectionTask(objective, largest=LARGEST, effort=effort)).proofs
+        seconds = time.perf_counter() - started
+        proven = np.array([status is ProofStatus.OPTIMAL for status in proofs.status])
+        gap = (1 - proofs.lower_bound / proofs.torque_error)[~proven].max(initial=0)
+        cells = [*map(str, case), str(proven.sum()), f"{seconds:.0f}", f"{100 * gap:.0f}"]
+        table.add_row(*cells)
+        print(cells, flush=True)
+    rich.console.Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()
