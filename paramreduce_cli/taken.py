@@ -1,6 +1,6 @@
 """What a stage takes that no other stage makes: files of the user's own, noted by their digests."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,15 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
 from paramreduce_cli.errors import ConcernError
 from paramreduce_cli.pipeline import Stage, brought_files
-from paramreduce_cli.records import Coefficients, Progress, RawLogs, Recording, Recordings, Tell
+from paramreduce_cli.records import (
+    Coefficients,
+    Progress,
+    RawLog,
+    RawLogs,
+    Recording,
+    Recordings,
+    Tell,
+)
 
 
 class Inputs:
@@ -46,15 +54,26 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
         raise explained(error) from error
 
 
+class _LogFiles:
+    """Logs that are read when they are gone through: each may take gigabytes."""
+
+    def __init__(self, paths: Sequence[Path], tell: Tell) -> None:
+        self._paths, self._tell = paths, tell
+
+    def __iter__(self) -> Iterator[RawLog]:
+        for k, path in enumerate(self._paths):
+            self._tell(Progress("read logs", k, len(self._paths), path.name))
+            log = load_log(path)
+            self._tell(Progress("read logs", k + 1, len(self._paths)))
+            yield log
+
+
 def _logs(inputs: Inputs) -> RawLogs:
     files = inputs.files(RawLogs)
-    found = {}
-    for k, (name, path) in enumerate(files.items()):
-        inputs.tell(Progress("read logs", k, len(files), path.name))
-        found[name] = load_log(path)
-    inputs.tell(Progress("read logs", len(files), len(files)))
-    held_out = tuple(log for name, log in found.items() if name.startswith("held out"))
-    training = tuple(log for name, log in found.items() if name.startswith("training"))
+    training, held_out = (
+        _LogFiles([path for name, path in files.items() if name.startswith(kind)], inputs.tell)
+        for kind in ("training", "held out")
+    )
     return RawLogs(training, held_out)
 
 

@@ -1,6 +1,7 @@
 """Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -73,23 +74,25 @@ def processed(
 
     steps: list[str] = []
     begin(0)
-    training, rate = _read(logs.training, wanted, names, steps)
-    held_out, other_rate = _read(logs.held_out, wanted, names, steps)
+    training, sources, rate = _read(logs.training, wanted, names, steps)
+    held_out, other_sources, other_rate = _read(logs.held_out, wanted, names, steps)
     if held_out and abs(other_rate - rate) > _SAME_RATE * rate:
         raise DataError(
-            f"{logs.held_out[0].source}: is recorded at {other_rate:.6g} Hz, {logs.training[0].source} at "
+            f"{other_sources[0]}: is recorded at {other_rate:.6g} Hz, {sources[0]} at "
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
+    recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
+    suspected = dict.fromkeys(text for piece in recorded for text in doubts(piece, rate, names))
     if held_out:
         learned_from = [moving(pieces, wanted) for pieces in training]
         tested_on = [moving(pieces, wanted) for pieces in held_out]
     else:
         halves = [split(moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
         learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
-    _check_left(learned_from, logs, wanted)
+    _check_left(learned_from, sources, wanted)
     raw = [piece for part in learned_from for piece in part]
     shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
-    longest = raw[shown].signals
+    longest, shown_raw = raw[shown].signals, _shown_raw(raw[shown].signals, rate)
     begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
@@ -106,15 +109,10 @@ def processed(
     tested = _motions(ready([piece for part in tested_on for piece in part]), 1)
     _check_enough(learned, tested)
     steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
-    noise = _noise(learned, cutoffs, rate / thin)
-    used = learned.tau[learned.fold != UNUSED]
     begin(3)
-    suspected = (
-        text
-        for pieces in (*training, *held_out)
-        for piece in pieces
-        for text in doubts(piece, rate, names)
-    )
+    noise = _noise(learned, cutoffs, rate / thin)
+    used = learned.fold != UNUSED
+    power = sum(float(np.mean(tau[used] ** 2)) for tau in learned.tau.T)
     found = MeasuredLog(
         training=learned,
         held_out=tested,
@@ -125,20 +123,22 @@ def processed(
         output_rate=_output_rate(wanted, cutoffs, rate / thin),
         delay=wanted.delay,
         noise=noise,
-        noise_share=float(np.sqrt(np.sum(noise**2) / np.mean(np.sum(used**2, axis=1)))),
-        shown=_shown(longest, made[shown].signals, rate),
+        noise_share=float(np.sqrt(np.sum(noise**2) / power)),
+        shown=ShownSignals(*shown_raw, *_shown(made[shown].signals)),
         spectra=spectra,
         steps=tuple(steps),
-        doubts=tuple(dict.fromkeys(suspected)),
+        doubts=tuple(suspected),
     )
     begin(4)
     return found
 
 
 def _read(
-    logs: Sequence[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
-) -> tuple[list[list[Signals]], float]:
+    logs: Iterable[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
+) -> tuple[list[list[Signals]], list[str], float]:
+    """Motions of each file, where they are from, and samples per second."""
     found = []
+    sources: list[str] = []
     rates: list[float] = []
     for log in logs:
         recorded = signals(log, wanted, names)
@@ -159,12 +159,13 @@ def _read(
                 )
         if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
             raise DataError(
-                f"{log.source}: is recorded at {rate:.6g} Hz, {logs[0].source} at {rates[0]:.6g} Hz. Bring "
+                f"{log.source}: is recorded at {rate:.6g} Hz, {sources[0]} at {rates[0]:.6g} Hz. Bring "
                 "logs of one rate."
             )
+        sources.append(log.source)
         rates.append(rate)
         found.append(pieces)
-    return found, rates[0] if rates else 0.0
+    return found, sources, rates[0] if rates else 0.0
 
 
 def _undelayed(found: Signals, delay: float) -> Signals:
@@ -234,11 +235,11 @@ def _output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
     return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
 
 
-def _check_left(parts: list[list[Piece]], logs: RawLogs, wanted: LogSection) -> None:
-    for part, log in zip(parts, logs.training, strict=True):
+def _check_left(parts: list[list[Piece]], sources: list[str], wanted: LogSection) -> None:
+    for part, source in zip(parts, sources, strict=True):
         if sum(p.used.stop - p.used.start for p in part) < _FEWEST_USED:
             raise DataError(
-                f"{log.source}: hardly any samples are left to learn from after sampling.log.trim "
+                f"{source}: hardly any samples are left to learn from after sampling.log.trim "
                 f"{wanted.trim} and standstill. Bring a longer log, or cut off less."
             )
 
@@ -250,6 +251,9 @@ def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
     torque = np.ones(1)
     if thin > 1 and np.isfinite(cutoffs.torque):
         torque = filters.low_pass(_ANTI_ALIAS * rate / thin, rate)
+    known = s.dz is not None and s.ddz is not None
+    if known and thin == state.size == torque.size == 1:
+        return piece
     time = s.time[::thin]
     z, dz, ddz, tau = (np.empty((time.size, s.z.shape[1])) for _ in range(4))
     for j in range(s.z.shape[1]):
@@ -324,20 +328,30 @@ def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArr
     """What of the torques lies above the band that a model is asked for."""
     cutoff = cutoffs.torque if np.isfinite(cutoffs.torque) else cutoffs.state
     taps = filters.low_pass(cutoff, rate)
-    left = []
-    for piece in np.unique(learned.piece).tolist():
-        rows = learned.piece == piece
-        tau = learned.tau[rows]
-        above = tau - filters.filtered(tau, taps)
-        left.append(above[learned.fold[rows] != UNUSED])
-    return np.std(np.concatenate(left), axis=0)
+    borders = np.searchsorted(learned.piece, np.arange(learned.piece[-1] + 2)).tolist()
+    used = learned.fold != UNUSED
+    noise = []
+    for tau in learned.tau.T:
+        above = np.concatenate(
+            [
+                tau[a:b] - filters.filtered(tau[a:b, None], taps)[:, 0]
+                for a, b in itertools.pairwise(borders)
+            ]
+        )
+        noise.append(np.std(above[used]))
+    return np.array(noise)
 
 
-def _shown(raw: Signals, ready: Signals, rate: float) -> ShownSignals:
-    one = slice(None, None, max(1, raw.time.size // _MOST_SHOWN))
-    two = slice(None, None, max(1, ready.time.size // _MOST_SHOWN))
+_Shown = tuple[FloatArray, FloatArray, FloatArray]
+"""Some times, speeds and torques, copied so that the rest may be forgotten."""
+
+
+def _shown_raw(raw: Signals, rate: float) -> _Shown:
+    some = slice(None, None, max(1, raw.time.size // _MOST_SHOWN))
+    return raw.time[some].copy(), _speeds(raw, rate)[some].copy(), raw.tau[some].copy()
+
+
+def _shown(ready: Signals) -> _Shown:
+    some = slice(None, None, max(1, ready.time.size // _MOST_SHOWN))
     assert ready.dz is not None
-    return ShownSignals(
-        raw.time[one], _speeds(raw, rate)[one], raw.tau[one],
-        ready.time[two], ready.dz[two], ready.tau[two],
-    )  # fmt: skip
+    return ready.time[some].copy(), ready.dz[some].copy(), ready.tau[some].copy()

@@ -1,6 +1,6 @@
 """Logs of a machine: columns as recorded, and the motions that are made of them."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,10 +27,13 @@ class RawLog:
 
 @dataclass(frozen=True)
 class RawLogs:
-    """What the user brought: files to train on, and files that are held out."""
+    """What the user brought: files to train on, and files that are held out.
 
-    training: tuple[RawLog, ...]
-    held_out: tuple[RawLog, ...]
+    Long ones are read when they are gone through, one at a time.
+    """
+
+    training: Iterable[RawLog]
+    held_out: Iterable[RawLog]
 
 
 @dataclass(frozen=True)
