@@ -18,6 +18,7 @@ from tests.cluster.sweeps import (
     different,
     killed_at_random,
     plain_runs,
+    rules,
     started_at_once,
     write_list,
 )
@@ -124,13 +125,15 @@ def on_slurm(folder, fresh, whole, expected, tell, table):
 
 
 def snakemake_on(slurm, fresh, expected, tell):
-    """Snakemake's jobs on this Slurm."""
+    """Snakemake's jobs on this Slurm: one for everything of a run, as its stages here take seconds."""
     listed, results = fresh("slurm")
     words = command(
         listed, "slurm", slurm_status_command="squeue", slurm_init_seconds_before_status_checks=5,
         latency_wait=20,
     )  # fmt: skip
-    words.insert(words.index("--quiet"), "--slurm-no-account")
+    groups = [f"{rule}=run" for rule in rules(listed) if rule not in ("all", "table")]
+    at = words.index("--quiet")
+    words[at:at] = ["--slurm-no-account", "--groups", *groups]
     with (listed.parent / "snakemake.log").open("w") as log:
         process = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
         slurm.kill_controller(after=45)
@@ -138,7 +141,11 @@ def snakemake_on(slurm, fresh, expected, tell):
     if process.returncode != 0:
         print((listed.parent / "snakemake.log").read_text()[-3000:])
         return 1
-    tell("Snakemake on a Slurm of one node, controller killed once", results, expected)
+    tell(
+        "Snakemake on a Slurm of one node, a job for each run, controller killed once",
+        results,
+        expected,
+    )
     return 0
 
 

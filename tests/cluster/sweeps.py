@@ -43,6 +43,13 @@ def command(listed, profile="local", **options):
     return [str(word) for word in [*words, "--quiet", "all", "--config", f"sweep={listed}"]]
 
 
+def rules(listed):
+    """Names of all rules for a list."""
+    words = [word for word in command(listed) if word not in ("--quiet", "all")]
+    found = subprocess.run([*words, "--list-rules"], check=True, capture_output=True, text=True)
+    return found.stdout.split()
+
+
 def plain_runs(folder, robots, seeds):
     """Digests of the same runs, each by one command, by run and file."""
     found = {}
