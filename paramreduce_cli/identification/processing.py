@@ -83,12 +83,7 @@ def processed(
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
     suspected = dict.fromkeys(text for piece in recorded for text in doubts(piece, rate, names))
-    if held_out:
-        learned_from = [moving(pieces, wanted) for pieces in training]
-        tested_on = [moving(pieces, wanted) for pieces in held_out]
-    else:
-        halves = [split(moving(pieces, wanted), 1 - wanted.held_out) for pieces in training]
-        learned_from, tested_on = [one for one, _ in halves], [two for _, two in halves]
+    learned_from, tested_on = _parts(training, held_out, wanted)
     _check_left(learned_from, sources, wanted)
     raw = [piece for part in learned_from for piece in part]
     shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
@@ -166,6 +161,17 @@ def _read(
         rates.append(rate)
         found.append(pieces)
     return found, sources, rates[0] if rates else 0.0
+
+
+def _parts(
+    training: list[list[Signals]], held_out: list[list[Signals]], wanted: LogSection
+) -> tuple[list[list[Piece]], list[list[Piece]]]:
+    """What is learned from and what is held out, by file."""
+    moved = [moving(pieces, wanted) for pieces in training]
+    if held_out:
+        return moved, [moving(pieces, wanted) for pieces in held_out]
+    halves = [split(pieces, 1 - wanted.held_out) for pieces in moved]
+    return [one for one, _ in halves], [two for _, two in halves]
 
 
 def _undelayed(found: Signals, delay: float) -> Signals:

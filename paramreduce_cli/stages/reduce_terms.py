@@ -1,10 +1,12 @@
 """reduce-terms: functions of reduced models with terms left out."""
 
+import warnings
+
 import numpy as np
 
 from paramreduce_cli.config.schema import SamplingSection
 from paramreduce_cli.config.terms import TermsSection
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
     CountedDynamics,
@@ -42,7 +44,8 @@ def reduce_terms(
     """Leave terms out of the functions of reduced models, and fit what is left.
 
     Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
-    within the budget on the validation set too, measured ones are held out.
+    within the budget on the validation set too, measured ones are held out. A function for which nothing
+    is found is left out, with a warning.
     """
     if section is None:
         raise ConfigError(
@@ -81,14 +84,27 @@ def reduce_terms(
         way = [one.refitted(fitted, budget) for one in front]
         records = (_record(one, judge, budget, way) for one in refitted)
         record = next((record for record in records if record is not None), None)
-        if record is None:
-            raise ConfigError(
-                f"nothing within it was found for the {name} dynamics. Allow more, or let reduction find "
-                "subsets that are better than that.",
-                ("terms", "torque_error"),
-            )
-        functions[name] = record
+        if record is not None:
+            functions[name] = record
+    _say_missing([name for name in section.functions if name not in functions], bool(functions))
     return TermReduction(budget.torque, budget.acceleration, functions)
+
+
+def _say_missing(names: list[str], others: bool) -> None:
+    """Of functions that stay as they are; what comes after goes on if there is another one.
+
+    Raises:
+        ConfigError: There is no other one.
+    """
+    if not names:
+        return
+    text = (
+        f"nothing within it was found for the {' and the '.join(names)} dynamics. Allow more, or let "
+        "reduction find subsets that are better than that."
+    )
+    if not others:
+        raise ConfigError(text, ("terms", "torque_error"))
+    warnings.warn(f"terms.torque_error: {text}", ParamreduceWarning, stacklevel=3)
 
 
 def _record(

@@ -10,6 +10,7 @@ from conftest import ONE_FORMAT, config_of
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.export.choice import simplified_model
 from paramreduce_cli.export.writing import Exported, export
 from paramreduce_cli.expressions.compiled import load
@@ -18,6 +19,7 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
 from paramreduce_cli.runner import Runner
+from paramreduce_cli.stages import reduce_terms
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
 STAGES = {stage.name: stage for stage in pipeline()}
@@ -98,6 +100,29 @@ def errors_by_definition(runner, name):
 
 def model_weights(runner):
     return loaded(runner, Reduction).nominal_torque
+
+
+def test_a_function_for_which_nothing_is_found_stops_no_run(tmp_path, monkeypatch):
+    record = reduce_terms._record
+
+    def none_for(*functions):
+        def found(one, judge, budget, way):
+            name = "direct" if judge.direct else "inverse"
+            return None if name in functions else record(one, judge, budget, way)
+
+        monkeypatch.setattr(reduce_terms, "_record", found)
+
+    none_for("direct")
+    with pytest.warns(ParamreduceWarning, match="nothing within it was found for the direct"):
+        runner = simplified(tmp_path, "two_link")
+    assert list(loaded(runner, TermReduction).functions) == ["inverse"]
+    for stage in stages_to_run(runner.config):
+        runner.run(stage)
+    summary = json.loads((tmp_path / "report" / "summary.json").read_text())
+    assert [term["function"] for term in summary["terms"]] == ["inverse"]
+    none_for("inverse", "direct")
+    with pytest.raises(ConfigError, match="the inverse and the direct dynamics"):
+        runner.run(STAGES["reduce-terms"], force=True)
 
 
 @pytest.mark.parametrize("name", ["inverse", "direct"])
