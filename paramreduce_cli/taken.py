@@ -55,23 +55,25 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
 
 
 class _LogFiles:
-    """Logs that are read when they are gone through: each may take gigabytes."""
+    """Logs that are read when they are gone through, and not kept: each may take gigabytes."""
 
-    def __init__(self, paths: Sequence[Path], tell: Tell) -> None:
-        self._paths, self._tell = paths, tell
+    def __init__(self, kind: str, paths: Sequence[Path], tell: Tell) -> None:
+        self._task, self._paths, self._tell = f"read {kind} logs", paths, tell
 
     def __iter__(self) -> Iterator[RawLog]:
         for k, path in enumerate(self._paths):
-            self._tell(Progress("read logs", k, len(self._paths), path.name))
-            log = load_log(path)
-            self._tell(Progress("read logs", k + 1, len(self._paths)))
-            yield log
+            self._tell(Progress(self._task, k, len(self._paths), path.name))
+            yield load_log(path)
+        if self._paths:
+            self._tell(Progress(self._task, len(self._paths), len(self._paths)))
 
 
 def _logs(inputs: Inputs) -> RawLogs:
     files = inputs.files(RawLogs)
     training, held_out = (
-        _LogFiles([path for name, path in files.items() if name.startswith(kind)], inputs.tell)
+        _LogFiles(
+            kind, [path for name, path in files.items() if name.startswith(kind)], inputs.tell
+        )
         for kind in ("training", "held out")
     )
     return RawLogs(training, held_out)

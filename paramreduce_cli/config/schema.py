@@ -61,7 +61,7 @@ class TrajectoriesSection(Section):
     period: Span = 2 * np.pi
     """s"""
     points: Annotated[Whole, Field(ge=4, le=10_000_000)] = 100
-    """Grid points over a period on which criterion and limits are evaluated."""
+    """Grid points over a period on which criterion and limits are evaluated; the search finds its way on 25 for every harmonic, if these are fewer."""
     position_limits: PairPerJoint
     """[lower, upper] for all joints, or a list of one pair per joint; rad (m if prismatic)."""
     velocity_limits: LimitPerJoint

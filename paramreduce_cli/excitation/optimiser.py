@@ -92,7 +92,7 @@ class Settings:
     """s"""
     harmonics: int
     points: int
-    """Of the grid on which the criterion and the limits are evaluated."""
+    """Of the grid on which the criterion and the limits are evaluated, at the last level if no earlier."""
     limits: JointLimits
     mapping: LimitMapping
     rest_to_rest: bool
@@ -118,7 +118,7 @@ class Settings:
 
     def coarse_basis(self) -> FourierBasis:
         """The series on a grid that is fine enough to find the way."""
-        return self._basis_on(min(self.points, _ENOUGH * self.harmonics))
+        return self._basis_on(_ENOUGH * self.harmonics)
 
     def _basis_on(self, points: int) -> FourierBasis:
         return fourier_basis(self.period, self.harmonics, sample_times(self.period, points))
@@ -200,15 +200,9 @@ class _Search:
 
     def __init__(self, excitation: Excitation, settings: Settings) -> None:
         self._excitation, self._settings = excitation, settings
-        self._grid, self._coarse = (
-            _Grid(
-                basis,
-                LimitMap(
-                    settings.limits, basis, settings.mapping, rest_to_rest=settings.rest_to_rest
-                ),
-            )
-            for basis in (settings.basis(), settings.coarse_basis())
-        )
+        self._grid = self._coarse = self._grid_of(settings.basis())
+        if settings.points > _ENOUGH * settings.harmonics:
+            self._coarse = self._grid_of(settings.coarse_basis())
         self._limits = self._grid.limits
         mechanism = excitation.coordinates.mechanism
         bounded = bool(excitation.quantities.constraints) or excitation.loads.limited
@@ -226,6 +220,13 @@ class _Search:
             R = excitation.coordinates.tangent(q)[0]
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
+
+    def _grid_of(self, basis: FourierBasis) -> _Grid:
+        settings = self._settings
+        limits = LimitMap(
+            settings.limits, basis, settings.mapping, rest_to_rest=settings.rest_to_rest
+        )
+        return _Grid(basis, limits)
 
     def starts(self, seed: list[int]) -> list[_Candidate]:
         """Random series, each with what the first level's objective says of it."""
@@ -271,9 +272,11 @@ class _Search:
 
     def _astray(self, candidate: _Candidate) -> bool:
         """Whether a candidate is not on all points what it is on few."""
-        few, many = self._coarse.basis, self._grid.basis
-        if many.time.size == few.time.size:
+        if self._coarse is self._grid:
             return False
+        if not np.isfinite(candidate.value):  # no way was found from where it began
+            return True
+        few, many = self._coarse.basis, self._grid.basis
         level = self.plan.steps[-1].level
         if not np.isfinite(self._objective(self._grid, level)(candidate.free.ravel())[0]):
             return True

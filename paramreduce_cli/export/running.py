@@ -8,6 +8,7 @@ import numpy as np
 
 from paramreduce_cli.export.writing import Exported, export, exported_functions
 from paramreduce_cli.expressions.compiled import load
+from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
 
 _ROUNDS, _TURNS = 20, 9
@@ -38,14 +39,16 @@ class RunningModel:
         stem = next(file[:-2] for file in files if file.endswith(".h"))
         header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
         text = header + source.replace(f'#include "{stem}.h"', "")
-        (self._function,) = exported_functions(model, chosen, Exported.IDM)
-        self._n_dof = model.mechanism.n_dof
-        states = ", ".join(
-            f"in[{i}] + k * {argument.size}"
-            for i, argument in enumerate(self._function.arguments[1:])
-        )
+        n_q, self._n_dof = model.mechanism.n_q, model.mechanism.n_dof
+        sizes = [n_q] * 3
+        if model.mechanism.loops is not None:
+            sizes.append((n_q - self._n_dof) * self._n_dof)
+        states = ", ".join(f"in[{i}] + k * {size}" for i, size in enumerate(sizes))
         loop = _LOOP.format(name=stem, states=states, n_dof=self._n_dof)
         self._library = load(text + loop)
+        self._function: Function | None = None
+        if self._library is None:
+            (self._function,) = exported_functions(model, chosen, Exported.IDM)
 
     @property
     def language(self) -> str:
@@ -61,10 +64,11 @@ class RunningModel:
         """
         count = len(states[0])
         arrays = [np.ascontiguousarray(x).reshape(count, -1) for x in states]
-        if self._library is None:
+        if self._function is not None:
             inputs = [np.broadcast_to(value, count) for value in self._phi]
             inputs += [column for array in arrays for column in array.T]
             return np.column_stack(self._function.program.evaluated(inputs))
+        assert self._library is not None
         tau = np.empty((count, self._n_dof))
         pointers = (ctypes.c_void_p * len(arrays))(*(x.ctypes.data for x in arrays))
         phi, result = (ctypes.c_void_p(x.ctypes.data) for x in (self._phi, tau))

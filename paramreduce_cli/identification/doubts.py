@@ -56,8 +56,12 @@ def _longest_run(flags: np.ndarray) -> int:
 
 def _slow(columns: Iterable[FloatArray], rate: float) -> FloatArray:
     """What of signals is slow, at as many samples as that needs."""
-    taps, every = filters.low_pass(_FASTEST, rate), max(1, int(rate / (_PER_PERIOD * _FASTEST)))
-    return np.column_stack([filters.filtered(x[:, None], taps)[::every, 0] for x in columns])
+    taps = filters.low_pass(_FASTEST, rate)
+    slow = []
+    for column in columns:
+        every = min(int(rate / (_PER_PERIOD * _FASTEST)), column.size // _PER_PERIOD)
+        slow.append(filters.filtered(column[:, None], taps)[:: max(1, every), 0].copy())
+    return np.column_stack(slow)
 
 
 def _speeds_against_positions(

@@ -41,7 +41,7 @@ def low_pass(cutoff: float, rate: float) -> FloatArray:
 
 
 def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
-    """The signal through a symmetric filter, as long as it was.
+    """The signal through a symmetric filter, as long as it was; the signal itself where that changes nothing.
 
     Beyond its ends it is continued by its point reflection, which keeps values and slopes.
 
@@ -52,7 +52,7 @@ def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
     k = taps.size // 2
     if k == 0:
         return x
-    result = np.empty_like(x)
+    result = np.empty(x.shape)
     for column, out in zip(x.T, result.T, strict=True):  # one at a time: transforms are large
         out[:] = signal.oaconvolve(_continued(column, k), taps, mode="valid")
     return result

@@ -38,8 +38,9 @@ def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
                 if far.any():
                     count += int(far.sum())
                     good = np.flatnonzero(~far)
-                    values = changed.setdefault(key, values.copy())
-                    values[far, j] = np.interp(np.flatnonzero(far), good, column[good])
+                    if key not in changed:
+                        changed[key] = values.copy()
+                    changed[key][far, j] = np.interp(np.flatnonzero(far), good, column[good])
         cleaned.append(replace(piece, **changed))
     return cleaned, count
 

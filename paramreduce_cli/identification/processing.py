@@ -136,15 +136,17 @@ def _read(
     sources: list[str] = []
     rates: list[float] = []
     for log in logs:
+        source = log.source
         recorded = signals(log, wanted, names)
+        del log  # the next one is read while this name would hold it
         if wanted.delay:
             recorded = _undelayed(recorded, wanted.delay)
         try:
             pieces, rate, said = evened(recorded)
         except DataError as error:
-            raise DataError(f"{log.source}: {error}") from error
+            raise DataError(f"{source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
-        steps.append(f"{log.source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
+        steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         if wanted.outliers == "replace":
             pieces, count = without_outliers(pieces)
@@ -154,10 +156,10 @@ def _read(
                 )
         if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
             raise DataError(
-                f"{log.source}: is recorded at {rate:.6g} Hz, {sources[0]} at {rates[0]:.6g} Hz. Bring "
+                f"{source}: is recorded at {rate:.6g} Hz, {sources[0]} at {rates[0]:.6g} Hz. Bring "
                 "logs of one rate."
             )
-        sources.append(log.source)
+        sources.append(source)
         rates.append(rate)
         found.append(pieces)
     return found, sources, rates[0] if rates else 0.0

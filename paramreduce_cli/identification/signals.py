@@ -150,7 +150,7 @@ def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str, times: s
                 f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; bring "
                 "signals that were recorded together."
             )
-    return np.column_stack(found)
+    return np.column_stack(found).astype(float, copy=False)
 
 
 def _column(log: RawLog, name: str) -> FloatArray:

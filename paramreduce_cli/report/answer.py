@@ -104,5 +104,5 @@ def _nanoseconds(data: ReportData) -> str:
         return ""
     full, reduced = (1e9 * seconds for seconds in data.speed.seconds.values())
     assert data.known_model is not None
-    given = "" if data.known_model.mechanism.loops is None else ", R handed in"
+    given = "" if data.known_model.mechanism.loops is None else ", of d_z with R handed in"
     return f"{reduced:.3g} ns instead of {full:.3g} ns in {data.speed.language}{given}"

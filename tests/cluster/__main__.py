@@ -125,7 +125,7 @@ def on_slurm(folder, fresh, whole, expected, tell, table):
 
 
 def snakemake_on(slurm, fresh, expected, tell):
-    """Snakemake's jobs on this Slurm: one for everything of a run, as its stages here take seconds."""
+    """Snakemake's jobs on this Slurm; of several runs one for everything of each, as stages here take seconds."""
     listed, results = fresh("slurm")
     words = command(
         listed, "slurm", slurm_status_command="squeue", slurm_init_seconds_before_status_checks=5,
@@ -133,7 +133,7 @@ def snakemake_on(slurm, fresh, expected, tell):
     )  # fmt: skip
     groups = [f"{rule}=run" for rule in rules(listed) if rule not in ("all", "table")]
     at = words.index("--quiet")
-    words[at:at] = ["--slurm-no-account", "--groups", *groups]
+    words[at:at] = ["--slurm-no-account", *(["--groups", *groups] if len(expected) > 1 else [])]
     with (listed.parent / "snakemake.log").open("w") as log:
         process = subprocess.Popen(words, env=slurm.environment, stdout=log, stderr=log)
         slurm.kill_controller(after=45)
@@ -141,11 +141,7 @@ def snakemake_on(slurm, fresh, expected, tell):
     if process.returncode != 0:
         print((listed.parent / "snakemake.log").read_text()[-3000:])
         return 1
-    tell(
-        "Snakemake on a Slurm of one node, a job for each run, controller killed once",
-        results,
-        expected,
-    )
+    tell("Snakemake on a Slurm of one node, controller killed once", results, expected)
     return 0
 
 

@@ -45,12 +45,14 @@ def test_gradient_with_the_barrier_against_finite_differences(case):
 
 def test_a_motion_that_few_points_mistake_begins_anew_on_all(case):
     excitation, settings, _ = case
+    settings = dataclasses.replace(settings, points=40 * settings.harmonics)
     search, all_points = (_Search(excitation, settings) for _ in range(2))
     all_points._coarse = all_points._grid
     (found,), (expected,) = search.starts([7]), all_points.starts([7])
     first, *_, last = search.plan.steps
     search.descend(found, first)
     assert not search._astray(found)
+    assert search._astray(dataclasses.replace(found, value=np.inf))
     few = dataclasses.replace(settings, points=2 * settings.harmonics + 1)
     search._coarse = _Search(excitation, few)._grid
     assert search._astray(found)

@@ -1,3 +1,5 @@
+import weakref
+
 import numpy as np
 import pytest
 from simulated_logs import two_link_log
@@ -51,6 +53,26 @@ def test_nothing_is_learned_from_what_is_held_out():
     for key in ("time", "z", "dz", "ddz", "tau", "fold"):
         assert np.array_equal(getattr(a.training, key), getattr(b.training, key))
     assert not np.array_equal(a.held_out.tau, b.held_out.tau)
+
+
+def test_files_are_read_one_at_a_time():
+    """What was read before is forgotten when the next one is opened."""
+    opened = []
+
+    class Files:
+        def __iter__(self):
+            for seed in range(3):
+                assert all(log() is None for log in opened)
+                log = RawLog(f"{seed}.csv", two_link_log(seed=seed), 2)
+                opened.append(weakref.ref(log))
+                yielded = [log]
+                del log
+                yield yielded.pop()
+
+    names = [f"{seed}.csv" for seed in range(3)]
+    found = processed(RawLogs(Files(), ()), LogSection(files=names, columns=COLUMNS), NAMES)
+    assert found.training.piece[-1] == 2
+    assert [any(name in step for step in found.steps) for name in names] == [True] * 3
 
 
 def test_held_out_files():

@@ -11,6 +11,7 @@ from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
 from paramreduce_cli.errors import ConcernError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.multibody import regressor
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.kinematics import body_poses
@@ -144,6 +145,25 @@ def test_a_point_mass_at_a_spherical_joint_may_belong_to_either_body():
                 null[names.index(f"{kind}_{name}")] += sign * value
         assert np.abs(null).max() >= 1
         assert np.abs(W @ null).max() < 1e-12
+
+
+def test_large_regressors_are_projected_as_matrices(monkeypatch):
+    """With the same results as those that are written out as scalars."""
+    mechanism, columns = closed("five_bar"), np.arange(3, 8)
+    q, dq, ddq = states_of(mechanism, 6)
+    states = [part[:, list(mechanism.independent)] for part in (dq, ddq)]
+    W_bar = np.random.default_rng(0).normal(size=(6 * mechanism.n_dof, 5))
+
+    def results():
+        dynamics = Dynamics(mechanism, once=True)
+        observation = dynamics.observation(columns)
+        W = observation.forward(q, *states)
+        return [dynamics.regressor(q, dq, ddq), W, *observation.adjoint(q, *states, W_bar)]
+
+    scalars = results()
+    monkeypatch.setattr(regressor, "_FLAT", -1)
+    for one, other in zip(scalars, results(), strict=True):
+        assert one == pytest.approx(other, rel=1e-10, abs=1e-10 * np.abs(other).max())
 
 
 @pytest.mark.parametrize("name", CLOSED_LOOPS)

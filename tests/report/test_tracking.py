@@ -99,6 +99,15 @@ def test_every_arms_page_says_how_long_its_model_takes(two_link_results):
     assert re.search(r"\d ns instead of [\d.e+]+ ns in (C|Python)", page)
 
 
+def test_pages_of_loops_say_what_is_timed(invoke, tmp_path):
+    few = ["trajectories.count=1", "trajectories.max_iterations=20", "report.formats=[svg]",
+           "reduction.heuristics=[forward-selection]", "validation.accept={}",
+           "validation.stability=false"]  # fmt: skip
+    invoke("run", CONFIGS / "four_bar.yaml", "--results", tmp_path, settings=few)
+    page = (tmp_path / "report" / "index.html").read_text()
+    assert re.search(r"\d ns instead of [\d.e+]+ ns in (C|Python), of d_z with R handed in", page)
+
+
 def test_a_model_in_doubt_is_not_timed(invoke, two_link_copy, monkeypatch):
     def doubted(*_):
         raise FormulationError("two formulations disagree")
