@@ -202,7 +202,7 @@ def progress_bars(quiet: bool, as_json: bool = False) -> Iterator[Callable[[Prog
 @contextmanager
 def _shown_progress(quiet: bool, as_json: bool) -> Iterator[Callable[[Progress], None]]:
     if as_json:
-        yield _Lines(1.0, lambda p, _: emit(event="progress", **vars(p))).show
+        yield _Lines(1.0, lambda p, left: emit(event="progress", **vars(p), left=left)).show
     elif quiet:
         yield lambda _: None
     elif not err.is_terminal or journal.verbose:
@@ -227,6 +227,10 @@ def _shown_progress(quiet: bool, as_json: bool) -> Iterator[Callable[[Progress],
             yield advance
 
 
+_FIRST_PAUSE = 2.0
+"""After which a task is told of for the first time, s."""
+
+
 class _Lines:
     """Progress as lines, not too often; the end of a task unless it was brief and says nothing.
 
@@ -244,7 +248,9 @@ class _Lines:
         """Tell of a step, if it is time."""
         now = time.monotonic()
         begun = self._begun.setdefault(p.task, now)
-        if p.done < p.total and now - self._told.get(p.task, begun) < self._pause:
+        told_before = p.task in self._told
+        pause = self._pause if told_before else min(self._pause, _FIRST_PAUSE)
+        if p.done < p.total and now - self._told.get(p.task, begun) < pause:
             return
         share = p.done / p.total if p.total else 1.0
         if p.done >= p.total:

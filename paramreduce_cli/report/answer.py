@@ -29,6 +29,8 @@ class Answer:
     parameters: tuple[ShownParameter, ...]
     worst_joint: str
     """The largest error of a joint's torque, in its unit; empty where nothing is known of units."""
+    functions: tuple[str, str]
+    """What operations are counted of."""
     nanoseconds: str
     """Of an evaluation, beside that of the full model; empty where it was not measured."""
     as_identified: bool
@@ -48,6 +50,7 @@ def answer(data: ReportData, asked: str) -> Answer:
     return Answer(
         parameters=_parameters(data, data.validation.selected.model),
         worst_joint=_worst_joint(data),
+        functions=data.functions,
         nanoseconds=_nanoseconds(data),
         as_identified=_as_identified(data),
         command=export if data.known_model is not None else f"{export} --format values",
@@ -95,8 +98,13 @@ def _worst_joint(data: ReportData) -> str:
     shares = np.where(np.isfinite(errors), errors / data.reduction.nominal_torque, -np.inf)
     j = int(shares.argmax())
     label = data.known_model.mechanism.coordinate_names[j]
-    whole = f"{rms[j]:.2g}" if rms[j] > _NO_TORQUE else "no"
+    whole = _two_digits(rms[j]) if rms[j] > _NO_TORQUE else "no"
     return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole} {data.force_unit(j)}"
+
+
+def _two_digits(value: float) -> str:
+    """Without an exponent, as for the rating of a motor."""
+    return np.format_float_positional(value, precision=2, fractional=False, trim="-")
 
 
 def _nanoseconds(data: ReportData) -> str:
@@ -104,5 +112,5 @@ def _nanoseconds(data: ReportData) -> str:
         return ""
     full, reduced = (1e9 * seconds for seconds in data.speed.seconds.values())
     assert data.known_model is not None
-    given = "" if data.known_model.mechanism.loops is None else ", of d_z with R handed in"
-    return f"{reduced:.3g} ns instead of {full:.3g} ns in {data.speed.language}{given}"
+    given = "" if data.known_model.mechanism.loops is None else "d_z with R handed in: "
+    return f"{given}{reduced:.3g} ns instead of {full:.3g} ns in {data.speed.language}"

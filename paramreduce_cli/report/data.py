@@ -7,6 +7,7 @@ import numpy as np
 
 from paramreduce_cli.records import (
     Block,
+    CountedDynamics,
     FloatArray,
     Identification,
     MeasuredLog,
@@ -58,6 +59,8 @@ class ReportData:
     validation: Validation
     weighting: str
     """Of the residuals in fits, as the config names it."""
+    counted: CountedDynamics
+    """Which functions of closed loops are counted."""
     simulated: bool
     """Whether the states of the samples are those of a simulation."""
     rms_torque: Mapping[str, FloatArray]
@@ -68,7 +71,7 @@ class ReportData:
     animation: Animation | None
     """Of the motion, where there is a mechanism."""
     speed: Speed | None
-    """Of the full and of the selected model; None of closed loops and without a robot."""
+    """Of the full and of the selected model; None without a robot."""
     tracking: Tracking | None
     """Where it was asked for."""
     log: MeasuredLog | None
@@ -98,6 +101,15 @@ class ReportData:
         mechanism = self.known_model.mechanism
         kind = mechanism.bodies[mechanism.independent[joint]].joint
         return "N m" if kind == "revolute" else "N"
+
+    @property
+    def functions(self) -> tuple[str, str]:
+        """What is counted: inverse and direct dynamics."""
+        if self.known_model is None or self.known_model.mechanism.loops is None:
+            return "d", "[M | δ]"
+        if self.counted is CountedDynamics.INDEPENDENT:
+            return "d_z", "[M_zz | δ_z]"
+        return "d_q", "[M_qq | δ_q]"
 
     @property
     def model(self) -> Model:

@@ -378,6 +378,8 @@
     }
   }, { rootMargin: "100px" });
   torqueCharts.forEach((chart) => watcher.observe(chart.place));
+  // On paper nothing is scrolled to.
+  addEventListener("beforeprint", () => torqueCharts.forEach((chart) => chart.show(modelOf(curves[state.curve], state.row))));
   followers.push((curve, row, model) => seen.forEach((chart) => chart.show(model)));
 
   // ---- the mechanism, moving
@@ -484,10 +486,19 @@
     canvas.addEventListener("pointerup", () => { view.drag = null; });
     canvas.addEventListener("pointermove", (event) => {
       if (!view.drag) return;
-      view.azimuth -= (event.clientX - view.drag[0]) * 0.01;
-      view.elevation = Math.min(1.5, Math.max(-1.5, view.elevation + (event.clientY - view.drag[1]) * 0.01));
+      turn((event.clientX - view.drag[0]) * 0.01, (event.clientY - view.drag[1]) * 0.01);
       view.drag = [event.clientX, event.clientY];
+    });
+    function turn(across, up) {
+      view.azimuth -= across;
+      view.elevation = Math.min(1.5, Math.max(-1.5, view.elevation + up));
       draw();
+    }
+    canvas.addEventListener("keydown", (event) => {
+      const way = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
+      if (!way) return;
+      event.preventDefault();
+      turn(...way);
     });
     new ResizeObserver(draw).observe(canvas);
     matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);

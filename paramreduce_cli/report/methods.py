@@ -5,7 +5,14 @@ from math import isfinite
 
 import numpy as np
 
-from paramreduce_cli.records import MeasuredLog, ProofStatus, SelectionMethod, Trajectories
+from paramreduce_cli.records import (
+    Identification,
+    MeasuredLog,
+    ProofStatus,
+    SelectionMethod,
+    TermReduction,
+    Trajectories,
+)
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.texts import share
 
@@ -54,6 +61,10 @@ def _sentences(data: ReportData) -> Iterator[str]:
     yield from _excitation(data)
     yield from _selection(data)
     yield from _result(data)
+    if data.terms is not None:
+        yield from _terms(data.terms)
+    if data.identification is not None:
+        yield from _identification(data.identification)
 
 
 def _model(data: ReportData) -> Iterator[str]:
@@ -159,10 +170,46 @@ def _result(data: ReportData) -> Iterator[str]:
     if data.known_model is not None:
         full = data.validation.full["operations_inverse"]
         reduced = result.operations_inverse[row]
-        loops = data.known_model.mechanism.loops is not None
         yield (
             f"Its inverse dynamics, recursive Newton-Euler equations [Luh1980] simplified symbolically, takes {reduced} "
-            f"operations instead of {full:.0f}{', the solution of the loops left out' if loops else ''}, parameters being inputs."
+            f"operations instead of {full:.0f}{_COUNTED[data.functions[0]]}, parameters being inputs."
+        )
+
+
+_COUNTED = {
+    "d": "",
+    "d_q": " for the open tree, the projection on the loops and their solution left out",
+    "d_z": ", the solution of the loops left out",
+}
+"""What is counted, by the function."""
+
+
+def _terms(found: TermReduction) -> Iterator[str]:
+    for name, term in found.functions.items():
+        yield (
+            f"Terms of the {name} dynamics that hardly matter were left out and the {term.values.size} parameters fitted again "
+            f"within a torque error of {share(found.torque_budget)}: {term.operations} operations instead of "
+            f"{term.operations_start}."
+        )
+
+
+_ESTIMATORS = {
+    "ordinary": "ordinary least squares",
+    "weighted": "least squares weighted by the noise of each joint",
+    "robust": "iteratively reweighted least squares",
+}
+
+
+def _identification(found: Identification) -> Iterator[str]:
+    yield (
+        f"Values were identified from the measured torques by {_ESTIMATORS[found.estimator]}, with standard deviations for "
+        f"noise as coloured as the residuals; {share(found.reduced.held_out)} of the torques held out stay unexplained, "
+        f"{share(found.full.held_out)} with all base parameters."
+    )
+    if found.consistency is not None:
+        yield (
+            "Standard parameters that a machine can have were found under constraints on the bodies' pseudo-inertia "
+            f"matrices and leave {share(found.consistency.held_out)}."
         )
 
 

@@ -24,6 +24,8 @@ class Skeleton:
     kinds: tuple[str, ...]
     closures: tuple[FloatArray, ...]
     """From one body's origin over the closure to the other's, for each loop, (n_points, 3), m."""
+    closure_bodies: tuple[tuple[int, ...], ...]
+    """Of which body each line along that is; :data:`BASE` for what is between two bodies."""
 
 
 def skeleton(model: Model, q: FloatArray) -> Skeleton:
@@ -34,6 +36,7 @@ def skeleton(model: Model, q: FloatArray) -> Skeleton:
         body.parent_to_joint if body.parent == BASE else poses[body.parent] @ body.parent_to_joint
         for body in mechanism.bodies
     ]
+    paths = list(_closure_paths(mechanism, poses))
     return Skeleton(
         z=q[list(mechanism.independent)],
         poses=poses,
@@ -41,7 +44,8 @@ def skeleton(model: Model, q: FloatArray) -> Skeleton:
         joints=np.array(joints),
         parents=tuple(body.parent for body in mechanism.bodies),
         kinds=tuple(_drawn_as(body) for body in mechanism.bodies),
-        closures=tuple(_closure_path(mechanism, poses)),
+        closures=tuple(points for points, _ in paths),
+        closure_bodies=tuple(bodies for _, bodies in paths),
     )
 
 
@@ -81,10 +85,10 @@ def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
         if body not in shown.parents and np.isfinite(shown.masses[body]).all():
             yield end, 1 + 2 * count + body, body, "mass"
     first = 1 + 3 * count
-    for path in shown.closures:
-        for k in range(first, first + len(path) - 1):
-            yield k, k + 1, -1, "loop"
-        first += len(path)
+    for bodies in shown.closure_bodies:
+        for k, body in enumerate(bodies, first):
+            yield k, k + 1, body, "loop"
+        first += len(bodies) + 1
 
 
 def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
@@ -103,15 +107,20 @@ def _drawn_as(body: Body) -> str:
     return "hidden" if body.intermediate and body.joint == "prismatic" else body.joint
 
 
-def _closure_path(mechanism: Mechanism, poses: FloatArray) -> Iterator[FloatArray]:
-    """From body to body by way of each closure; ends on the base are left out."""
+def _closure_paths(
+    mechanism: Mechanism, poses: FloatArray
+) -> Iterator[tuple[FloatArray, tuple[int, ...]]]:
+    """From body to body by way of each closure, and whose each line is; ends on the base are left out."""
     for closure in mechanism.loops.closures if mechanism.loops is not None else ():
         if closure.kind == "coupling":
             continue
         points: list[FloatArray] = []
+        bodies: list[int] = []
         for body, frame in zip(closure.bodies, closure.frames, strict=True):
             pose = np.eye(4) if body == BASE else poses[body]
             way = [pose[:3, 3], (pose @ frame)[:3, 3]]
             ends = way[1:] if body == BASE else way
+            own = [] if body == BASE else [body]
+            bodies += own if not points else [BASE, *own]
             points += ends if not points else ends[::-1]
-        yield np.array(points)
+        yield np.array(points), tuple(bodies)

@@ -14,6 +14,7 @@ from paramreduce_cli.export.writing import export
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
+    CountedDynamics,
     FloatArray,
     Identification,
     MeasuredLog,
@@ -51,6 +52,7 @@ def report(
     section: ReportSection,
     sampling: SamplingSection,
     search: ReductionSection,
+    counted: CountedDynamics,
     model: Model | None,
     trajectories: Trajectories | None,
     samples: Samples,
@@ -83,6 +85,7 @@ def report(
         reduction=reduction,
         validation=validation,
         weighting=search.weighting,
+        counted=counted,
         simulated=sampling.simulation is not None,
         rms_torque=_rms_torque(samples, reduction.nominal_torque),
         motion=motion,

@@ -15,15 +15,20 @@ from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.records import ModelChoice, Reduction, Validation
+from paramreduce_cli.records import Model, ModelChoice, Reduction, Validation
 
 if TYPE_CHECKING:
-    from paramreduce_cli.records import ReducedModel
+    from paramreduce_cli.records import FloatArray, ReducedModel
 
 
 @click.command()
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--model", "chosen", metavar="HEURISTIC:N", help="Show a model of a reduction.h5.")
+@click.option(
+    "--model",
+    "chosen",
+    metavar="HEURISTIC:N",
+    help="Show a model of a reduction.h5, or `selected`.",
+)
 @click.option("--relations", is_flag=True, help="And what its parameters stand for.")
 @JSON
 def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> None:
@@ -31,7 +36,10 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
 
     Example: paramreduce inspect results/puma560/reduction.h5 --model forward-selection:18
     """
-    if chosen is not None:
+    folder = file if file.is_dir() else file.parent
+    if chosen == "selected":
+        _say_model(*_selected(folder / "validation.h5"), relations, as_json)
+    elif chosen is not None:
         path = file / "reduction.h5" if file.is_dir() else file
         _say_model(*_chosen(path, chosen), relations, as_json)
     elif file.is_dir():
@@ -92,6 +100,13 @@ def _selected(file: Path) -> tuple[str, ReducedModel]:
     return f"{selected.reason} {validation.verdict}", selected.model
 
 
+def _known_values(file: Path) -> FloatArray | None:
+    """Standard parameters, by which relations are ordered; None without a model beside the reduction."""
+    from paramreduce_cli.artifacts.store import load_file  # these load all numerics
+
+    return load_file(file, Model, None, "build-model")[0].values if file.exists() else None
+
+
 def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
     """A model of a reduction, and what it is worth."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
@@ -103,7 +118,8 @@ def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
     if row is None:
         raise ConfigError(f"--model {chosen}: there is {known_choices(reduction)}.")
     found = reduction.heuristics[choice.heuristic]
-    model = reduced_model(reduction, choice.heuristic, row)
+    known = _known_values(file.parent / "model.h5")
+    model = reduced_model(reduction, choice.heuristic, row, known)
     flag = ", minimum-norm fit beyond the rank" if found.minimum_norm[row] else ""
     error = f"torque error {found.torque_error[row]:.6g}{flag}"
     return f"{choice.heuristic}, n = {model.n}, {error}", model
