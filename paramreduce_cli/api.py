@@ -32,6 +32,7 @@ from paramreduce_cli.records import (
     Progress,
     ReducedModel,
     Reduction,
+    Report,
     Run,
     Samples,
     TermReduction,
@@ -39,7 +40,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
-from paramreduce_cli.runner import Runner, asked
+from paramreduce_cli.runner import Runner, asked, provenance
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -62,6 +63,7 @@ __all__ = [
     "process_log",
     "reduce",
     "reduce_terms",
+    "report",
     "run",
     "sample",
     "validate",
@@ -180,6 +182,33 @@ def identify(
     return _made(Identification, config, model, samples, validation, log)
 
 
+def report(
+    samples: Samples,
+    reduction: Reduction,
+    validation: Validation,
+    config: Config | None = None,
+    model: Model | None = None,
+    *more: Trajectories | TermReduction | MeasuredLog | Identification,
+) -> Report:
+    """Make the page, figures, tables and the summary.
+
+    Args:
+        samples: Of both sets.
+        reduction: From :func:`reduce`.
+        validation: From :func:`validate`.
+        config: What is asked for in ``report``; the defaults if None.
+        model: Of the robot; without it sections of a mechanism are left out.
+        more: What else there is: trajectories, functions with terms left out, a log, what was identified.
+
+    Returns:
+        Files by their path, and the summary as a mapping.
+    """
+    wanted = config or Settings()
+    robot = "" if model is None else model.mechanism.robot
+    records = samples, reduction, validation, model, *more, provenance(wanted, robot, {}, "")
+    return _made(Report, wanted, *records)
+
+
 def chosen(
     reduction: Reduction, heuristic: str, n: int, model: Model | None = None
 ) -> ReducedModel:
@@ -208,6 +237,7 @@ def code(
     title: str = "",
     constant: bool = False,
     single: bool = False,
+    validation: Validation | None = None,
 ) -> dict[str, bytes]:
     """Files of a model in some language, checked against plain recursion.
 
@@ -215,16 +245,18 @@ def code(
         model: Of the robot.
         parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
         language: c, casadi, latex, matlab or python.
-        title: What the model is called in the files.
+        title: What the model is called in the files; how many parameters it has if empty.
         constant: Whether the values are part of the code.
         single: Whether numbers have single precision, in C.
+        validation: Says in which ranges errors were measured.
 
     Raises:
         ParamreduceError: The functions do not compute what the straightforward model does.
     """
     return export(
-        model, parameters, title=title, language=language, constant=constant, single=single
-    )
+        model, parameters, title=title or f"{parameters.n} parameters", language=language,
+        constant=constant, single=single, origin="from Python", validation=validation,
+    )  # fmt: skip
 
 
 def inverse_dynamics(

@@ -9,7 +9,7 @@ import importlib.metadata
 import json
 import shlex
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -39,6 +39,23 @@ from paramreduce_cli.records import (
     Trajectories,
 )
 from paramreduce_cli.taken import OUTSIDE, Inputs, called
+
+
+def provenance(
+    wanted: Config | Settings, robot: str, seconds: Mapping[str, float], asked: str
+) -> Provenance:
+    """Where results come from, whatever ran the stages.
+
+    Args:
+        wanted: What was asked for.
+        robot: Its name.
+        seconds: That stages took, by name.
+        asked: See :class:`Provenance`.
+    """
+    text = json.dumps(wanted.model_dump(mode="json"), sort_keys=True)
+    digest = hashlib.sha256(text.encode()).hexdigest()
+    changed = wanted.model_dump(mode="json", exclude_defaults=True)
+    return Provenance(robot, digest, versions(), seconds, asked, changed)
 
 
 @cache
@@ -369,8 +386,5 @@ class Runner:
             stamp = self.store.stamp(stage.output)
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
-        asked = self.config or self.settings or Settings()
-        text = json.dumps(asked.model_dump(mode="json"), sort_keys=True)
-        digest = hashlib.sha256(text.encode()).hexdigest()
-        changed = asked.model_dump(mode="json", exclude_defaults=True)
-        return Provenance(self._robot, digest, versions(), seconds, self.asked, changed)
+        wanted = self.config or self.settings or Settings()
+        return provenance(wanted, self._robot, seconds, self.asked)
