@@ -58,12 +58,12 @@ __all__ = [
     "identify",
     "inverse_dynamics",
     "load_config",
+    "make_report",
     "open_results",
     "optimize_trajectories",
     "process_log",
     "reduce",
     "reduce_terms",
-    "report",
     "run",
     "sample",
     "validate",
@@ -182,7 +182,7 @@ def identify(
     return _made(Identification, config, model, samples, validation, log)
 
 
-def report(
+def make_report(
     samples: Samples,
     reduction: Reduction,
     validation: Validation,
