@@ -27,7 +27,7 @@ def main() -> None:
     warnings.simplefilter("once", ParamreduceWarning)
     warnings.showwarning = show_warning
     try:
-        code = cli.main(standalone_mode=False)
+        code = _called()
     except ParamreduceError as error:
         show_errors(with_arguments(str(error)))
         code = error.exit_code
@@ -55,6 +55,19 @@ def main() -> None:
         )
         code = INTERNAL
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _called() -> object:
+    """What the command returns.
+
+    Raises:
+        KeyboardInterrupt: Also where it was raised into a library, which then failed with an error of its own.
+    """
+    try:
+        return cli.main(standalone_mode=False)
+    except Exception:
+        interruption.check()
+        raise
 
 
 class _Commands(click.Group):

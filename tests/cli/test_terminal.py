@@ -1,10 +1,14 @@
 """What is said of long work, and which interruptions are kept in mind."""
 
+import contextlib
 import signal
+import warnings
 
 import pytest
 
+import paramreduce_cli.cli as command_line
 from paramreduce_cli.cli import terminal
+from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Progress
 
 
@@ -68,3 +72,23 @@ def test_after_ctrl_c_work_can_go_on():
         interruption._note(signal.SIGINT, None)
     interruption.heeded()
     interruption.check()
+
+
+@pytest.mark.parametrize(("interrupted", "code"), [(False, 2), (True, 130)])
+def test_an_error_after_a_signal_is_an_interruption(interrupted, code, monkeypatch):
+    """HDF5 fails with an error of its own when it is interrupted while it writes."""
+    found = terminal.Interruption()
+    monkeypatch.setattr(found, "install", lambda: None)
+    monkeypatch.setattr(command_line, "interruption", found)
+
+    def failing(**_):
+        if interrupted:
+            with contextlib.suppress(KeyboardInterrupt):
+                found._note(signal.SIGTERM, None)
+        raise ArtifactError("cannot be written")
+
+    monkeypatch.setattr(command_line.cli, "main", failing)
+    monkeypatch.setattr(warnings, "showwarning", warnings.showwarning)
+    with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
+        command_line.main()
+    assert ended.value.code == code
