@@ -87,7 +87,8 @@ def processed(
     _check_left(learned_from, sources, wanted)
     raw = [piece for part in learned_from for piece in part]
     shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
-    longest, shown_raw = raw[shown].signals, _shown_raw(raw[shown].signals, rate)
+    longest = raw[shown].signals
+    shown_raw = _some(longest.time, _speeds(longest, rate), longest.tau)
     begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
@@ -100,6 +101,8 @@ def processed(
     steps.append(_said_of_states(longest, thin, rate / thin))
     begin(2)
     made = ready(raw)
+    s = made[shown].signals
+    shown_ready = _some(s.time, _speeds(s, rate / thin), s.tau)
     learned = _motions(made, wanted.folds)
     tested = _motions(ready([piece for part in tested_on for piece in part]), 1)
     _check_enough(learned, tested)
@@ -119,7 +122,7 @@ def processed(
         delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / power)),
-        shown=ShownSignals(*shown_raw, *_shown(made[shown].signals)),
+        shown=ShownSignals(*shown_raw, *shown_ready),
         spectra=spectra,
         steps=tuple(steps),
         doubts=tuple(suspected),
@@ -350,16 +353,7 @@ def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArr
     return np.array(noise)
 
 
-_Shown = tuple[FloatArray, FloatArray, FloatArray]
-"""Some times, speeds and torques, copied so that the rest may be forgotten."""
-
-
-def _shown_raw(raw: Signals, rate: float) -> _Shown:
-    some = slice(None, None, max(1, raw.time.size // _MOST_SHOWN))
-    return raw.time[some].copy(), _speeds(raw, rate)[some].copy(), raw.tau[some].copy()
-
-
-def _shown(ready: Signals) -> _Shown:
-    some = slice(None, None, max(1, ready.time.size // _MOST_SHOWN))
-    assert ready.dz is not None
-    return ready.time[some].copy(), ready.dz[some].copy(), ready.tau[some].copy()
+def _some(*signals: FloatArray) -> tuple[FloatArray, ...]:
+    """Samples for figures, copied so that the rest may be forgotten."""
+    every = max(1, signals[0].size // _MOST_SHOWN)
+    return tuple(values[::every].copy() for values in signals)

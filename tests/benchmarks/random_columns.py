@@ -6,7 +6,6 @@ columns have an effect: where they are more than n, many subsets are nearly as g
 
 import itertools
 import os
-import sys
 import time
 
 import numpy as np
@@ -24,20 +23,25 @@ EFFECTS, CORRELATIONS, SEEDS = (10, 20, 40), (0.5, 0.9), (0, 1, 2)
 TIME_LIMIT = 60.0
 
 
-def drawn(effects, correlation, seed):
-    """Columns as of an autoregressive process of first order, and what some of them explain, with noise."""
-    rng = np.random.default_rng(seed)
-    W = rng.normal(size=(ROWS, COLUMNS))
-    for j in range(1, COLUMNS):
+def autoregressive(rng, rows, columns, correlation):
+    """Columns as of an autoregressive process of first order."""
+    W = rng.normal(size=(rows, columns))
+    for j in range(1, columns):
         W[:, j] = correlation * W[:, j - 1] + np.sqrt(1 - correlation**2) * W[:, j]
+    return W
+
+
+def drawn(effects, correlation, seed):
+    """Correlated columns, and what some of them explain, with noise."""
+    rng = np.random.default_rng(seed)
+    W = autoregressive(rng, ROWS, COLUMNS, correlation)
     signal = W[:, rng.choice(COLUMNS, effects, replace=False)] @ rng.normal(size=effects)
     noise = rng.normal(size=ROWS)
     return W, signal + NOISE * np.linalg.norm(signal) / np.linalg.norm(noise) * noise
 
 
 def main():
-    time_limit = float(sys.argv[1]) if len(sys.argv) > 1 else TIME_LIMIT
-    effort = Effort(time_limit=time_limit, jobs=os.cpu_count() or 1)
+    effort = Effort(time_limit=TIME_LIMIT, jobs=os.cpu_count() or 1)
     run(
         "best-subset", SelectionTask(TorqueObjective(problem(*drawn(10, 0.5, 9))), largest=2)
     )  # compile

@@ -11,6 +11,7 @@ from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.task import SelectionTask, run
+from tests.benchmarks.random_columns import autoregressive
 from tests.selecting import problem
 
 JOBS, COLUMNS, CORRELATION = 8, 60, 0.9
@@ -22,9 +23,7 @@ _TURN = 2000
 
 def correlated(seed):
     rng = np.random.default_rng(seed)
-    W = rng.normal(size=(3 * COLUMNS, COLUMNS))
-    for j in range(1, COLUMNS):
-        W[:, j] = CORRELATION * W[:, j - 1] + np.sqrt(1 - CORRELATION**2) * W[:, j]
+    W = autoregressive(rng, 3 * COLUMNS, COLUMNS, CORRELATION)
     kept = rng.choice(COLUMNS, COLUMNS // 2, replace=False)
     return W, W[:, kept] @ rng.normal(size=kept.size) + 2 * rng.normal(size=len(W))
 

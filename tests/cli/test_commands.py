@@ -8,9 +8,11 @@ import h5py
 import pytest
 from conftest import ONE_FORMAT, TWO_LINK, summary_of
 
-from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.pipeline import pipeline, stages_to_run
+from paramreduce_cli.records import Model, Reduction
+from paramreduce_cli.reduction.models import reduced_model
 
 STAGES = [stage.name for stage in pipeline()]
 USUAL = [stage.name for stage in stages_to_run(load_config(TWO_LINK))]
@@ -127,6 +129,26 @@ def test_compare_tells_what_differs(invoke, two_link_copy, tmp_path):
     invoke(*compare, "--only", "kappa")
     invoke("compare", two_link_copy, tmp_path / "none.json", code=2)
     assert "kappa" in invoke(*compare, "--tolerance", "speed=1", code=2).err
+
+
+def test_inspect_shows_the_selected_model(invoke, two_link_results):
+    shown = invoke("inspect", two_link_results).out
+    for place in (two_link_results, two_link_results / "reduction.h5"):
+        assert invoke("inspect", place, "--model", "selected").out == shown
+
+
+def test_relations_are_ordered_by_the_values_that_are_known(invoke, two_link_results, tmp_path):
+    """As on the page; a reduction without its model beside it has them as they come."""
+    asked = ("--model", "forward-selection:2", "--relations")
+    alone = tmp_path / "reduction.h5"
+    shutil.copy(two_link_results / "reduction.h5", alone)
+    reduction = load_file(alone, Reduction, None, "")[0]
+    model = load_file(two_link_results / "model.h5", Model, None, "")[0]
+    row = reduction.heuristics["forward-selection"].row(2)
+    for folder, known in ((two_link_results, model.values), (tmp_path, None)):
+        out = invoke("inspect", folder / "reduction.h5", *asked).out
+        wanted = reduced_model(reduction, "forward-selection", row, known).expressions
+        assert all(f"  =  {text}" in out for text in wanted)
 
 
 def test_inspect_shows_contents_and_provenance(invoke, two_link_results):

@@ -45,6 +45,14 @@ def test_long_work_is_told_with_the_time_that_is_left(lines):
     assert lines(50, 10) == [(2, 44.0), (10, None)]
 
 
+def test_it_is_first_told_after_two_seconds_and_then_at_leisure(lines):
+    lines(0, 0)
+    assert lines(1.9, 1) == []
+    assert lines(2.1, 2) == [(2, pytest.approx(8.4))]
+    assert len(lines(11, 3)) == 1
+    assert len(lines(12.2, 4)) == 2
+
+
 def test_the_end_of_long_work_without_steps_is_told(lines):
     lines(0, 0)
     assert lines(30, 10) == [(10, None)]

@@ -10,6 +10,7 @@ import pytest
 from conftest import CONFIGS
 
 from paramreduce_cli.cli.commands.run import run
+from paramreduce_cli.texts import share
 
 
 def paragraph(results):
@@ -38,6 +39,14 @@ def test_methods_tell_of_a_log(measured_results):
     assert f"recorded at {recorded:.4g} Hz" in text
     assert ("taken as recorded" in text) != bool(np.isfinite(cutoff))
     assert "Fourier series" not in text
+    summary = json.loads((results / "report" / "summary.json").read_text())
+    found = summary["identification"]
+    assert "identified from the measured torques by least squares weighted by the noise" in text
+    unexplained = f"{share(found['reduced']['held_out'])} of the torques held out stay unexplained"
+    assert f"{unexplained}, {share(found['full']['held_out'])} with all base parameters" in text
+    for term in summary["terms"]:
+        assert f"Terms of the {term['function']} dynamics" in text
+        assert f": {term['operations']} operations instead of" in text
 
 
 @pytest.fixture(scope="module")
