@@ -205,7 +205,7 @@ def make_report(
     """
     wanted = config or Settings()
     robot = "" if model is None else model.mechanism.robot
-    records = samples, reduction, validation, model, *more, provenance(wanted, robot, {}, "")
+    records = samples, reduction, validation, model, *more, provenance(wanted, robot, {}, {}, "")
     return _made(Report, wanted, *records)
 
 

@@ -21,6 +21,7 @@ from paramreduce_cli.artifacts.incumbents import StoredIncumbents
 from paramreduce_cli.artifacts.parts import Parts, StoredShares
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.config import Config
+from paramreduce_cli.config.checks import remarks
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
 from paramreduce_cli.errors import ArtifactError
@@ -38,11 +39,15 @@ from paramreduce_cli.records import (
     Tell,
     Trajectories,
 )
-from paramreduce_cli.taken import OUTSIDE, Inputs, called
+from paramreduce_cli.taken import OUTSIDE, Inputs, called, noted_warnings
 
 
 def provenance(
-    wanted: Config | Settings, robot: str, seconds: Mapping[str, float], asked: str
+    wanted: Config | Settings,
+    robot: str,
+    seconds: Mapping[str, float],
+    warnings: Mapping[str, Sequence[str]],
+    asked: str,
 ) -> Provenance:
     """Where results come from, whatever ran the stages.
 
@@ -50,12 +55,15 @@ def provenance(
         wanted: What was asked for.
         robot: Its name.
         seconds: That stages took, by name.
+        warnings: That stages gave, by name.
         asked: See :class:`Provenance`.
     """
     text = json.dumps(wanted.model_dump(mode="json"), sort_keys=True)
     digest = hashlib.sha256(text.encode()).hexdigest()
     changed = wanted.model_dump(mode="json", exclude_defaults=True)
-    return Provenance(robot, digest, versions(), seconds, asked, changed)
+    if isinstance(wanted, Config):
+        warnings = {"config": remarks(wanted), **warnings}
+    return Provenance(robot, digest, versions(), seconds, warnings, asked, changed)
 
 
 @cache
@@ -156,9 +164,10 @@ class Runner:
             arguments,
             {Tell: self.progress, stage.output: previous, Share: WHOLE, Shares: Shares(found)},
         )
-        record = called(stage, arguments)
+        with noted_warnings() as warnings:
+            record = called(stage, arguments)
         self.check()
-        self.store.save(record, self._stamp(stage, inputs, started))
+        self.store.save(record, self._stamp(stage, inputs, started, warnings))
         if parts is not None:
             parts.clear()
         shares.clear()
@@ -186,9 +195,10 @@ class Runner:
             arguments,
             {Tell: self.progress, stage.output: previous, Share: share, Shares: UNSHARED},
         )
-        record = called(stage, arguments)
+        with noted_warnings() as warnings:
+            record = called(stage, arguments)
         self.check()
-        self.store.save(record, self._stamp(stage, inputs, started), path)
+        self.store.save(record, self._stamp(stage, inputs, started, warnings), path)
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 
     def _arguments(self, stage: Stage, inputs: Inputs) -> dict[str, Any]:
@@ -361,7 +371,9 @@ class Runner:
         self.interrupted()
         self._cut_short = True
 
-    def _stamp(self, stage: Stage, inputs: Inputs, started: float) -> Stamp:
+    def _stamp(
+        self, stage: Stage, inputs: Inputs, started: float, warnings: Sequence[str] = ()
+    ) -> Stamp:
         sections: dict[str, str] = {}
         seeds = []
         if self.config is not None:
@@ -378,13 +390,15 @@ class Runner:
             seed=next((seed for seed in seeds if seed is not None), 0),
             seconds=time.perf_counter() - started,
             cut_short=self._cut_short,
+            warnings=tuple(warnings),
         )
 
     def _provenance(self) -> Provenance:
-        seconds = {}
+        seconds, warnings = {}, {}
         for stage in pipeline():
             stamp = self.store.stamp(stage.output)
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
+                warnings[stage.name] = stamp.warnings
         wanted = self.config or self.settings or Settings()
-        return provenance(wanted, self._robot, seconds, self.asked)
+        return provenance(wanted, self._robot, seconds, warnings, self.asked)

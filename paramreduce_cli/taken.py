@@ -1,6 +1,8 @@
 """What a stage takes that no other stage makes: files of the user's own, noted by their digests."""
 
+import warnings
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -9,7 +11,7 @@ from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.artifacts.store import file_digest
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
-from paramreduce_cli.errors import ConcernError
+from paramreduce_cli.errors import ConcernError, ParamreduceWarning
 from paramreduce_cli.pipeline import Stage, brought_files
 from paramreduce_cli.records import (
     Coefficients,
@@ -20,6 +22,9 @@ from paramreduce_cli.records import (
     Recordings,
     Tell,
 )
+
+_MOST_WARNINGS = 50
+"""Of a stage that are kept; an attribute of a file has not room for any number."""
 
 
 class Inputs:
@@ -52,6 +57,22 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
         return stage.function(**arguments)
     except ConcernError as error:
         raise explained(error) from error
+
+
+@contextmanager
+def noted_warnings() -> Iterator[list[str]]:
+    """The warnings of this project that are given meanwhile; they are shown as ever."""
+    noted: list[str] = []
+    with warnings.catch_warnings():
+        show = warnings.showwarning
+
+        def note(message: Warning | str, category: type[Warning], *where: Any) -> None:
+            if issubclass(category, ParamreduceWarning) and len(noted) < _MOST_WARNINGS:
+                noted.append(str(message))
+            show(message, category, *where)
+
+        warnings.showwarning = note  # type: ignore[assignment]
+        yield noted
 
 
 class _LogFiles:

@@ -63,6 +63,8 @@ class Stamp:
     """Of all datasets; set when the file is complete."""
     cut_short: bool = False
     """Whether Ctrl-C ended a search in it, with which the next run goes on."""
+    warnings: tuple[str, ...] = ()
+    """What was said while it was made."""
 
 
 class Writer:
@@ -384,6 +386,7 @@ def _attributes(stamp: Stamp) -> dict[str, Any]:
         "wall_seconds": stamp.seconds,
         "digest": stamp.digest,
         "cut_short": stamp.cut_short,
+        "warnings": json.dumps(stamp.warnings),
     }
 
 
@@ -406,4 +409,5 @@ def read_stamp(path: Path) -> Stamp | None:
             seconds=float(reader.attribute("wall_seconds", 0.0)),
             digest=str(reader.attribute("digest", "")),
             cut_short=bool(reader.attribute("cut_short", False)),
+            warnings=tuple(json.loads(reader.attribute("warnings", "[]"))),
         )

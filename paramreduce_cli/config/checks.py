@@ -1,12 +1,11 @@
 """What the parts of a config must say about each other."""
 
-import warnings
 from collections.abc import Callable, Iterator
 
 import numpy as np
 
 from paramreduce_cli.config.schema import Config
-from paramreduce_cli.errors import Key, ParamreduceWarning
+from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Kind, Parameter
@@ -23,11 +22,12 @@ def check(config: Config) -> list[Problem]:
     tree = [*_bodies(config), *_payloads_and_drives(config)]
     if tree:
         return tree
-    found = [problem for one in _CHECKS for problem in one(config)]
-    if not found:
-        _remark_on_physics(config)
-        _remark_on_drives(config)
-    return found
+    return [problem for one in _CHECKS for problem in one(config)]
+
+
+def remarks(config: Config) -> list[str]:
+    """What is odd in a config that can be used: bodies and drives that cannot be, values that are not known."""
+    return [f"{text}; going on" for one in (_odd_bodies, _odd_drives) for text in one(config)]
 
 
 def _bodies(config: Config) -> Iterator[Problem]:
@@ -322,22 +322,22 @@ _CHECKS: tuple[Check, ...] = (
 )
 
 
-def _remark_on_physics(config: Config) -> None:
-    """Warn of bodies that cannot exist; reduced sets are not physical either, so go on."""
+def _odd_bodies(config: Config) -> Iterator[str]:
+    """Bodies that cannot exist; reduced sets are not physical either, so that is no error."""
     for name, body in config.body_parameters().items():
         if body.m < 0:
-            _remark(f"body {name} has the negative mass {body.m:g} kg")
+            yield f"body {name} has the negative mass {body.m:g} kg"
             continue
         moments = pseudo_inertia(body.values())
         if not physical(moments):
-            _remark(
+            yield (
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "
                 f"pseudo-inertia matrix has the eigenvalue {np.linalg.eigvalsh(moments)[0]:.3g})"
             )
 
 
-def _remark_on_drives(config: Config) -> None:
-    """Warn of values that are not known, and of what cannot be."""
+def _odd_drives(config: Config) -> Iterator[str]:
+    """Values that are not known, and what cannot be."""
     sampling = config.sampling
     missing = {name: drive.unknown() for name, drive in config.each_drive().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
@@ -345,12 +345,8 @@ def _remark_on_drives(config: Config) -> None:
         sampling.estimation_file is not None and sampling.torques == "measured"
     )
     if found and not measured:
-        _remark(f"unknown, and so zero in the torques of the model: {', '.join(found)}")
+        yield f"unknown, and so zero in the torques of the model: {', '.join(found)}"
     for name, drive in config.each_drive().items():
         for kind, value in drive.effects().items():
             if value < 0 and kind is not Kind.OFFSET:
-                _remark(f"drive {name} has the negative {Parameter(kind, name).name} {value:g}")
-
-
-def _remark(message: str) -> None:
-    warnings.warn(f"{message}; going on", ParamreduceWarning, stacklevel=2)
+                yield f"drive {name} has the negative {Parameter(kind, name).name} {value:g}"

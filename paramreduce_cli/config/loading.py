@@ -2,6 +2,7 @@
 
 import copy
 import difflib
+import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,10 +13,10 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from paramreduce_cli.config import reading
-from paramreduce_cli.config.checks import check
+from paramreduce_cli.config.checks import check, remarks
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
-from paramreduce_cli.errors import ConfigError, Key, keyed
+from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, keyed
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.numbers import read_constants
 from paramreduce_cli.fields.section import Section
@@ -57,6 +58,8 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         if more > 0:
             lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]
         raise ConfigError("\n".join(lines))
+    for text in remarks(config):
+        warnings.warn(text, ParamreduceWarning, stacklevel=2)
     return _with_paths(config, path.parent)
 
 

@@ -1,6 +1,6 @@
 """What a run lends its stages, and what it knows of them."""
 
-from collections.abc import Callable, Mapping, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -38,6 +38,8 @@ class Provenance:
     config_sha256: str
     versions: Mapping[str, str]
     seconds: Mapping[str, float]
+    warnings: Mapping[str, Sequence[str]]
+    """What was said of the config, and by stages of what they made, by name."""
     asked: str
     """The config and options that name the run at the shell; empty where it was not started there."""
     settings: Mapping[str, Any]

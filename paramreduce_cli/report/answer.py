@@ -20,6 +20,8 @@ class ShownParameter:
     unit: str
     deviation: str
     """Standard deviation where torques were measured; empty elsewhere."""
+    relation: str
+    """What it stands for, in standard parameters; empty where it stands for itself."""
 
 
 @dataclass(frozen=True)
@@ -62,14 +64,18 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
     if data.identification is not None and _as_identified(data):
         found = data.identification.reduced
         deviations = dict(zip(found.names, found.deviations, strict=True))
+    expressions = model.expressions or model.names
     return tuple(
         ShownParameter(
             name,
             f"{value:.6g}",
             data.unit(int(np.flatnonzero(model.position == k)[0])).replace("^2", "²"),
             f"{deviations[name]:.2g}" if name in deviations else "",
+            relation if relation != name else "",
         )
-        for k, (name, value) in enumerate(zip(model.names, model.values, strict=True))
+        for k, (name, value, relation) in enumerate(
+            zip(model.names, model.values, expressions, strict=True)
+        )
     )
 
 

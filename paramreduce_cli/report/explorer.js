@@ -12,6 +12,9 @@
     made.append(...children);
     return made;
   };
+  const dark = matchMedia("(prefers-color-scheme: dark)");
+  // Colours of curves stand out from white; on a dark page they are lightened, but not on paper.
+  const shade = (own) => (dark.matches ? `color-mix(in srgb, ${own} 60%, white)` : own);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   // ---- data
@@ -33,7 +36,7 @@
     motion: await unpacked(data.motion),
     figure: await unpacked(data.figure),
   });
-  root.hidden = false;
+  root.hidden = document.querySelector("nav .live").hidden = false;
   const nSamples = motion.time.length;
   const nDof = motion.tau.length / nSamples;
   const SETS = ["estimation", "validation"].filter((s) => curves.some((c) => c.torque[s].some(Number.isFinite)));
@@ -218,7 +221,7 @@
   const finders = (k, row) => curves.filter((c) => c.model.includes(curves[k].model[row])).flatMap((c) => c.names);
   const spoken = (k, row) => {
     const c = curves[k];
-    const cost = c.operations.inverse ? `, d in ${c.operations.inverse[row]} operations` : "";
+    const cost = c.operations.inverse ? `, ${data.functions[0]} in ${c.operations.inverse[row]} operations` : "";
     return `${finders(k, row).join(", ")}: ${c.n[row]} parameters, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
   };
 
@@ -257,12 +260,12 @@
     scales: { x: { time: false, range: [0, largest + 1] }, y: errorScale },
     axes: [axis("number of parameters n", { incrs: [1, 2, 5, 10, 20, 50, 100] }), errorAxis("torque error")],
     series: [{}, ...lines.map(({ curve, set }) => ({
-      stroke: curves[curve].colour, width: 1.6, dash: set === "validation" ? [5, 4] : undefined, spanGaps: false, points: { show: set === "estimation", size: 4 },
+      stroke: () => shade(curves[curve].colour), width: 1.6, dash: set === "validation" ? [5, 4] : undefined, spanGaps: false, points: { show: set === "estimation", size: 4 },
     }))],
     hooks: { draw: [(u) => {
       const own = curves[state.curve];
       upright(u, own.n[state.row]);
-      ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), own.colour);
+      ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), shade(own.colour));
     }] },
   }, [ns, ...against]);
   pointing(errorChart, () => shownCurves().flatMap((k) => SETS.filter((s) => state.sets.has(s)).flatMap((set) =>
@@ -284,7 +287,8 @@
   }
   curves.forEach((c, k) => {
     const mark = element("i");
-    mark.style.background = c.colour;
+    mark.style.background = shade(c.colour);
+    dark.addEventListener("change", () => { mark.style.background = shade(c.colour); });
     const button = element("button", { type: "button" }, mark, c.names.join(", "));
     toggled(button, true);
     button.addEventListener("click", () => {
@@ -322,12 +326,12 @@
     const chart = plot(part(`${key}-chart`), 300, {
       scales: { x: { time: false }, y: errorScale },
       axes: [axis(`operations of ${label}`), errorAxis("torque error, estimation")],
-      series: [{}, ...curves.map((c) => dots(c.colour)),
+      series: [{}, ...curves.map((c) => dots(() => shade(c.colour))),
         { ...line(() => colour("--ink")), paths: uPlot.paths.stepped({ align: 1 }) },
         { ...line(() => colour("--blue"), [2, 3]), points: { show: true, size: 5, stroke: () => colour("--blue"), fill: () => colour("--card") } }],
       hooks: { draw: [(u) => {
         const own = curves[state.curve];
-        ring(u, own.operations[key][state.row], visible(own.torque.estimation[state.row]), own.colour);
+        ring(u, own.operations[key][state.row], visible(own.torque.estimation[state.row]), shade(own.colour));
       }] },
     }, [points.map((p) => p.x), ...series, front, points.map((p) => (p.terms ? p.y : null))]);
     pointing(chart, () => points.filter((p) => p.terms || !state.hidden.has(p.curve)), part(`${key}-spot`));
@@ -335,8 +339,12 @@
     costCharts[key] = chart;
   }
   if (data.counted) {
-    costChart("inverse", "d");
-    costChart("direct", "[M | δ]");
+    costChart("inverse", data.functions[0]);
+    costChart("direct", data.functions[1]);
+  }
+  for (const name of ["error-chart", "inverse-chart", "direct-chart"]) {
+    const place = part(name);
+    if (place) savable(place, `${name}.png`, () => place.querySelector("canvas").toDataURL());
   }
 
   // Torques along the motion with what is missed; drawn when they come into view.
@@ -501,10 +509,10 @@
       turn(...way);
     });
     new ResizeObserver(draw).observe(canvas);
-    matchMedia("(prefers-color-scheme: dark)").addEventListener("change", draw);
+    dark.addEventListener("change", draw);
   }
 
-  matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => drawn.forEach((chart) => chart.redraw()));
+  dark.addEventListener("change", () => drawn.forEach((chart) => chart.redraw()));
   addEventListener("hashchange", () => { if (/[#&](heuristic|n)=/.test(location.hash)) { fromAddress(); follow(); } });
   fromAddress();
   follow();

@@ -7,13 +7,12 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.records import HeuristicValidation, IntArray, ModelChoice
+from paramreduce_cli.report.curves import EQUAL, curves
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.style import heuristic_style, joint_label
+from paramreduce_cli.report.style import joint_label
 
 _NUMBERS = 600_000
 """Most entries of the observation matrix that the page carries; an arm of six joints has 300 per sample."""
-_EQUAL = 1e-4
-"""Relative difference of values that single precision and other orders of columns explain."""
 _SETS = ("estimation", "validation")
 _FUNCTIONS = ("inverse", "direct")
 
@@ -34,6 +33,7 @@ def explorer(data: ReportData) -> dict[str, Any]:
         "selected": {"heuristic": selected.heuristic, "n": selected.n},
         "measured": data.identification is not None,
         "counted": data.known_model is not None,
+        "functions": data.functions,
         "joints": _joints(data),
         "columns": _columns(data, shown),
         "curves": _curves(data, library),
@@ -67,7 +67,7 @@ class _Models:
         # The same parameters may have other values, fitted by another criterion.
         same = self._numbers.setdefault(columns.tobytes(), [])
         for number in same:
-            if np.allclose(self._values[number], values, rtol=_EQUAL, atol=0):
+            if np.allclose(self._values[number], values, rtol=EQUAL, atol=0):
                 return number
         same.append(len(self._columns))
         self._columns.append(columns)
@@ -86,17 +86,18 @@ class _Models:
 
 def _curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
     """Errors and costs by heuristic; those that found the same models are one curve."""
-    curves: dict[tuple[Any, ...], dict[str, Any]] = {}
-    for name, result in data.validation.heuristics.items():
-        models = [library.number(ModelChoice(name, n)) for n in result.n.tolist()]
-        same = (tuple(result.n.tolist()), tuple(models))
-        if same in curves:
-            curves[same]["names"].append(name)
-            continue
-        colour, _ = heuristic_style(data, name)
-        curves[same] = {"names": [name], "colour": colour, "n": result.n.tolist(),
-                        "model": models, **_worth(data, result)}  # fmt: skip
-    return list(curves.values())
+    return [
+        {
+            "names": curve.names,
+            "colour": curve.colour,
+            "n": curve.result.n.tolist(),
+            "model": [
+                library.number(ModelChoice(curve.names[0], n)) for n in curve.result.n.tolist()
+            ],
+            **_worth(data, curve.result),
+        }
+        for curve in curves(data)
+    ]
 
 
 def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:

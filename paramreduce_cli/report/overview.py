@@ -3,8 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
 

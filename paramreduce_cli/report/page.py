@@ -20,30 +20,14 @@ from paramreduce_cli.report.explorer import explorer
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.methods import methods
 from paramreduce_cli.report.sections import PageSection, place_of
-from paramreduce_cli.report.table import Table
+from paramreduce_cli.report.symbols import explained
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
 
 _FIGURE_MIME = "image/svg+xml"
 _PLOTTING = ("uplot-python", "uplot/static/uPlot.iife.js", "uplot/static/uPlot.min.css")
 """The distribution that carries uPlot, its script and its style."""
-
-_SYMBOLS = {
-    "n": "number of parameters of the reduced model",
-    "n_φ": "standard parameters that act on the torques",
-    "r": "base parameters: the rank of the observation matrix",
-    "d": "sums, products and function calls of the inverse dynamics with all parameters",
-    "d, n": "the same with n parameters",
-    "M, δ": "sums, products and function calls of mass matrix and remainder, gravity included, with all parameters",
-    "M, δ, n": "the same with n parameters",
-    "ε_τ E": "weighted torque error on the estimation set, of the torques' norm",
-    "ε_τ V": "weighted torque error on the validation set",
-    "ε_z̈ E": "weighted error of the accelerations on the estimation set",
-    "ε_z̈ V": "weighted error of the accelerations on the validation set",
-    "κ": "condition number of the observation matrix",
-    "φ' value": "value of the parameter, which stands for those that were dropped too",
-}
-"""What headings of tables mean, shown where they stand."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +40,8 @@ class _Item:
     """Of a figure's image."""
     table: Table | None = None
     tall: bool = False
+    symbols: Sequence[tuple[str, str]] = ()
+    """Of the headings, with what they mean."""
 
 
 def render_page(
@@ -102,8 +88,8 @@ def render_page(
         # Inside a script nothing may look like the end of it.
         explored=json.dumps(explorer(data), separators=(",", ":")).replace("<", "\\u003c"),
         sections=sections,
+        warnings=[(stage, text) for stage, texts in provenance.warnings.items() for text in texts],
         settings=json.dumps(provenance.settings, indent=2, ensure_ascii=False),
-        symbols=_SYMBOLS,
         methods=told,
         bibtex=bibtex,
         code=_archive(code) if code else "",
@@ -161,7 +147,9 @@ def _items(
             make = tables[name]
             place = place_of(make)
             caption = (make.__doc__ or name).strip()
-            found.append((place, _Item(name, caption, table=table, tall=place.tall)))
+            symbols = explained(name, table.header)
+            item = _Item(name, caption, table=table, tall=place.tall, symbols=symbols)
+            found.append((place, item))
     found.sort(key=lambda entry: entry[0].order)
     return {
         section: [item for place, item in found if place.section is section]

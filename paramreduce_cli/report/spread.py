@@ -5,8 +5,8 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
 _LISTED = 40

@@ -1,7 +1,9 @@
 """How all figures are drawn, and what several of them have in common."""
 
 import io
+import textwrap
 from collections.abc import Callable
+from typing import Any
 
 import matplotlib as mpl
 import numpy as np
@@ -10,9 +12,11 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from paramreduce_cli.records import FloatArray
+from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 
 STYLE = {
+    "figure.figsize": (8.4, 3.8),
     "font.size": 9.5,
     "font.family": "DejaVu Sans",
     "axes.spines.top": False,
@@ -32,20 +36,32 @@ STYLE = {
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
 }
+"""On the page, and in pictures for slides."""
+COLUMN = {
+    "figure.figsize": (3.5, 2.4),
+    "font.size": 8.5,
+    "axes.linewidth": 0.6,
+    "axes.labelsize": "small",
+    "xtick.labelsize": "small",
+    "ytick.labelsize": "small",
+    "lines.linewidth": 1.0,
+}
+"""What differs in a column of a paper, 3.5 inches wide, where the PDF is included as it is."""
+_NARROW = 5.0
+"""Inches below which plots stand under each other, and legends under plots."""
 _JOINT_COLOURS = ("#0b6e99", "#d9730d", "#2f8f5b", "#8e5bb5", "#c2384f", "#7a6a53", "#4d7c8a")
-_HEURISTIC_COLOURS = (
-    "#7d8590", "#0b62c4", "#5fa3d9", "#8e5bb5", "#d9730d", "#e0a526", "#2f8f5b", "#c2384f", "#7a6a53",
-    "#0b8f8f",
-)  # fmt: skip
 _LINES = ("-", "--", ":", "-.")
-_MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
-WIDE = (8.4, 3.8)
-"""Size of a figure over the whole width, inches."""
 FUNCTIONS = (("inverse", "d", "-"), ("direct", "[M | δ]", "--"))
 """Names of the dynamics in records and in figures, and their lines."""
 FLOOR = 1e-7
 """Where errors are cut off below: what is less is round-off."""
 HIGHEST_ERROR = 1e3
+_LONG_LABEL = 30
+"""Characters from which on entries of a legend stand alone in a row."""
+_LINE = 52
+"""Characters of small print that have room in a column."""
+_LEGEND_ROW = 0.13
+"""Height of a row of a legend, inches."""
 _LEAST_MEASURED = 1e-3
 """Where errors of measured torques are cut off below."""
 
@@ -59,9 +75,23 @@ FORMATS: dict[str, dict] = {
 def render(
     draw: Callable[[ReportData], Figure | None], data: ReportData, formats: list[str]
 ) -> dict[str, bytes]:
-    """Draw a figure and encode it in each format; nothing where there is nothing to draw."""
-    with mpl.rc_context(STYLE):
-        drawn = draw(data)
+    """Draw a figure and encode it in each format, PDF for a column; nothing where there is nothing to draw."""
+    of_papers = [name for name in formats if name == "pdf"]
+    of_pages = [name for name in formats if name != "pdf"]
+    return {
+        **_encoded(draw, data, of_pages, STYLE),
+        **_encoded(draw, data, of_papers, STYLE | COLUMN),
+    }
+
+
+def _encoded(
+    draw: Callable[[ReportData], Figure | None],
+    data: ReportData,
+    formats: list[str],
+    style: dict[str, Any],
+) -> dict[str, bytes]:
+    with mpl.rc_context(style):
+        drawn = draw(data) if formats else None
         if drawn is None:
             return {}
         result = {}
@@ -73,10 +103,40 @@ def render(
     return result
 
 
-def heuristic_style(data: ReportData, name: str) -> tuple[str, str]:
-    """Colour and marker of a heuristic, the same in all figures."""
-    k = list(data.validation.heuristics).index(name)
-    return _HEURISTIC_COLOURS[k % len(_HEURISTIC_COLOURS)], _MARKERS[k % len(_MARKERS)]
+def new_figure(tall: float = 1.0) -> Figure:
+    """An empty figure over the width of where it will stand.
+
+    Args:
+        tall: Its height over the usual one.
+    """
+    width, height = mpl.rcParams["figure.figsize"]
+    return Figure(figsize=(width, tall * height))
+
+
+def pair_of_plots(shared: bool = True) -> tuple[Figure, Axes, Axes]:
+    """A figure with two plots, beside or under each other.
+
+    Args:
+        shared: Whether both have the same upright scale.
+    """
+    rows, columns = (2, 1) if _is_narrow() else (1, 2)
+    drawn = new_figure(1.8 if _is_narrow() else 1.0)
+    first, second = drawn.subplots(rows, columns, sharey=shared)
+    return drawn, first, second
+
+
+def broken(text: str, plots: int = 1) -> str:
+    """Text over a plot, in lines that are no longer than it is wide.
+
+    Args:
+        text: Of about the size of an axis' label.
+        plots: That stand beside each other.
+    """
+    return textwrap.fill(text, _LINE // plots) if _is_narrow() else text
+
+
+def _is_narrow() -> bool:
+    return bool(mpl.rcParams["figure.figsize"][0] < _NARROW)
 
 
 def joint_style(j: int) -> tuple[str, str]:
@@ -93,8 +153,27 @@ def joint_label(data: ReportData, j: int) -> str:
 
 
 def legend_beside(axes: Axes) -> None:
-    """A legend on the right, where it covers nothing."""
-    axes.legend(fontsize=8, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    """A legend where it covers nothing: on the right, in a column below."""
+    if not _is_narrow():
+        axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
+        return
+    drawn = axes.get_figure(root=True)
+    assert drawn is not None
+    handles, labels = axes.get_legend_handles_labels()
+    columns = 1 if max(map(len, labels), default=0) > _LONG_LABEL else 2
+    rows = -(-len(labels) // columns)
+    drawn.set_figheight(drawn.get_figheight() + _LEGEND_ROW * rows)
+    drawn.legend(handles, labels, fontsize="x-small", loc="outside lower center", ncols=columns)
+
+
+def legend_above(axes: Axes, columns: int) -> None:
+    """A legend over a plot, of so many columns at most; of half as many in a column."""
+    axes.legend(
+        fontsize="x-small" if _is_narrow() else "small",
+        ncols=-(-columns // 2) if _is_narrow() else columns,
+        loc="lower center",
+        bbox_to_anchor=(0.5, 1.0),
+    )
 
 
 def visible(values: FloatArray) -> FloatArray:
@@ -111,7 +190,7 @@ def mark_selected(axes: Axes, data: ReportData) -> None:
 
 def message(text: str) -> Figure:
     """A figure that says why there is nothing to draw."""
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
     axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
     axes.set_axis_off()
@@ -120,15 +199,14 @@ def message(text: str) -> Figure:
 
 def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
     """An error against the number of parameters, on both sets."""
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
-    for name, result in data.validation.heuristics.items():
-        colour, marker = heuristic_style(data, name)
+    for curve in curves(data):
         for which, line in (("estimation", "-"), ("validation", "--")):
-            values = visible(getattr(result, f"{quantity}_{which}"))
+            values = visible(getattr(curve.result, f"{quantity}_{which}"))
             axes.semilogy(
-                result.n, values, line, color=colour, label=name if line == "-" else None,
-                marker=marker if line == "-" else None, markersize=3,
+                curve.result.n, values, line, color=curve.colour, markersize=3,
+                label=curve.label if line == "-" else None, marker=curve.marker if line == "-" else None,
             )  # fmt: skip
     # Measured torques are never explained to round-off.
     bottom = FLOOR if data.identification is None else _LEAST_MEASURED
@@ -136,7 +214,7 @@ def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
     axes.axvline(data.reduction.rank, color="#57606a", linewidth=0.8, linestyle=":")
     axes.annotate(
         f" r = {data.reduction.rank}", (data.reduction.rank, 1.0),
-        xycoords=("data", "axes fraction"), va="top", fontsize=8, color="#57606a",
+        xycoords=("data", "axes fraction"), va="top", fontsize="small", color="#57606a",
     )  # fmt: skip
     mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")

@@ -36,11 +36,11 @@ from paramreduce_cli.reduction.models import full_model
 from paramreduce_cli.registry import Registry
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
+from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.tracking.demonstration import tracked
 
 _POSES = 3

@@ -283,7 +283,8 @@ def test_casadi_functions_load_and_agree(model, tmp_path):
 def test_latex_is_a_table_of_all_parameters(model):
     (content,) = files_of(model, "latex", text="base").values()
     text, names = content.decode(), chosen_model("base", model, None, None)[0].names
-    assert text.count(r"\\") == 1 + len(names)
+    assert text.count(r" \\") == 1 + len(names)
+    assert "{lS[table-format=" in text  # values stand under each other by their points
     for name in names:
         assert text.count(f"${model.mechanism.symbols[name]}$") >= 2  # by itself and made of itself
     assert text.count("$") % 2 == 0

@@ -1,8 +1,8 @@
 import csv
 import io
 
-from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.overview import overview, overview_row
+from paramreduce_cli.texts.latex_table import latex_table
 
 
 def test_one_row_per_robot_with_the_selected_model(summary):

@@ -1,5 +1,6 @@
 import csv
 import io
+import re
 import shutil
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
@@ -10,9 +11,9 @@ import pytest
 from conftest import run_stages
 
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.latex_table import latex_table
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.report.tables import tables
+from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.table import Table
 
 
 @pytest.fixture(scope="module")
@@ -40,6 +41,18 @@ def test_figures_are_there_in_every_format(in_every_format, name):
     assert (folder / f"{name}.pdf").read_bytes().startswith(b"%PDF")
     assert (folder / f"{name}.png").read_bytes().startswith(b"\x89PNG")
     ET.fromstring((folder / f"{name}.svg").read_text())
+
+
+@pytest.mark.parametrize(
+    "name", ["torque-error", "error-vs-operations", "torques", "poses", "trajectory"]
+)
+def test_a_pdf_is_as_wide_as_a_column_and_carries_its_letters(in_every_format, name):
+    content = (in_every_format / "figures" / f"{name}.pdf").read_bytes()
+    (box,) = re.findall(rb"/MediaBox \[ ([^]]*) \]", content)
+    width, height = (float(number) for number in box.split()[2:])
+    assert width == 3.5 * 72
+    assert height < 9 * 72
+    assert content.count(b"/Type /FontDescriptor") == content.count(b"/FontFile2 ") > 0
 
 
 @pytest.mark.parametrize("name", list(tables))
@@ -133,9 +146,39 @@ def test_latex_sets_numbers_breaks_texts_and_fits_the_line():
         r"\begin{tabular}{S[table-format=2]S[table-format=-1.2]S[table-format=1.1e-2]r>{\raggedright"
     )
     assert lines[-4] == r"23 & 4 & 2.5e+11 & $>$ 1000 \% & {[}M $|$ $\delta$] \\"
-    many = tuple((str(k), "x" * 20) * 4 for k in range(60))
-    assert r"\begin{longtable}" in latex_table(Table("t", ("a", "b") * 4, many))
-    assert r"\resizebox{\linewidth}" in latex_table(Table("t", ("a", "b") * 4, many[:3]))
+    many = tuple((str(k), "x" * 20) * 6 for k in range(60))
+    turned = latex_table(Table("t", ("a", "b") * 6, many)).splitlines()
+    assert turned[1] == r"\begin{landscape}"
+    assert r"\begin{longtable}" in turned[2]
+    scaled = latex_table(Table("t", ("a", "b") * 3, tuple(row[:6] for row in many[:3])))
+    assert r"\resizebox{\linewidth}" in scaled
+    assert r"\begin{table}" in scaled
+    assert r"\begin{sidewaystable}" in latex_table(Table("t", ("a", "b") * 6, many[:3]))
+
+
+def test_warnings_of_a_run_stand_on_its_page(tmp_path):
+    """Those of the config, and those of a stage that is not run again."""
+    heavy = "parameter_sets.slender_rods.fore.inertia_com=[1e-3, 0, 0, 0.0135, 0, 0.1]"
+    for again in ("report.title=One", "report.title=Two"):
+        run_stages(tmp_path, heavy, "reduction.best_subset.time_limit=0", again,
+                   "reduction.heuristics=[swap, best-subset]", "selected.heuristic=swap")  # fmt: skip
+    page = (tmp_path / "report" / "index.html").read_text()
+    (listed,) = re.findall(r'<div id="warnings">.*?</div>', page, re.DOTALL)
+    assert "<code>config</code>: the inertia of body fore is not physical" in listed
+    assert "<code>reduce</code>: best-subset: " in listed
+    assert f"{listed.count('<li>')} warnings</a> from the run" in page
+
+
+def test_headings_are_explained_where_they_stand(folder):
+    page = (folder / "index.html").read_text()
+    (pareto,) = re.findall(
+        r'id="table-pareto-front".*?<p class="symbols">(.*?)</p>', page, re.DOTALL
+    )
+    assert "<b>d</b> operations of the inverse dynamics;" in pareto
+    (geometry,) = re.findall(
+        r'id="table-kinematics".*?<p class="symbols">(.*?)</p>', page, re.DOTALL
+    )
+    assert "operations" not in geometry
 
 
 def test_drives_have_a_table_of_their_own(tmp_path):

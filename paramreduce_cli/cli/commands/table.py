@@ -11,10 +11,10 @@ from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, emit, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.report.latex_table import latex_table
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
-from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.table import Table
 
 
 @click.command()

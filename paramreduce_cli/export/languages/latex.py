@@ -1,15 +1,17 @@
 """The approximate base parameters as equations for a paper."""
 
 from paramreduce_cli.export.exported import ExportedModel, plain
-from paramreduce_cli.texts import latex as typeset
+from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.table import Table
 
 
 def latex(model: ExportedModel) -> dict[str, bytes]:
     """A table of the parameters: symbol, value, unit and what it is made of."""
-    lines = [f"% {plain(line)}".rstrip() for line in model.heading]
-    lines += [r"\begin{tabular}{lrll}", r"parameter & value & unit & made of \\", r"\hline"]
-    for p in model.parameters:
-        cells = (p.name, f"{p.value:.6g}", p.unit.replace("^2", "²"), p.expression)
-        lines.append(" & ".join(typeset(cell, model.symbols) for cell in cells) + r" \\")
-    lines += [r"\end{tabular}", ""]
-    return {f"{model.name}_parameters.tex": "\n".join(lines).encode()}
+    heading = "".join(f"% {plain(line)}".rstrip() + "\n" for line in model.heading)
+    rows = tuple(
+        (p.name, f"{p.value:.6g}", p.unit.replace("^2", "²"), p.expression)
+        for p in model.parameters
+    )
+    title = f"{model.robot}: {len(rows)} parameters"
+    table = Table(title, ("parameter", "value", "unit", "made of"), rows)
+    return {f"{model.name}_parameters.tex": (heading + latex_table(table, model.symbols)).encode()}

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import WIDE, mark_selected
+from paramreduce_cli.report.style import broken, legend_beside, mark_selected, new_figure
 
 _OVER_BEST = 4.0
 """Largest error shown, times the smallest."""
@@ -18,7 +18,7 @@ def cross_validation(data: ReportData) -> Figure | None:
         return None
     name = data.validation.selected.heuristic
     result, own = data.validation.heuristics[name], crossed[name]
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
     axes.plot(result.n, 100 * result.torque_error_estimation, color="#7d8590", label="learned from")
     axes.errorbar(
@@ -32,13 +32,13 @@ def cross_validation(data: ReportData) -> Figure | None:
     if data.log is not None:
         floor = 100 * data.log.noise_share
         axes.annotate(
-            f"noise above the band of the model: {floor:.2g} % of the torques as recorded", (0.98, 0.03),
-            xycoords="axes fraction", ha="right", va="bottom", fontsize=8, color="#57606a",
+            broken(f"noise above the band of the model: {floor:.2g} % of the torques as recorded"), (0.98, 0.03),
+            xycoords="axes fraction", ha="right", va="bottom", fontsize="small", color="#57606a",
         )  # fmt: skip
     best = 100 * float(own.mean.min())
     axes.set_ylim(0, _OVER_BEST * best)
     mark_selected(axes, data)
     axes.set_xlabel(f"number of parameters n ({name})")
     axes.set_ylabel(r"$\varepsilon_\tau$, %")
-    axes.legend(fontsize=8, loc="upper center")
+    legend_beside(axes)
     return drawn

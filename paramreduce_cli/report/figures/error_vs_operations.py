@@ -3,23 +3,22 @@
 import numpy as np
 from matplotlib.figure import Figure
 
+from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import FUNCTIONS, WIDE, heuristic_style, legend_beside, visible
+from paramreduce_cli.report.style import FUNCTIONS, legend_beside, pair_of_plots, visible
 
 
 @placed(PageSection.SAVINGS, 3)
 def error_vs_operations(data: ReportData) -> Figure:
     """Torque error on the estimation set against the operations it costs."""
-    drawn = Figure(figsize=WIDE)
-    axes = drawn.subplots(1, 2, sharey=True)
+    drawn, *axes = pair_of_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
-        for name, result in data.validation.heuristics.items():
-            colour, marker = heuristic_style(data, name)
-            values = visible(result.torque_error_estimation)
+        for curve in curves(data):
+            values = visible(curve.result.torque_error_estimation)
             one.semilogy(
-                getattr(result, f"operations_{key}"), values,
-                color=colour, marker=marker, markersize=3, linewidth=0.8, label=name,
+                getattr(curve.result, f"operations_{key}"), values,
+                color=curve.colour, marker=curve.marker, markersize=3, linewidth=0.8, label=curve.label,
             )  # fmt: skip
         front = [
             (float(cost), float(error))

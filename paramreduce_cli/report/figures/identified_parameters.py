@@ -5,6 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import new_figure
 
 _CONFIDENCE = 1.96
 """Standard deviations of an interval that holds the truth in 95 of 100 cases."""
@@ -18,7 +19,7 @@ def identified_parameters(data: ReportData) -> Figure | None:
     found = data.identification.reduced
     relative = _CONFIDENCE * found.deviations / np.maximum(np.abs(found.values), 1e-300)
     order = np.argsort(relative)
-    drawn = Figure(figsize=(7.2, 2.6))
+    drawn = new_figure(0.8)
     axes = drawn.subplots()
     places = np.arange(order.size)
     axes.errorbar(
@@ -28,6 +29,6 @@ def identified_parameters(data: ReportData) -> Figure | None:
     axes.axhline(0, color="#8a929c", linewidth=0.8)
     widest = min(3.0, float(relative.max(initial=0.1)) * 1.15)
     axes.set_ylim(1 - max(widest, 0.2), 1 + max(widest, 0.2))
-    axes.set_xticks(places, [found.names[k] for k in order], rotation=90, fontsize=7)
+    axes.set_xticks(places, [found.names[k] for k in order], rotation=90, fontsize="x-small")
     axes.set_ylabel("value / own value")
     return drawn

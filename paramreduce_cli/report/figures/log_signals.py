@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style
+from paramreduce_cli.report.style import joint_label, joint_style, new_figure
 
 _RAW = "#c3c9d0"
 
@@ -17,7 +17,7 @@ def log_signals(data: ReportData) -> Figure | None:
         return None
     shown = data.log.shown
     n_dof = shown.dz.shape[1]
-    drawn = Figure(figsize=(7.2, 1.15 * n_dof + 0.6))
+    drawn = new_figure(0.16 + 0.33 * n_dof)
     grid = drawn.subplots(n_dof, 2, sharex=True, squeeze=False)
     for j in range(n_dof):
         colour, _ = joint_style(j)
@@ -29,8 +29,8 @@ def log_signals(data: ReportData) -> Figure | None:
             axes.plot(shown.time, used[:, j], color=colour, linewidth=1.0)
             size = float(np.abs(used[:, j]).max()) or 1.0
             axes.set_ylim(-1.3 * size, 1.3 * size)
-            axes.set_ylabel(f"{label}  {joint_label(data, j)}", fontsize=7)
-            axes.tick_params(labelsize=7)
+            axes.set_ylabel(f"{label}  {joint_label(data, j)}", fontsize="x-small")
+            axes.tick_params(labelsize="x-small")
     for axes in grid[-1]:
         axes.set_xlabel("t (s)")
     return drawn

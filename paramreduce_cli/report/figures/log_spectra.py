@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import WIDE, joint_label, joint_style
+from paramreduce_cli.report.style import joint_label, joint_style, legend_beside, pair_of_plots
 
 
 @placed(PageSection.LOG, 3)
@@ -14,8 +14,7 @@ def log_spectra(data: ReportData) -> Figure | None:
     if data.log is None:
         return None
     spectra = data.log.spectra
-    drawn = Figure(figsize=WIDE)
-    pair = drawn.subplots(1, 2, sharex=True)
+    drawn, *pair = pair_of_plots(shared=False)
     for axes, density, cutoff, label in (
         (pair[0], spectra.velocity, data.log.state_cutoff, "speed"),
         (pair[1], spectra.torque, data.log.torque_cutoff, "torque"),
@@ -31,8 +30,8 @@ def log_spectra(data: ReportData) -> Figure | None:
         if np.isfinite(cutoff):
             axes.axvline(cutoff, color="#111", linewidth=0.9, linestyle=":")
             axes.annotate(f" {cutoff:.3g} Hz", (cutoff, 0.97), xycoords=("data", "axes fraction"),
-                          va="top", fontsize=8)  # fmt: skip
-        axes.set_title(label, fontsize=9)
+                          va="top", fontsize="small")  # fmt: skip
+        axes.set_title(label, fontsize="medium")
         axes.set_xlabel("Hz")
-    pair[0].legend(fontsize=7, loc="lower left")
+    legend_beside(pair[1])
     return drawn

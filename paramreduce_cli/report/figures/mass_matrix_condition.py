@@ -2,37 +2,32 @@
 
 from matplotlib.figure import Figure
 
+from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import (
-    WIDE,
-    heuristic_style,
-    legend_beside,
-    mark_selected,
-    visible,
-)
+from paramreduce_cli.report.style import legend_beside, mark_selected, new_figure, visible
 
 
 @placed(PageSection.ACCELERATIONS, 2)
 def mass_matrix_condition(data: ReportData) -> Figure:
     """Largest condition number of the mass matrix over the samples; hollow where it is indefinite."""
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
-    for name, result in data.validation.heuristics.items():
-        colour, marker = heuristic_style(data, name)
+    for curve in curves(data):
+        result, colour = curve.result, curve.colour
         condition = visible(result.mass_matrix_condition)
         positive = result.mass_matrix_smallest_eigenvalue > 0
-        axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=name)
+        axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=curve.label)
         for chosen, fill in ((positive, colour), (~positive, "white")):
             axes.semilogy(
-                result.n[chosen], condition[chosen], linestyle="none", marker=marker,
+                result.n[chosen], condition[chosen], linestyle="none", marker=curve.marker,
                 markersize=4, markerfacecolor=fill, color=colour,
             )  # fmt: skip
     full = data.validation.full["mass_matrix_condition"]
     axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
     name = "full model" if data.identification is None else "values of the config"
     axes.annotate(name, (1.0, full), xycoords=("axes fraction", "data"), ha="right",
-                  va="bottom", fontsize=8, color="#57606a")  # fmt: skip
+                  va="bottom", fontsize="small", color="#57606a")  # fmt: skip
     axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
     mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style
+from paramreduce_cli.report.style import joint_label, joint_style, legend_above, new_figure
 
 
 @placed(PageSection.IDENTIFICATION, 2)
@@ -15,7 +15,7 @@ def measured_torques(data: ReportData) -> Figure | None:
     if found is None:
         return None
     joints = np.flatnonzero(np.isfinite(found.torque_deviation)).tolist()
-    drawn = Figure(figsize=(7.2, 1.25 * len(joints) + 0.6))
+    drawn = new_figure(0.16 + 0.33 * len(joints))
     grid = drawn.subplots(len(joints), 2, sharex=True, squeeze=False)
     n, m = len(found.reduced.names), len(found.full.names)
     for (left, right), j in zip(grid, joints, strict=True):
@@ -30,11 +30,11 @@ def measured_torques(data: ReportData) -> Figure | None:
         ):
             right.plot(found.shown_time, measured - values[:, j], color=line_colour, linewidth=0.8,
                        label=label)  # fmt: skip
-        left.set_ylabel(f"τ  {joint_label(data, j)}", fontsize=7)
+        left.set_ylabel(f"τ  {joint_label(data, j)}", fontsize="x-small")
         for axes in (left, right):
-            axes.tick_params(labelsize=7)
+            axes.tick_params(labelsize="x-small")
     for axes in grid[0]:
-        axes.legend(fontsize=7, ncols=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
+        legend_above(axes, 2)
     for axes in grid[-1]:
         axes.set_xlabel("t (s)")
     return drawn

@@ -2,29 +2,23 @@
 
 from matplotlib.figure import Figure
 
+from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import (
-    FUNCTIONS,
-    WIDE,
-    heuristic_style,
-    legend_beside,
-    mark_selected,
-)
+from paramreduce_cli.report.style import FUNCTIONS, legend_beside, mark_selected, new_figure
 
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
     """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters."""
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
-    for name, result in data.validation.heuristics.items():
-        colour, marker = heuristic_style(data, name)
+    for curve in curves(data):
         for key, _, line in FUNCTIONS:
-            values = getattr(result, f"operations_{key}")
+            values = getattr(curve.result, f"operations_{key}")
             axes.plot(
-                result.n, values, line, color=colour, marker=marker, markersize=2.5,
-                label=name if line == "-" else None,
+                curve.result.n, values, line, color=curve.colour, marker=curve.marker, markersize=2.5,
+                label=curve.label if line == "-" else None,
             )  # fmt: skip
     for key, _, line in FUNCTIONS:
         axes.axhline(

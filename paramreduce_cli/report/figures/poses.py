@@ -7,19 +7,20 @@ from matplotlib.figure import Figure
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.data import ReportData, Skeleton
 from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import broken, new_figure
 
 
 @placed(PageSection.MECHANISM, 1)
 def poses(data: ReportData) -> Figure:
     """The mechanism in a few poses of the validation set."""
     count = len(data.skeletons)
-    drawn = Figure(figsize=(2.8 * count, 3.1))
+    drawn = new_figure(2.4 / count)
     corners = np.array([_extent(skeleton) for skeleton in data.skeletons])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     half = 0.55 * float((high - low).max()) or 1.0
     for k, skeleton in enumerate(data.skeletons):
         axes = drawn.add_subplot(1, count, k + 1, projection="3d")
-        _draw_skeleton(axes, skeleton, half)
+        _draw_skeleton(axes, skeleton, half, count)
         for setter, middle in zip(
             (axes.set_xlim, axes.set_ylim, axes.set_zlim), (low + high) / 2, strict=True
         ):
@@ -41,7 +42,7 @@ def _extent(skeleton: Skeleton) -> FloatArray:
     return np.array([np.nanmin(points, axis=0), np.nanmax(points, axis=0)])
 
 
-def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
+def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float, plots: int) -> None:
     link = {"color": "#44607a", "linewidth": 4, "solid_capstyle": "round", "alpha": 0.9}
     for i, parent in enumerate(skeleton.parents):
         start = np.zeros(3) if parent < 0 else skeleton.poses[parent][:3, 3]
@@ -78,6 +79,6 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float) -> None:
         axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
     shown = ", ".join(f"{value:.2f}" for value in skeleton.z)
     axes.text2D(
-        0.5, 0.98, f"z = ({shown})", transform=axes.transAxes, ha="center", fontsize=6.5,
-        color="#57606a",
-    )  # fmt: skip
+        0.5, 0.98, broken(f"z = ({shown})", plots), transform=axes.transAxes, ha="center",
+        fontsize="xx-small", color="#57606a",
+    ).set_in_layout(False)  # fmt: skip

@@ -4,16 +4,10 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.records import ProofStatus, SelectionMethod
+from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import (
-    FLOOR,
-    WIDE,
-    heuristic_style,
-    legend_beside,
-    mark_selected,
-    message,
-)
+from paramreduce_cli.report.style import FLOOR, legend_beside, mark_selected, message, new_figure
 
 
 @placed(PageSection.PROOFS, 1)
@@ -22,27 +16,28 @@ def proven_bound(data: ReportData) -> Figure:
     proofs = data.reduction.proofs
     if proofs is None:
         return message("best-subset was not run")
-    drawn = Figure(figsize=WIDE)
+    drawn = new_figure()
     axes = drawn.subplots()
     shown = np.maximum(proofs.lower_bound, FLOOR)
     axes.fill_between(proofs.n, shown, FLOOR, step="mid", color="#d5d9de", zorder=0)
     axes.step(proofs.n, shown, where="mid", color="#30363d", linewidth=0.9, label="proven bound")
-    for name, found in data.reduction.heuristics.items():
-        if not SelectionMethod.parse(name).by_torque:
+    for curve in curves(data):
+        names = [name for name in curve.names if SelectionMethod.parse(name).by_torque]
+        proven = "best-subset" in names
+        if not names:
             continue
-        colour, marker = heuristic_style(data, name)
-        optimal = name == "best-subset"
+        found = data.reduction.heuristics[names[0]]
         axes.semilogy(
-            found.n, np.maximum(found.torque_error, FLOOR), color=colour, marker=marker,
-            markersize=4 if optimal else 2.5, linewidth=0.8, label=name, linestyle="none" if optimal
-            else "-",
+            found.n, np.maximum(found.torque_error, FLOOR), color=curve.colour, marker=curve.marker,
+            markersize=4 if proven else 2.5, linewidth=0.8, label=", ".join(names),
+            linestyle="none" if proven and len(names) == 1 else "-",
         )  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom=FLOOR)
     unproven = [status is not ProofStatus.OPTIMAL for status in proofs.status]
     axes.set_title(
         f"optimal for {len(unproven) - sum(unproven)} of {len(unproven)} sizes",
-        fontsize=9,
+        fontsize="medium",
         loc="left",
     )
     mark_selected(axes, data)

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from paramreduce_cli.records import DataChange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import message
+from paramreduce_cli.report.style import legend_above, message, new_figure
 
 _WIDE_SPREAD = 100.0
 """Per cent of change from which on a logarithmic scale shows more."""
@@ -18,7 +18,7 @@ def stability(data: ReportData) -> Figure:
     found, names = data.validation.stability, data.reduction.columns.names
     if found is None:
         return message("validation.stability is off")
-    drawn = Figure(figsize=(7.2, 4.6))
+    drawn = new_figure(1.3)
     often = found.chosen.mean(axis=0)
     order = np.argsort(-often, kind="stable")[: int(np.sum(often > 0))]
     upper, middle, lower = drawn.subplots(3, 1)
@@ -36,7 +36,9 @@ def stability(data: ReportData) -> Figure:
     middle.set_ylabel("φ' - median, %")
     for axes, shown in ((upper, False), (middle, True)):
         labels = [names[k] for k in order] if shown else []
-        axes.set_xticks(places, labels if shown else [""] * order.size, rotation=90, fontsize=7)
+        axes.set_xticks(
+            places, labels if shown else [""] * order.size, rotation=90, fontsize="x-small"
+        )
         axes.set_xlim(-0.7, order.size - 0.3)
         axes.grid(axis="x", visible=False)
     thinned = np.array([v.change is DataChange.THINNED for v in found.variants])
@@ -54,8 +56,8 @@ def stability(data: ReportData) -> Figure:
                 numbers[chosen], 100 * found.torque_error[chosen], "o", color=colour, markersize=4,
                 label=label,
             )  # fmt: skip
-    lower.set_xticks(numbers, ["all", *map(str, numbers[1:])], fontsize=7)
+    lower.set_xticks(numbers, ["all", *map(str, numbers[1:])], fontsize="x-small")
     lower.set_xlabel("which trajectory is left out; then fewer samples")
     lower.set_ylabel(r"$\varepsilon_\tau$, %")
-    lower.legend(fontsize=7, ncols=2, loc="lower center", bbox_to_anchor=(0.5, 1.0))
+    legend_above(lower, 2)
     return drawn

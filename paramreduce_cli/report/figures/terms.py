@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.figures.error_vs_operations import staircase
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import FUNCTIONS, WIDE, legend_beside, visible
+from paramreduce_cli.report.style import FUNCTIONS, legend_beside, pair_of_plots, visible
 
 
 @placed(PageSection.TERMS, 0)
@@ -14,8 +14,7 @@ def terms(data: ReportData) -> Figure | None:
     """Torque error against operations: the best models of fewer parameters, and the same with terms left out on the way to the budget. Filled: estimation set; hollow: validation set."""
     if data.terms is None:
         return None
-    drawn = Figure(figsize=WIDE)
-    axes = drawn.subplots(1, 2, sharey=True)
+    drawn, *axes = pair_of_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
         found = [
             (float(cost), float(error))

@@ -5,7 +5,11 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style
+from paramreduce_cli.report.style import joint_label, joint_style, new_figure
+
+_DASHES = (0, (3, 2))
+_ANY = "#7d8590"
+"""Stands for the colour of any joint."""
 
 
 @placed(PageSection.SELECTED, 2)
@@ -17,19 +21,21 @@ def torques(data: ReportData) -> Figure:
     n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1
     rows = -(-n_dof // columns)
-    drawn = Figure(figsize=(7.2, 1.55 * rows + 0.5))
+    drawn = new_figure(0.13 + 0.42 * rows)
     grid = np.atleast_1d(drawn.subplots(rows, columns, sharex=True)).ravel()
     for axes, j in zip(grid, measured, strict=False):
         colour, _ = joint_style(j)
-        axes.plot(data.motion.time, data.motion.full[:, j], color=colour, label=label)
+        axes.plot(data.motion.time, data.motion.full[:, j], color=colour)
         axes.plot(
-            data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=(0, (3, 2)),
-            linewidth=1.1, label=f"n = {data.validation.selected.n}",
+            data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=_DASHES,
+            linewidth=1.1,
         )  # fmt: skip
-        axes.set_ylabel(f"τ / nom, {joint_label(data, j)}", fontsize=8)
-        axes.legend(fontsize=7, loc="upper right", ncols=2)
+        axes.set_ylabel(f"τ / nom, {joint_label(data, j)}", fontsize="small")
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:
         axes.set_xlabel("t (s)" if data.motion.timed else "sample")
+    grid[0].plot([], [], color=_ANY, label=f"{label} (in the joint's colour)")
+    grid[0].plot([], [], color="#111", linestyle=_DASHES, label=f"n = {data.validation.selected.n}")
+    drawn.legend(fontsize="small", loc="outside upper center", ncols=2)
     return drawn

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, legend_beside
+from paramreduce_cli.report.style import broken, joint_label, joint_style, legend_beside, new_figure
 
 
 @placed(PageSection.TRACKING, 1)
@@ -14,7 +14,7 @@ def tracking(data: ReportData) -> Figure | None:
     result, speed = data.tracking, data.speed
     if result is None or speed is None:
         return None
-    drawn = Figure(figsize=(8.4, 4.6))
+    drawn = new_figure(1.5)
     top, *below = drawn.subplots(
         1 + len(result.errors), 1, sharex=True, height_ratios=[1.2] + [1] * len(result.errors)
     )
@@ -32,12 +32,11 @@ def tracking(data: ReportData) -> Figure | None:
     for axes, (name, errors) in zip(below, result.errors.items(), strict=True):
         rms = 1e3 * result.rms(name)
         axes.set_ylabel("off, mrad or mm")
-        axes.set_title(
+        told = (
             f"{name}: {np.median(rms):.2g} mrad rms ({rms.min():.2g} to {rms.max():.2g} over {rms.size} "
             f"paths), at most {1e3 * float(np.abs(errors).max()):.2g}; "
-            f"{1e9 * speed.seconds[name]:.3g} ns a step in {speed.language}",
-            fontsize=9.5,
-            loc="left",
+            f"{1e9 * speed.seconds[name]:.3g} ns a step in {speed.language}"
         )
+        axes.set_title(broken(told), fontsize="small", loc="left")
     below[-1].set_xlabel("time, s")
     return drawn

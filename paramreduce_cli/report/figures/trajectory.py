@@ -4,13 +4,13 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style
+from paramreduce_cli.report.style import joint_label, joint_style, legend_above, new_figure
 
 
 @placed(PageSection.TRAJECTORIES, 1)
 def trajectory(data: ReportData) -> Figure:
     """A characteristic trajectory of the validation set: positions, velocities, accelerations."""
-    drawn = Figure(figsize=(7.2, 5.4))
+    drawn = new_figure(1.5)
     motion = data.motion
     rows = (
         (motion.z, "z  (rad, m)"),
@@ -24,8 +24,6 @@ def trajectory(data: ReportData) -> Figure:
             label = joint_label(data, j)
             axes.plot(motion.time, values[:, j], color=colour, linestyle=style, label=label)
         axes.set_ylabel(title)
-    all_axes[0].legend(
-        ncols=min(values.shape[1], 7), fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0)
-    )
+    legend_above(all_axes[0], min(values.shape[1], 7))
     all_axes[-1].set_xlabel("t (s)")
     return drawn

@@ -6,8 +6,8 @@ import numpy as np
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.IDENTIFICATION, 3)

@@ -3,8 +3,8 @@
 from paramreduce_cli.records import ProofStatus
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.PROOFS, 2, tall=True)

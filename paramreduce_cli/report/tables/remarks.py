@@ -2,7 +2,7 @@
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.ACCELERATIONS, 3)

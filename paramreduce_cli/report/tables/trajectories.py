@@ -5,7 +5,7 @@ import numpy as np
 from paramreduce_cli.records import Trajectory
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.table import Table
+from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.TRAJECTORIES, 3, tall=True)

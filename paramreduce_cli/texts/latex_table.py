@@ -4,11 +4,13 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
-from paramreduce_cli.report.table import Table
 from paramreduce_cli.texts import latex
+from paramreduce_cli.texts.table import Table
 
 _FITTING = 80
 """Characters of a row beyond which it is scaled to the width of the line."""
+_WIDE = 150
+"""Characters beyond which it is turned, as scaled to the line it would be too small to read."""
 _PAGE = 40
 """Lines beyond which a table is broken over pages."""
 _LONG = 45
@@ -21,7 +23,8 @@ _NUMBER = re.compile(r"-?(\d*)(?:\.(\d*))?(?:e(-?)\+?(\d+))?")
 def latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({})) -> str:
     """A tabular with its caption, or a longtable where it is more than a page; names as formulas.
 
-    Columns of numbers are siunitx's, long texts are broken, and what is wide is set small.
+    Columns of numbers are siunitx's, long texts are broken, what is wide is set small, and what is
+    wider than that is turned.
 
     Args:
         table: What is set.
@@ -43,29 +46,41 @@ def latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({}))
     ]
     caption = rf"\caption{{{latex(table.title, symbols)}}}"
     height = sum(1 + max(map(len, cells)) // _LONG for cells in table.rows)
-    if height > _PAGE:
-        lines = [
-            "% needs array, longtable, siunitx",
-            rf"{{\footnotesize\begin{{longtable}}{{{''.join(kinds)}}}",
-            caption + r"\\",
-            *[r"\hline", head, r"\hline", r"\endhead", *rows, r"\hline"],
-            r"\end{longtable}}",
-        ]
-        return "\n".join(lines) + "\n"
     lengths = (max(map(len, cells)) for cells in zip(table.header, *table.rows, strict=True))
-    wide = sum(min(length, _LONG) + _SPACE for length in lengths) > _FITTING
-    lines = [
-        "% needs array, graphicx, siunitx",
-        r"\begin{table}[ht]",
+    width = sum(min(length, _LONG) + _SPACE for length in lengths)
+    lines = [r"\hline", head, r"\hline", *rows, r"\hline"]
+    whole = _over_pages if height > _PAGE else _on_a_page
+    return "\n".join(whole("".join(kinds), caption, lines, width)) + "\n"
+
+
+def _over_pages(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+    turned = width > _WIDE
+    size = r"\tiny" if turned else r"\footnotesize"
+    return [
+        f"% needs array, longtable, {'pdflscape, ' if turned else ''}siunitx",
+        *([r"\begin{landscape}"] if turned else []),
+        rf"{{{size}\begin{{longtable}}{{{kinds}}}",
+        caption + r"\\",
+        *[*lines[:3], r"\endhead", *lines[3:]],
+        r"\end{longtable}}",
+        *([r"\end{landscape}"] if turned else []),
+    ]
+
+
+def _on_a_page(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+    kind = "sidewaystable" if width > _WIDE else "table"
+    scaled = width > _FITTING
+    return [
+        f"% needs array, graphicx, {'rotating, ' if kind != 'table' else ''}siunitx",
+        rf"\begin{{{kind}}}" + ("[ht]" if kind == "table" else ""),
         r"\centering",
         caption,
-        *([r"\resizebox{\linewidth}{!}{%"] if wide else []),
-        rf"\begin{{tabular}}{{{''.join(kinds)}}}",
-        *[r"\hline", head, r"\hline", *rows, r"\hline"],
-        r"\end{tabular}" + ("}" if wide else ""),
-        r"\end{table}",
+        *([r"\resizebox{\linewidth}{!}{%"] if scaled else []),
+        rf"\begin{{tabular}}{{{kinds}}}",
+        *lines,
+        r"\end{tabular}" + ("}" if scaled else ""),
+        rf"\end{{{kind}}}",
     ]
-    return "\n".join(lines) + "\n"
 
 
 def _row(cells: Iterable[str]) -> str:

@@ -1,0 +1,41 @@
+"""Heuristics that found the same models share a curve."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.artifacts.store import Store, load_file
+from paramreduce_cli.records import Reduction, Validation
+from paramreduce_cli.report.curves import curves
+
+
+@pytest.fixture
+def found(two_link_results):
+    store = Store(two_link_results)
+    reduction, validation = (
+        load_file(store.path(kind), kind, None, "")[0] for kind in (Reduction, Validation)
+    )
+    name = next(iter(validation.heuristics))
+    reduction = replace(reduction, heuristics={"one": reduction.heuristics[name],
+                                               "two": reduction.heuristics[name]})  # fmt: skip
+    validation = replace(
+        validation, heuristics=dict.fromkeys(("one", "two"), validation.heuristics[name])
+    )
+    return SimpleNamespace(reduction=reduction, validation=validation)
+
+
+def test_the_same_models_are_one_curve(found):
+    (curve,) = curves(found)
+    assert curve.names == ("one", "two")
+    assert curve.label == "one, two"
+
+
+def test_one_other_value_is_another_curve(found):
+    two = found.reduction.heuristics["two"]
+    values = [np.array(v) for v in two.parameters]
+    values[-1] = values[-1] * 1.01
+    found.reduction.heuristics["two"] = replace(two, parameters=tuple(values))
+    assert [curve.names for curve in curves(found)] == [("one",), ("two",)]
+    assert len({curve.colour for curve in curves(found)}) == 2
