@@ -14,6 +14,7 @@ from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 
 _LISTING = ".exported.json"
+_AGAIN = "Make it again with `paramreduce run`."
 
 
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
@@ -114,9 +115,11 @@ def verify_report(path: Path) -> None:
         try:
             found = hashlib.sha256((path.parent / name).read_bytes()).hexdigest()
         except OSError as error:
-            raise ArtifactError(f"{path.parent / name}: cannot be read: {error}.") from error
+            raise ArtifactError(
+                f"{path.parent / name}: cannot be read: {error.strerror}. {_AGAIN}"
+            ) from error
         if found != digest:
-            raise ArtifactError(f"{path.parent / name}: is damaged or was changed.")
+            raise ArtifactError(f"{path.parent / name}: is damaged or was changed. {_AGAIN}")
 
 
 def load_json(path: Path) -> Any:

@@ -9,7 +9,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.hints import meant_command, next_command, with_arguments
+from paramreduce_cli.cli.hints import after, meant_command, next_command, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
 from paramreduce_cli.cli.terminal import complain, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
@@ -29,11 +29,15 @@ def main() -> None:
     try:
         code = _called()
     except ParamreduceError as error:
-        show_errors(with_arguments(str(error)))
+        message = with_arguments(str(error))
+        show_errors(message)
+        if further := after(message, _command()):
+            complain(further)
         code = error.exit_code
     except click.ClickException as error:
         show_errors(error.format_message())
-        complain(next_command(error))
+        context = getattr(error, "ctx", None)
+        complain(next_command(context.command if context and context.parent else None))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(
@@ -55,6 +59,12 @@ def main() -> None:
         )
         code = INTERNAL
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _command() -> click.Command | None:
+    """The one that was called; None where there is no such command."""
+    name = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
+    return cli.get_command(click.Context(cli), name)
 
 
 def _called() -> object:

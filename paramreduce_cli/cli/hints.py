@@ -1,6 +1,7 @@
 """What to type next, for who has typed something that does not work."""
 
 import difflib
+import inspect
 import re
 import shlex
 import sys
@@ -10,6 +11,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.cli.corrections import corrected
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.5
@@ -25,26 +27,45 @@ def meant_command(name: str, known: Sequence[str]) -> str:
     )
 
 
-def next_command(error: click.ClickException) -> str:
-    """An example of the command that was called wrongly."""
-    context = getattr(error, "ctx", None)
-    if context is None or context.parent is None:
+def next_command(command: click.Command | None) -> str:
+    """An example of the command that was called wrongly; None stands for the program itself."""
+    if command is None:
         return "paramreduce --help lists all commands; paramreduce alone says what to do next."
-    example = re.search(r"Example: (paramreduce .*)", context.command.help or "")
-    path = context.command_path.partition(" ")[2]
-    more = f"paramreduce {path} --help says more."
-    return f"Example: {example[1]}\n{more}" if example else more
+    example = re.search(r"Example: (paramreduce .*(?:\n.+)*)", inspect.cleandoc(command.help or ""))
+    more = f"paramreduce {command.name} --help says more."
+    return f"Example: {' '.join(example[1].split())}\n{more}" if example else more
+
+
+def after(message: str, command: click.Command | None) -> str:
+    """What to type next, where an error does not say it itself; empty where it does."""
+    if re.search(r"paramreduce [a-z]|`pip install ", message):
+        return ""
+    typed = sys.argv[1:]
+    mended = corrected(message, typed)
+    if not mended:
+        return next_command(command)
+    return f"{'Then again' if shlex.split(mended)[1:] == typed else 'Next'}: {mended}"
 
 
 def with_arguments(text: str) -> str:
-    """A message whose commands can be typed as they stand: with the config and options of this call."""
-    given = _own_arguments(sys.argv[1:])
+    """A message whose commands can be typed as they stand: with the config and options of this call.
+
+    Without a config in the call that of the results in question is named, if it lies where it usually does.
+    """
+    given = _own_arguments(sys.argv[1:]) or _usual_config(text) or "CONFIG"
 
     def completed(found: re.Match[str]) -> str:
         name = found[1]
         return f"`paramreduce {name} {given}`" if name in stages or name == "run" else found[0]
 
-    return re.sub(r"`paramreduce ([a-z-]+)`", completed, text) if given else text
+    return re.sub(r"`paramreduce ([a-z-]+)`", completed, text)
+
+
+def _usual_config(text: str) -> str:
+    """Of the results folder whose file a message begins with; empty if there is none."""
+    found = re.match(r"(\S+?)(?:/report)?/[\w-]+\.(?:h5|json|html): ", text)
+    path = Path("configs") / f"{Path(found[1]).name}.yaml" if found else None
+    return shlex.quote(str(path)) if path is not None and path.is_file() else ""
 
 
 def _own_arguments(words: Sequence[str]) -> str:

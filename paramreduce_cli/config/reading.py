@@ -41,6 +41,11 @@ class Document:
                 return f"--set {self.overrides[path[:end]]}"
             if path[:end] in self.lines:
                 return f"{self.source}, line {self.lines[path[:end]]}"
+            above = [
+                text for key, text in self.overrides.items() if end and key[:end] == path[:end]
+            ]
+            if above:  # what is set is below, and there was nothing before
+                return f"--set {above[0]}"
         return self.source
 
 

@@ -28,6 +28,8 @@ class ExportedModel:
     robot: str
     heading: tuple[str, ...]
     """Where it comes from and what it is worth, line by line."""
+    frames: tuple[str, ...]
+    """In which frames the parameters are, line by line."""
     coordinates: tuple[str, ...]
     units: tuple[str, ...]
     """Of these, rad or m."""
@@ -212,9 +214,11 @@ def about(model: ExportedModel, first: int = 0) -> list[str]:
     kind = "constants of the code" if model.constant else "in this order"
     lines += [
         "",
-        "First moments and inertias are about the origin of their body's frame, in its axes, as the config",
-        f"places it. Parameters, {kind}; each is followed by what it is made of, ordered and",
-        "counted by the values in the config; what is zero there is left out:",
+        "First moments and inertias are about the origin of their body's frame, in its axes. Frames:",
+        *(plain(line) for line in model.frames),
+        "",
+        f"Parameters, {kind}; each is followed by what it is made of, ordered and counted",
+        "by the values in the config; what is zero there is left out:",
     ]
     for k, p in enumerate(model.parameters, first):
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")

@@ -23,10 +23,15 @@ from paramreduce_cli.records import (
     FloatArray,
     Mechanism,
     Model,
+    Progress,
     ReducedModel,
+    Tell,
     TermModel,
     Validation,
 )
+from paramreduce_cli.texts.table import Table
+
+_TASK = "write code"
 
 _CASES = 16
 """States in the self-test."""
@@ -65,6 +70,7 @@ def export(
     origin: str = "",
     simplified: TermModel | None = None,
     validation: Validation | None = None,
+    tell: Tell = lambda _: None,
 ) -> dict[str, bytes]:
     """Files of a model in some language.
 
@@ -80,15 +86,18 @@ def export(
         simplified: The function that is asked for with terms left out, whose parameters are those of
             the model.
         validation: Says in which ranges the model was validated; None where it was not.
+        tell: Told of its steps.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
     """
     mechanism = model.mechanism
+    tell(Progress(_TASK, 0, 3, "functions"))
     functions = exported_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
     if mechanism.loops is not None:
         closures = tuple(LeanFunctions(model, chosen, constant=constant).closures())
+    tell(Progress(_TASK, 1, 3, "checks"))
     rng = np.random.default_rng(0)
     checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
     check(functions, checked)
@@ -117,6 +126,7 @@ def export(
             "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
             f"Made by paramreduce {__version__} ({origin}).",
         ),
+        frames=_frames(mechanism),
         coordinates=mechanism.generalised_names,
         units=tuple("rad" if b.joint == "revolute" else "m" for b in mechanism.bodies),
         independent=np.array(mechanism.independent, dtype=np.int64),
@@ -128,7 +138,9 @@ def export(
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
     )
+    tell(Progress(_TASK, 2, 3, "files"))
     files: dict[str, bytes] = languages[language](exported)
+    tell(Progress(_TASK, 3, 3))
     return files
 
 
@@ -157,6 +169,13 @@ def _ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[
         )
         for j, name in enumerate(mechanism.coordinate_names)
     ]
+
+
+def _frames(mechanism: Mechanism) -> tuple[str, ...]:
+    """The geometry of the config, line by line."""
+    header, *rows = mechanism.table
+    lines = Table(mechanism.frames, header, tuple(rows)).to_text().splitlines()
+    return tuple(f"  {line}".rstrip() for line in lines if line)
 
 
 def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:

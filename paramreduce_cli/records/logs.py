@@ -6,6 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.reduction import ReducedModel
+
+_SAME_VALUES = 1e-4
+"""Relative difference of values that are the same fit."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +139,16 @@ class Estimate:
     joint_held_out: FloatArray
     folds: FloatArray
     """Error on each part of the training data when fitted without it, like ``train``, (n_folds,)."""
+
+    def deviations_of(self, model: ReducedModel) -> dict[str, float]:
+        """Standard deviations by name; none for a model of other values, such as other weights give."""
+        values = dict(zip(self.names, self.values, strict=True))
+        if set(values) != set(model.names):
+            return {}
+        own = np.array([values[name] for name in model.names])
+        if not np.allclose(own, model.values, rtol=_SAME_VALUES, atol=0):
+            return {}
+        return dict(zip(self.names, self.deviations.tolist(), strict=True))
 
 
 @dataclass(frozen=True)

@@ -185,6 +185,8 @@ class Mechanism:
     """What bodies carry."""
     drives: tuple[Drive, ...] = ()
     """Rotors, friction and springs."""
+    frames: str = ""
+    """Where the table says that the frames of the bodies are; for people."""
 
     @property
     def n_q(self) -> int:

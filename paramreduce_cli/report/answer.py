@@ -60,10 +60,8 @@ def answer(data: ReportData, asked: str) -> Answer:
 
 
 def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:
-    deviations = {}
-    if data.identification is not None and _as_identified(data):
-        found = data.identification.reduced
-        deviations = dict(zip(found.names, found.deviations, strict=True))
+    found = None if data.identification is None else data.identification.reduced
+    deviations = {} if found is None else found.deviations_of(model)
     expressions = model.expressions or model.names
     return tuple(
         ShownParameter(
@@ -80,16 +78,8 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
 
 
 def _as_identified(data: ReportData) -> bool:
-    """Whether the selected values are those that were identified: other weights give others."""
-    if data.identification is None:
-        return False
-    found = data.identification.reduced
-    identified = dict(zip(found.names, found.values, strict=True))
-    model = data.validation.selected.model
-    if set(identified) != set(model.names):
-        return False
-    ours = np.array([identified[name] for name in model.names])
-    return bool(np.allclose(ours, model.values, rtol=1e-4, atol=0))
+    found = data.identification
+    return found is not None and bool(found.reduced.deviations_of(data.validation.selected.model))
 
 
 def _worst_joint(data: ReportData) -> str:

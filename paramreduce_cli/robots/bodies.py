@@ -31,6 +31,11 @@ class BodiesDescription(Section, ABC):
     def rigid_bodies(self) -> tuple[Body, ...]:
         """The bodies with their joints of one axis each."""
 
+    @property
+    @abstractmethod
+    def frames(self) -> str:
+        """Where the table says that the frames of the bodies are, for people."""
+
     @abstractmethod
     def table(self) -> tuple[tuple[str, ...], ...]:
         """The geometry for people, a header row first."""

@@ -93,6 +93,7 @@ class Robot(Section):
             loops=bodies.loops(),
             payloads=tuple(s.payload(name, index) for name, s in self.payloads.items()),
             drives=tuple(s.drive(name, coordinates) for name, s in self.each_drive().items()),
+            frames=bodies.frames,
         )
 
     def stretched(self, stretch: Callable[[float], float]) -> Robot:

@@ -107,6 +107,14 @@ class DHDescription(BodiesDescription):
         ]
         return self.model_copy(update={"joints": joints})
 
+    @property
+    def frames(self) -> str:
+        """Where the table says that the frames of the bodies are, for people."""
+        axis = "of joint i" if self.convention == "modified" else "of the joint after body i"
+        return (
+            f"{self.convention} Denavit-Hartenberg, z of frame i along the axis {axis}; m and rad"
+        )
+
     def table(self) -> tuple[tuple[str, ...], ...]:
         """The geometry for people, a header row first."""
         branching = any(joint.gamma or joint.b for joint in self.joints)

@@ -319,6 +319,11 @@ class TreeDescription(BodiesDescription):
             if name not in coordinates:
                 yield ("guess", name), unknown("coordinate", name, coordinates)
 
+    @property
+    def frames(self) -> str:
+        """Where the table says that the frames of the bodies are, for people."""
+        return "each placed in the frame of the body it is on where all coordinates are zero; m and rad"
+
     def table(self) -> tuple[tuple[str, ...], ...]:
         """The geometry for people, a header row first."""
         table: list[tuple[str, ...]] = [("body", "on", "joint", "axes", "at", "coordinates")]

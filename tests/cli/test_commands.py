@@ -11,7 +11,7 @@ from conftest import ONE_FORMAT, TWO_LINK, summary_of
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.pipeline import pipeline, stages_to_run
-from paramreduce_cli.records import Model, Reduction
+from paramreduce_cli.records import Identification, Model, Reduction
 from paramreduce_cli.reduction.models import reduced_model
 
 STAGES = [stage.name for stage in pipeline()]
@@ -135,6 +135,33 @@ def test_inspect_shows_the_selected_model(invoke, two_link_results):
     shown = invoke("inspect", two_link_results).out
     for place in (two_link_results, two_link_results / "reduction.h5"):
         assert invoke("inspect", place, "--model", "selected").out == shown
+
+
+def test_parameters_are_shown_with_units_and_deviations(invoke, two_link_results, measured_results):
+    shown = invoke("inspect", two_link_results).out.splitlines()[1:]
+    units = {"m": "kg", "mx": "kg m", "my": "kg m", "Izz": "kg m^2"}
+    assert [line.split(maxsplit=2)[2] for line in shown] == [
+        units[line.split("_")[0].strip()] for line in shown
+    ]
+    measured = measured_results / "results"
+    found = load_file(measured / "identification.h5", Identification, None, "")[0].reduced
+    told = json.loads(invoke("inspect", measured, "--json").out)["parameters"]
+    assert {p["name"]: p["deviation"] for p in told} == dict(
+        zip(found.names, found.deviations.tolist(), strict=True)
+    )
+    assert f"± {found.deviations[0]:.2g} " in invoke("inspect", measured).out
+
+
+def test_datasets_of_every_size_are_one_line(invoke, two_link_results):
+    file = two_link_results / "reduction.h5"
+    (line,) = (
+        line
+        for line in invoke("inspect", file).out.splitlines()
+        if line.startswith("/qr/parameters/")
+    )
+    assert line.split() == ["/qr/parameters/*", "7", "datasets", "float64,", "1", "to", "7"]
+    names = {one["name"] for one in json.loads(invoke("inspect", file, "--json").out)["datasets"]}
+    assert {f"/qr/parameters/{n}" for n in range(1, 8)} <= names
 
 
 def test_relations_are_ordered_by_the_values_that_are_known(invoke, two_link_results, tmp_path):

@@ -3,9 +3,13 @@
 import json
 import re
 import shutil
+import sys
 
+import h5py
 import pytest
 from conftest import CONFIGS
+
+from paramreduce_cli.artifacts.hdf5 import SCHEMA
 
 MOVES = [
     (["rnu", "configs/two_link.yaml"], "did you mean `paramreduce run`"),
@@ -15,8 +19,8 @@ MOVES = [
     (["help"], "see `paramreduce --help`"),
     (["-v"], "paramreduce --help lists all commands"),
     (["run"], "Example: paramreduce run configs/puma560.yaml"),
-    (["run", "two_link"], "Did you mean configs/two_link.yaml?"),
-    (["run", "two_link.yaml"], "Did you mean configs/two_link.yaml?"),
+    (["run", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
+    (["run", "two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
     (["run", "configs/two_lnik.yaml"], "Did you mean configs/two_link.yaml?"),
     (["run", "configs"], "Example: paramreduce run configs/puma560.yaml"),
     (["run", "notes.txt"], "`paramreduce init --dh NAME` writes one"),
@@ -24,11 +28,14 @@ MOVES = [
     (["run", "my_arm.urdf"], "`paramreduce init --dh my_arm` writes one"),
     (["run", "configs/empty.yaml"], "`paramreduce init --dh NAME` writes a whole one"),
     (["run", "configs/nothing.yaml"], "`paramreduce init --dh NAME` writes one"),
-    (["run", "configs/broken.yaml"], "configs/broken.yaml, line 2: this is not YAML"),
+    (["run", "configs/broken.yaml"], "Then again: paramreduce run configs/broken.yaml"),
     (["run", "configs/two_link.yaml", "--sett", "a=b"], "Did you mean one of: '--quiet', '--set'"),
     (["run", "configs/two_link.yaml", "--set", "selected.m=4"], "there is heuristic, n,"),
     (["run", "configs/two_link.yaml", "--set", "selected.n"], "write KEY=VALUE"),
-    (["run", "configs/two_link.yaml", "--set", "selected.heuristic=swapp"], "did you mean swap?"),
+    (["run", "configs/two_link.yaml", "--set", "selected.heuristic=swapp"],
+     "Next: paramreduce run configs/two_link.yaml --set selected.heuristic=swap"),
+    (["run", "configs/two_link.yaml", "--set", "selectd.n=3"],
+     "Next: paramreduce run configs/two_link.yaml --set selected.n=3"),
     (["run", "configs/two_link.yaml", "--set", "selected.n=many"], "write one such as"),
     (["run", "configs/two_link.yaml", "--jobs", "0"], "paramreduce run --help says more"),
     (["run", "configs/two_link.yaml", "--results", "notes.txt"], "Example: paramreduce run"),
@@ -41,11 +48,12 @@ MOVES = [
     (["report", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
     (["reduce-terms", "configs/two_link.yaml", "--results", "done"], "such as `terms: {torque_error: 0.01}`"),
     (["process-log", "configs/two_link.yaml", "--results", "done"], "`paramreduce init ROBOT.urdf --log FILE`"),
-    (["export"], "such as --results results/my_samples"),
-    (["export", "two_link"], "Did you mean configs/two_link.yaml?"),
+    (["export"], "Next: paramreduce export --results results/my_samples"),
+    (["export", "two_link"], "Next: paramreduce export configs/two_link.yaml"),
     (["export", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
     (["export", "configs/two_link.yaml", "--format", "java"], "'c', 'casadi'"),
-    (["export", "configs/two_link.yaml", "--results", "done", "--model", "swap:99"], "swap:1...7"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "swap:99"],
+     "Next: paramreduce export configs/two_link.yaml --results done --model swap:7"),
     (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "add --what idm"),
     (["export", "configs/two_link.yaml", "--results", "done", "--format", "urdf"],
      "`paramreduce init ROBOT.urdf` writes"),
@@ -57,10 +65,11 @@ MOVES = [
     (["inspect", "."], "`paramreduce inspect done`"),
     (["inspect", "done/model"], "Did you mean done/model.h5?"),
     (["inspect", "samples.h5"], "is not a readable HDF5 file"),
-    (["inspect", "done/reduction.h5", "--model", "best:3"], "best-subset:1...7"),
+    (["inspect", "done/reduction.h5", "--model", "best:3"],
+     "Next: paramreduce inspect done/reduction.h5 --model best-subset:3"),
     (["compare", "done"], "Example: paramreduce compare"),
     (["compare", "done", "dome"], "Did you mean done?"),
-    (["compare", "done", "summary.json"], "make it again with `paramreduce run`"),
+    (["compare", "done", "summary.json"], "make it again with `paramreduce run CONFIG`"),
     (["table"], "Example: paramreduce table"),
     (["table", "."], "`paramreduce table done`"),
     (["open"], "Example: paramreduce open"),
@@ -68,11 +77,12 @@ MOVES = [
     (["open", "results/none"], "`paramreduce run CONFIG`"),
     (["init"], "`paramreduce init robot.urdf`"),
     (["init", "nothing.urdf"], "give the path of a URDF or MJCF"),
-    (["init", "one.urdf"], "give --floating"),
-    (["init", "--example", "pmua560"], "puma560"),
+    (["init", "one.urdf"], "Next: paramreduce init one.urdf --floating"),
+    (["init", "--example", "pmua560"], "Next: paramreduce init --example puma560"),
     (["init", "--dh", "two_link"], "choose another with --output"),
-    (["reduce", "--samples", "samples.h5"], "such as --results results/my_samples"),
-    (["reduce", "--samples", "sample.h5", "--results", "r"], "Did you mean samples.h5?"),
+    (["reduce", "--samples", "samples.h5"], "Next: paramreduce reduce --samples samples.h5 --results results/my_samples"),
+    (["reduce", "--samples", "sample.h5", "--results", "r"],
+     "Next: paramreduce reduce --samples samples.h5 --results r"),
     (["completion", "tcsh"], "Example: paramreduce completion bash"),
     (["graph", "configs/two_link.yaml"], "paramreduce graph --help says more"),
 ]  # fmt: skip
@@ -103,8 +113,37 @@ def folder(two_link_results, tmp_path, monkeypatch):
 def test_what_does_not_work_says_what_does(invoke, folder, words, told):
     said = invoke(*words, code=2)
     assert told in said.out + said.err
+    assert re.search(r"paramreduce (--help|[a-z-]+ \S)", said.err)  # something to type as it stands
     assert "Traceback" not in said.err
     assert not (folder / "results").exists() or not list((folder / "results").rglob("*.h5"))
+
+
+@pytest.mark.parametrize("words", [["inspect", "results/two_link"], ["report", "configs/two_link.yaml"], ["open", "results/two_link"]], ids=" ".join)  # fmt: skip
+def test_old_results_are_remade_with_their_config(invoke, folder, words, monkeypatch):
+    shutil.copytree(folder / "done", folder / "results" / "two_link")
+    with h5py.File(folder / "results/two_link/validation.h5", "r+") as file:
+        file.attrs["schema"] = SCHEMA - 1
+    (folder / "results/two_link/report/index.html").unlink()
+    assert "`paramreduce run configs/two_link.yaml`" in invoke(*words, code=2).err
+
+
+@pytest.mark.parametrize(
+    ("words", "library", "extra"),
+    [
+        (["init", "arm.xml"], "mujoco", "mjcf"),
+        (["check-data", "bag"], "rosbags.highlevel", "rosbag"),
+        (["table", "done", "--parquet"], "pyarrow", "parquet"),
+    ],
+    ids=str,
+)
+def test_a_missing_extra_is_named(invoke, folder, monkeypatch, words, library, extra):
+    (folder / "arm.xml").write_text("<mujoco><worldbody/></mujoco>")
+    (folder / "bag").mkdir()
+    (folder / "bag" / "metadata.yaml").write_text("")
+    for name in [name for name in sys.modules if name.split(".")[0] == library.split(".")[0]]:
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setitem(sys.modules, library.split(".")[0], None)
+    assert f"pip install 'paramreduce[{extra}]'" in invoke(*words, code=2).err
 
 
 def test_without_a_command_it_says_what_to_do(invoke, tmp_path, monkeypatch, two_link_results):

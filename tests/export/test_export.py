@@ -354,6 +354,15 @@ def test_the_header_lists_orders_and_units(hexaglide):
     independent = text[text.index("Independent coordinates") : text.index("Dependent coordinates")]
     assert [f"{k}: s_{k + 1}, m" in independent for k in range(6)] == [True] * 6
     assert "Gravity in the base frame, m/s^2: 0 0 -9.8" in text
+    assert "each placed in the frame of the body it is on" in text
+
+
+@pytest.mark.parametrize("kind", ["c", "python", "matlab"])
+def test_the_header_says_in_which_frames_the_parameters_are(puma, kind):
+    text = b"".join(files_of(puma, kind, "idm").values()).decode()
+    assert "modified Denavit-Hartenberg, z of frame i along the axis of joint i; m and rad" in text
+    (row,) = set(re.findall(r" 3 +2 +revolute .*", text))
+    assert row.split() == ["3", "2", "revolute", "0.4318", "0", "-0.1491", "z_3"]
 
 
 @needs_gcc

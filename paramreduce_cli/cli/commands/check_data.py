@@ -7,7 +7,7 @@ import rich.box
 import rich.table
 
 from paramreduce_cli.cli.options import SET
-from paramreduce_cli.cli.terminal import remark, say, say_table
+from paramreduce_cli.cli.terminal import LOG, remark, say, say_table
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.log_template import guessed_columns
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
@@ -23,6 +23,7 @@ _TABLE_WIDTH = 100
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("config", type=click.Path(path_type=Path, dir_okay=False), required=False)
 @SET
+@LOG
 def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:
     """Say what a log is good for: rate, gaps, noise, and with a CONFIG how well it excites the robot.
 

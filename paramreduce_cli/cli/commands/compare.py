@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import load_summary
-from paramreduce_cli.cli.terminal import JSON, emit, say
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
 from paramreduce_cli.report.comparison import compare as compared
@@ -24,6 +24,7 @@ DIFFERENT = 1
     "--only", multiple=True, type=click.Choice(list(QUANTITIES)), help="Compare only this."
 )
 @JSON
+@LOG
 def compare(
     first: Path, second: Path, given: tuple[str, ...], only: tuple[str, ...], as_json: bool
 ) -> int:

@@ -9,7 +9,7 @@ import click
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
-from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, progress_bars, say
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.export.choice import (
@@ -67,6 +67,8 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, TERMS)
     "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/FORMAT]",
 )  # fmt: skip
+@VERBOSE
+@LOG
 def export(
     config: Path | None,
     results: Path | None,
@@ -132,18 +134,20 @@ def export(
         assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:
-        files = exported(
-            loading[Model],
-            chosen,
-            title=title,
-            language=kind,
-            what=Exported(what),
-            constant=constants,
-            single=single,
-            simplified=simplified,
-            origin=origin,
-            validation=loading.get(Validation),
-        )
+        with progress_bars(quiet=False) as tell:
+            files = exported(
+                loading[Model],
+                chosen,
+                title=title,
+                language=kind,
+                what=Exported(what),
+                constant=constants,
+                single=single,
+                simplified=simplified,
+                origin=origin,
+                validation=loading.get(Validation),
+                tell=tell,
+            )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")
 

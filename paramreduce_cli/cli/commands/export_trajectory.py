@@ -8,7 +8,7 @@ from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
-from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.cli.terminal import LOG, say
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.export.timed_motion import timed_motion
@@ -35,6 +35,7 @@ from paramreduce_cli.records import Model, Trajectories, Trajectory
     "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/trajectory-FORMAT]",
 )  # fmt: skip
+@LOG
 def export_trajectory(
     config: Path,
     results: Path | None,

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import contextlib
+import dataclasses
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +16,12 @@ import rich.table
 from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.terminal import JSON, emit, harmless, say, say_table
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.records import Model, ModelChoice, Reduction, Validation
+from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
 
 if TYPE_CHECKING:
-    from paramreduce_cli.records import FloatArray, ReducedModel
+    from paramreduce_cli.records import ReducedModel
 
 
 @click.command()
@@ -31,21 +34,24 @@ if TYPE_CHECKING:
 )
 @click.option("--relations", is_flag=True, help="And what its parameters stand for.")
 @JSON
+@LOG
 def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> None:
     """Show what is in an artifact and where it came from; of a results folder the selected model.
 
     Example: paramreduce inspect results/puma560/reduction.h5 --model forward-selection:18
     """
     folder = file if file.is_dir() else file.parent
-    if chosen == "selected":
-        _say_model(*_selected(folder / "validation.h5"), relations, as_json)
-    elif chosen is not None:
-        path = file / "reduction.h5" if file.is_dir() else file
-        _say_model(*_chosen(path, chosen), relations, as_json)
-    elif file.is_dir():
+    if file.is_dir() and chosen is None:
         if not (file / "validation.h5").exists() and (meant := results_below(file, "inspect")):
             raise ArtifactError(f"{file}: holds no results itself.{meant}")
-        _say_model(*_selected(file / "validation.h5"), relations, as_json)
+        chosen = "selected"
+    if chosen == "selected":
+        title, model = _selected(folder / "validation.h5")
+        _say_model(title, _parameters(model, folder), relations, as_json)
+    elif chosen is not None:
+        path = file / "reduction.h5" if file.is_dir() else file
+        title, model = _chosen(path, chosen)
+        _say_model(title, _parameters(model, folder), relations, as_json)
     elif file.suffix == ".json":
         loaded = load_summary(file)
         _say_all({**loaded.get("provenance", {}), **loaded.get("selected", {})}, as_json)
@@ -74,21 +80,74 @@ def _say_contents(file: Path, as_json: bool) -> None:
     table.add_column("dataset", no_wrap=True)
     table.add_column("shape", no_wrap=True)
     table.add_column("content", overflow="fold")
-    for row in datasets:
+    for row in _folded(datasets):
         table.add_row(*(rich.markup.escape(harmless(cell)) for cell in row))
     say_table(table, max(len(name) + len(shape) + 20 for name, shape, _ in datasets))
 
 
-def _say_model(title: str, model: ReducedModel, relations: bool, as_json: bool) -> None:
-    rows = list(zip(model.names, model.values.tolist(), model.expressions, strict=True))
+def _folded(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[str, str, str]]:
+    """Datasets, those of every size or number in one line."""
+    for (place, numbered), members in itertools.groupby(datasets, _family):
+        rows = list(members)
+        if not numbered or len(rows) == 1:
+            yield from rows
+        else:
+            numbers = sorted(int(name.rpartition("/")[2]) for name, _, _ in rows)
+            yield (
+                f"{place}/*",
+                f"{len(rows)} datasets",
+                f"{rows[0][2]}, {numbers[0]} to {numbers[-1]}",
+            )
+
+
+def _family(row: tuple[str, str, str]) -> tuple[str, bool]:
+    place, _, last = row[0].rpartition("/")
+    return (place, True) if last.isdecimal() else (row[0], False)
+
+
+def _say_model(
+    title: str, parameters: Sequence[_Parameter], relations: bool, as_json: bool
+) -> None:
     if as_json:
-        keys = ("name", "value", "stands_for")
-        emit(model=title, parameters=[dict(zip(keys, row, strict=True)) for row in rows])
+        emit(model=title, parameters=[dataclasses.asdict(p) for p in parameters])
         return
     say(title)
-    longest = max(map(len, model.names), default=0)
-    for name, value, text in rows:
-        say(f"  {name:{longest}}  {value: .9e}" + (f"  =  {text}" if relations else ""))
+    longest = max((len(p.name) for p in parameters), default=0)
+    for p in parameters:
+        value = f"{p.value: .9e}"
+        value += f" ± {p.deviation:.2g}" if p.deviation is not None else ""
+        say(
+            f"  {p.name:{longest}}  {value} {p.unit}".rstrip()
+            + (f"  =  {p.stands_for}" if relations else "")
+        )
+
+
+@dataclasses.dataclass(frozen=True)
+class _Parameter:
+    """A parameter as it is shown."""
+
+    name: str
+    value: float
+    unit: str
+    """Empty where nothing is known of the robot."""
+    deviation: float | None
+    """Standard deviation, where torques were measured."""
+    stands_for: str
+
+
+def _parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
+    """Of a model, with what the files beside it know of them."""
+    model = _beside(folder / "model.h5", Model)
+    found = _beside(folder / "identification.h5", Identification)
+    deviations = {} if found is None else found.reduced.deviations_of(chosen)
+    units = [] if model is None else [p.unit for p in model.mechanism.parameters]
+    first = {k: column for column, k in reversed(list(enumerate(chosen.position.tolist())))}
+    return [
+        _Parameter(name, value, units[first[k]] if units else "", deviations.get(name), expression)
+        for k, (name, value, expression) in enumerate(
+            zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
+        )
+    ]
 
 
 def _selected(file: Path) -> tuple[str, ReducedModel]:
@@ -100,11 +159,13 @@ def _selected(file: Path) -> tuple[str, ReducedModel]:
     return f"{selected.reason} {validation.verdict}", selected.model
 
 
-def _known_values(file: Path) -> FloatArray | None:
-    """Standard parameters, by which relations are ordered; None without a model beside the reduction."""
+def _beside(file: Path, record: type) -> Any:
+    """What a file beside the one that is looked at holds; None if there is none, or no readable one."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
 
-    return load_file(file, Model, None, "build-model")[0].values if file.exists() else None
+    with contextlib.suppress(ArtifactError):  # it only tells more
+        return load_file(file, record, None, "")[0]
+    return None
 
 
 def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
@@ -118,8 +179,8 @@ def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
     if row is None:
         raise ConfigError(f"--model {chosen}: there is {known_choices(reduction)}.")
     found = reduction.heuristics[choice.heuristic]
-    known = _known_values(file.parent / "model.h5")
-    model = reduced_model(reduction, choice.heuristic, row, known)
+    known = _beside(file.parent / "model.h5", Model)
+    model = reduced_model(reduction, choice.heuristic, row, None if known is None else known.values)
     flag = ", minimum-norm fit beyond the rank" if found.minimum_norm[row] else ""
     error = f"torque error {found.torque_error[row]:.6g}{flag}"
     return f"{choice.heuristic}, n = {model.n}, {error}", model

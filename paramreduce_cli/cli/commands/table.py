@@ -9,7 +9,7 @@ from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.terminal import JSON, emit, say
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
@@ -25,6 +25,7 @@ from paramreduce_cli.texts.table import Table
 )  # fmt: skip
 @click.option("--parquet", is_flag=True, help="Write PREFIX-runs.parquet too; it needs pyarrow.")
 @JSON
+@LOG
 def table(results: tuple[Path, ...], output: Path | None, parquet: bool, as_json: bool) -> None:
     """Set one table over several robots or runs, as text, CSV, LaTeX and a page.
 

@@ -1,0 +1,25 @@
+"""Calls that are mended from what an error says."""
+
+import pytest
+
+from paramreduce_cli.cli.corrections import corrected
+
+
+@pytest.mark.parametrize(
+    ("message", "typed", "meant"),
+    [
+        ("a.yaml: there is no such file. Did you mean b.yaml?", "run a.yaml --jobs 2", "run b.yaml --jobs 2"),
+        ("a.yaml: there is no such file. Did you mean my arm.yaml?", "run c.yaml", None),
+        ("--set x.m=4: x.m: key 'm' is not known; did you mean n?", "run a.yaml --set x.m=4", "run a.yaml --set x.n=4"),
+        ("--set m.m=m: m.m: 'm' is not known; did you mean n?", "run --set m.m=m", "run --set m.m=n"),
+        ("--model swap:9: there is full, swap:2...7.", "export --model swap:9", "export --model swap:7"),
+        ("--model swap:0: there is swap:2...7; with a log also identified.", "export --model swap:0", "export --model swap:2"),
+        ("--model swop:3: there is swap:2...7.", "export --model swop:3", "export --model swap:3"),
+        ("--results: say where, such as --results results/x.", "reduce --samples s.h5", "reduce --samples s.h5 --results results/x"),
+        ("a.yaml, line 3: robot is missing.", "run a.yaml", "run a.yaml"),
+        ("something else is wrong.", "run a.yaml", None),
+    ],
+)  # fmt: skip
+def test_what_is_meant(message, typed, meant):
+    expected = "" if meant is None else f"paramreduce {meant}"
+    assert corrected(message, typed.split()) == expected
