@@ -17,6 +17,10 @@ from paramreduce_cli.cli import cli
 from paramreduce_cli.config.loading import config_schema
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
+KEYS = Path(__file__).resolve().parent / "keys"
+"""Configs that use what the others do not need."""
+_LONGEST = 120
+"""Characters of an example."""
 RECORDS = Path(__file__).resolve().parents[1] / "paramreduce_cli" / "records"
 Schema = Mapping[str, Any]
 
@@ -29,17 +33,19 @@ def config_page() -> str:
         "",
         "Made from the schema that the program checks configs with; `paramreduce schema` prints it for editors.",
         "Numbers may be written as `pi/2`, `90deg` or with names under `constants`. Where a key has no",
-        "default it must be given. *Example* is from a config that comes along.",
+        "default it must be given. *Example* is from a config that comes along, or from `docs/keys/`; a `share` is",
+        "1 for all of it.",
     ]
     examples = _examples()
     for path, section, about in _sections(schema):
         lines += ["", f"## `{path}`" if path else "## At the top", "", about, ""]
-        lines += ["| key | what it takes | default | what it is | example |", "| --- | --- | --- | --- | --- |"]  # fmt: skip
+        lines += ["| key | what it takes | unit | default | what it is | example |", "| --- | --- | --- | --- | --- | --- |"]  # fmt: skip
         for key, entry in section.get("properties", {}).items():
             full = f"{path}.{key}" if path else key
             needed = key in section.get("required", ())
             default = "**must be given**" if needed else _code(entry.get("default"))
-            cells = (f"`{key}`", _kind(entry, schema), default, _cell(entry.get("description", "")), examples.get(full, ""))  # fmt: skip
+            text = _text(entry.get("description", ""))
+            cells = (f"`{key}`", _kind(entry, schema), _unit(text), default, _cell(text), _cell(examples.get(full, "")))  # fmt: skip
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -145,15 +151,30 @@ def _kind(entry: Schema, schema: Schema) -> str:
     return words.get(str(entry.get("type")), "anything")
 
 
+_UNITS = ("rad/s^2", "rad/s", "rad", "kg m^2", "kg m", "kg", "m/s^2", "m/s", "m", "N m s/rad", "N m/rad", "N m", "N", "Hz", "W", "s", "share")  # fmt: skip
+
+
+def _unit(text: str) -> str:
+    """The unit that a description names; with that of sliding joints where it differs."""
+    one = "|".join(map(re.escape, _UNITS))
+    other = r"(?: or m| \((?:[a-zA-Z/^2 ]+?)(?: if (?:prismatic|it slides))?\))?"
+    found = re.search(rf"(?:^|[,;:] |; a |, a )((?:{one}){other})(?=[.;,:]|$| \(0|, times| per its unit)", text)
+    return (
+        found[1].replace(" if prismatic", "").replace(" if it slides", "").replace("^2", "²")
+        if found
+        else ""
+    )
+
+
 def _plural(kind: str) -> str:
     return {"a number": "numbers", "a section": "sections", "text": "texts", "a whole number": "whole numbers"}.get(kind, kind)  # fmt: skip
 
 
-def _code(value: Any) -> str:
+def _code(value: Any, most: int = 60) -> str:
     if value is None:
         return "none"
     text = yaml.safe_dump(value, default_flow_style=True, width=1000).strip().removesuffix("...").strip()  # fmt: skip
-    return f"`{text}`" if len(text) <= 60 else "see the text"
+    return f"`{text}`" if len(text) <= most else "see the text"
 
 
 def _examples() -> dict[str, str]:
@@ -165,14 +186,16 @@ def _examples() -> dict[str, str]:
             for key, below in value.items():
                 walk(below, {f"{p}.{k}".lstrip(".") for p in places for k in (key, "NAME")})
         elif isinstance(value, list) and value and isinstance(value[0], dict):
-            walk(value[0], {f"{place}[]" for place in places})
-        if not isinstance(value, dict):
-            for place in places:
-                found.setdefault(place, _code(value))
+            for below in value:
+                walk(below, {f"{place}[]" for place in places})
+            value = value[:1]
+        text = _code(value, _LONGEST)
+        for place in places if text != "see the text" else ():
+            found.setdefault(place, text)
 
-    for path in sorted(CONFIGS.glob("*.yaml")):
+    for path in (*sorted(CONFIGS.glob("*.yaml")), *sorted(KEYS.glob("*.yaml"))):
         walk(yaml.safe_load(path.read_text(encoding="utf-8")), {""})
-    return {place: text for place, text in found.items() if text != "see the text"}
+    return found
 
 
 def _text(text: str) -> str:

@@ -14,6 +14,7 @@ import yaml
 from conftest import ROOT, model_of
 
 from paramreduce_cli.cli import cli
+from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import config_schema
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.writing import export
@@ -39,10 +40,25 @@ def schema_keys(schema):
 
 def test_every_key_of_a_config_is_on_its_page(generated):
     page = generated.config_page()
-    rows = re.findall(r"^\| `(\w+)` \|(.*)\|(.*)\|(.*)\|(.*)\|$", page, re.MULTILINE)
-    assert sorted(row[0] for row in rows) == sorted(schema_keys(config_schema()))
-    assert all(row[3].strip() for row in rows)
+    rows = [
+        re.split(r"(?<!\\)\|", line)[1:-1] for line in page.splitlines() if line.startswith("| `")
+    ]
+    assert sorted(row[0].strip(" `") for row in rows) == sorted(schema_keys(config_schema()))
+    for key, kind, unit, _, text, example in rows:
+        assert text.strip(), key
+        assert example.strip() or "section" in kind, key
+        if (
+            re.search(r"\b(rad|kg|Hz|N m)\b", text)
+            and "one of" not in kind
+            and "offset" not in text
+        ):
+            assert unit.strip(), (key, text)
     assert len(generated.keys()) == len(set(generated.keys())) == len(rows)
+
+
+@pytest.mark.parametrize("path", sorted((DOCS / "keys").glob("*.yaml")), ids=lambda p: p.stem)
+def test_examples_of_keys_are_configs(path):
+    load_config(path)
 
 
 def test_every_command_and_option_is_on_its_page(generated):

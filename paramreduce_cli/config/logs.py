@@ -77,7 +77,7 @@ class LogSection(Section):
     transmission: list[PerJoint] | PerJoint | None = None
     """Motor over joint: one number per joint, or a matrix N of them (motor position = N joint position); recorded positions and torques are then the motors'."""
     torque_constants: PerJoint | None = None
-    """N m (N) per recorded unit, where currents were recorded; before the transmission."""
+    """Torque over the recorded current, N m (N) per its unit; before the transmission."""
     signs: PerJoint = [1.0]
     """1 or -1 for joints (or motors) that were counted the other way, in motion and torque alike."""
     torque_signs: PerJoint = [1.0]
