@@ -27,9 +27,9 @@ SHORT = {
 """Pages that are typed with short configs, by what their readers have in their folder."""
 NOTEBOOK = "tutorial.ipynb"
 _BLOCK = re.compile(
-    r"(?:`(?P<file>[\w.]+\.py)`:\n\n)?```(?P<kind>\w*)\n(?P<text>.*?)```", re.DOTALL
+    r"(?:`(?P<file>[\w.]+\.(?:py|[ch]pp|m))`:\n\n)?```(?P<kind>\w*)\n(?P<text>.*?)```", re.DOTALL
 )
-_COMMAND = re.compile(r"paramreduce |for |cp |python |make -C ")
+_COMMAND = re.compile(r"paramreduce |for |cp |python |make -C |cc |g\+\+ |octave-cli |\./")
 """Lines that are typed; other targets of Make are those of the repository, and CI's."""
 
 
