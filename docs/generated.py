@@ -4,15 +4,18 @@ mkdocs runs this when the site is built; `python docs/generated.py FOLDER` write
 """
 
 import ast
+import inspect
 import re
 import sys
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import click
 import yaml
 
+from paramreduce_cli import api
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config.loading import config_schema
 
@@ -81,6 +84,47 @@ def records_page() -> str:
                 lines += ["| field | kind | what it is |", "| --- | --- | --- |"]
                 lines += [f"| `{name}` | `{kind}` | {_cell(about)} |" for name, kind, about in fields]  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def python_page() -> str:
+    """Everything that ``paramreduce_cli`` offers, from its docstrings."""
+    lines = ["# Functions", "", "What `import paramreduce_cli as pr` offers, from its docstrings; [From Python](../python.md) shows it at work. Records", "are [here](records.md)."]  # fmt: skip
+    for name in api.__all__:
+        lines += ["", f"## {name}", "", *_documented(name, getattr(api, name))]
+        if isinstance(getattr(api, name), type):
+            for own, member in vars(getattr(api, name)).items():
+                if not own.startswith("_") and isinstance(member, property | cached_property) and member.__doc__:  # fmt: skip
+                    lines += [f"- `.{own}`: {_roles(_text(member.__doc__))}"]
+    return "\n".join(lines) + "\n"
+
+
+def _documented(name: str, thing: Any) -> Iterator[str]:
+    """Signature and docstring: sections of arguments and errors as lists."""
+    if inspect.isfunction(thing):
+        text = re.sub(r"(: |-> )'([^']+)'", r"\1\2", str(inspect.signature(thing)))
+        text = re.sub(r"paramreduce_cli\.[\w.]*\.", "", text)
+        yield from ("```text", f"pr.{name}{text}", "```", "")
+    for paragraph in inspect.cleandoc(thing.__doc__ or "").split("\n\n"):
+        title, _, body = paragraph.partition("\n")
+        if title not in ("Args:", "Raises:", "Returns:", "Attributes:"):
+            yield from (_roles(_text(paragraph)), "")
+            continue
+        yield from (f"**{title[:-1]}**", "")
+        if title == "Returns:":
+            yield _roles(_text(body))
+        else:
+            for entry in re.split(
+                r"\n(?=    \S)", f"\n{inspect.cleandoc(body)}".replace("\n", "\n    ")
+            )[1:]:
+                key, _, about = entry.strip().partition(":")
+                yield f"- `{key}`: {_roles(_text(about))}"
+        yield ""
+
+
+def _roles(text: str) -> str:
+    """References and literals of docstrings as Markdown."""
+    text = re.sub(r":\w+:`~?(?:[\w.]*\.)?(\w+)`", r"`\1`", text)
+    return text.replace("``", "`")
 
 
 def _fields(node: ast.ClassDef) -> Iterator[tuple[str, str, str]]:
@@ -158,7 +202,9 @@ def _unit(text: str) -> str:
     """The unit that a description names; with that of sliding joints where it differs."""
     one = "|".join(map(re.escape, _UNITS))
     other = r"(?: or m| \((?:[a-zA-Z/^2 ]+?)(?: if (?:prismatic|it slides))?\))?"
-    found = re.search(rf"(?:^|[,;:] |; a |, a )((?:{one}){other})(?=[.;,:]|$| \(0|, times| per its unit)", text)
+    found = re.search(
+        rf"(?:^|[,;:] |; a |, a )((?:{one}){other})(?=[.;,:]|$| \(0|, times| per its unit)", text
+    )
     return (
         found[1].replace(" if prismatic", "").replace(" if it slides", "").replace("^2", "²")
         if found
@@ -210,6 +256,7 @@ PAGES = {
     "reference/config.md": config_page,
     "reference/commands.md": commands_page,
     "reference/records.md": records_page,
+    "reference/python.md": python_page,
 }
 
 if __name__ == "<run_path>" or "mkdocs_gen_files" in sys.modules:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.export.writing import export
+from paramreduce_cli.frames import frame
 from paramreduce_cli.in_memory import made_in_memory
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.pipeline import maker_of, pipeline, stages_to_run
@@ -41,9 +42,6 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
 from paramreduce_cli.runner import Runner, asked, provenance
-
-if TYPE_CHECKING:
-    import pandas as pd
 
 __all__ = [
     "Config",
@@ -364,31 +362,6 @@ class Results:
 
     def _record(self, kind: type) -> Any:
         return load_file(Store(self.folder).path(kind), kind, None, maker_of(kind))[0]
-
-
-def frame(record: Reduction | Validation) -> pd.DataFrame:
-    """All models of a reduction or a validation as a table, a row each; it needs pandas.
-
-    Columns of a reduction: heuristic, n, torque_error, parameters. Of a validation: heuristic, n, and
-    what is known of every model, errors and operations, but for single joints.
-    """
-    import pandas as pd
-
-    rows = []
-    if isinstance(record, Reduction):
-        for name, found in record.heuristics.items():
-            for k, n in enumerate(found.n.tolist()):
-                kept = tuple(record.columns.names[c] for c in sorted(found.subsets[k].tolist()))
-                error = float(found.torque_error[k])
-                rows.append({"heuristic": name, "n": n, "torque_error": error, "parameters": kept})
-        return pd.DataFrame(rows)
-    for name, judged in record.heuristics.items():
-        columns = {key: value for key, value in vars(judged).items() if value.ndim == 1}
-        sizes = range(judged.n.size)
-        rows += [
-            {"heuristic": name} | {key: column[k] for key, column in columns.items()} for k in sizes
-        ]
-    return pd.DataFrame(rows)
 
 
 def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:

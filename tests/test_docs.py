@@ -1,6 +1,7 @@
 """Whether the docs name everything there is."""
 
 import importlib.util
+import inspect
 import re
 import shlex
 import shutil
@@ -13,6 +14,7 @@ import pytest
 import yaml
 from conftest import ROOT, model_of
 
+from paramreduce_cli import api
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import config_schema
@@ -54,6 +56,18 @@ def test_every_key_of_a_config_is_on_its_page(generated):
         ):
             assert unit.strip(), (key, text)
     assert len(generated.keys()) == len(set(generated.keys())) == len(rows)
+
+
+def test_every_function_is_on_its_page_with_what_it_takes(generated):
+    page = generated.python_page()
+    for name in api.__all__:
+        text = page.split(f"\n## {name}\n")[1].split("\n## ")[0]
+        thing = getattr(api, name)
+        assert inspect.cleandoc(thing.__doc__).split("\n")[0].replace("``", "`") in text
+        if inspect.isfunction(thing):
+            assert f"pr.{name}(" in text
+            described = re.findall(r"^    (\w+):", inspect.cleandoc(thing.__doc__), re.MULTILINE)
+            assert all(f"- `{one}`: " in text for one in described)
 
 
 @pytest.mark.parametrize("path", sorted((DOCS / "keys").glob("*.yaml")), ids=lambda p: p.stem)

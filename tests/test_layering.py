@@ -15,7 +15,7 @@ PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
     {"cli", "__main__", "api"},
     {"workflow", "runner", "in_memory"},
-    {"sweep", "taken"},
+    {"sweep", "taken", "frames"},
     {"pipeline"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},

@@ -1,0 +1,103 @@
+"""Records as pandas' tables, for whoever works on with them in Python."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import fields
+from functools import singledispatch
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from paramreduce_cli.records import (
+    Identification,
+    Model,
+    ReducedModel,
+    Reduction,
+    Trajectories,
+    Validation,
+)
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Row = dict[str, Any]
+
+
+def frame(
+    record: Model | Trajectories | Reduction | Validation | Identification | ReducedModel,
+) -> pd.DataFrame:
+    """A record as a table; it needs pandas.
+
+    Of a model the standard parameters, a row each: name, body, kind, unit, value, affecting. Of trajectories
+    set, number and the numbers that each has reached. Of a reduction all models: heuristic, n,
+    torque_error, parameters; of a validation heuristic, n, and errors and operations of every model, but for
+    single joints. Of a reduced model its parameters: name, value, stands_for. Of an identification
+    those of both models: model, name, value, deviation, the standard deviation.
+
+    Args:
+        record: Which one.
+
+    Raises:
+        TypeError: No table is made of such a record.
+    """
+    import pandas as pd
+
+    return pd.DataFrame(list(_rows(record)))
+
+
+@singledispatch
+def _rows(record: Any) -> Iterator[Row]:
+    raise TypeError(f"no table is made of a {type(record).__name__}")
+
+
+@_rows.register
+def _(record: Model) -> Iterator[Row]:
+    known = zip(
+        record.mechanism.parameters, record.values.tolist(), record.affecting.tolist(), strict=True
+    )
+    for parameter, value, affecting in known:
+        yield {"name": parameter.name, "body": parameter.owner, "kind": parameter.kind.symbol,
+               "unit": parameter.unit, "value": value, "affecting": affecting}  # fmt: skip
+
+
+@_rows.register
+def _(record: Trajectories) -> Iterator[Row]:
+    for which in ("estimation", "validation"):
+        for k, trajectory in enumerate(getattr(record, which), 1):
+            values = {f.name: getattr(trajectory, f.name) for f in fields(trajectory)}
+            numbers = {key: v for key, v in values.items() if isinstance(v, int | float | str)}
+            yield {"set": which, "number": k, **numbers}
+
+
+@_rows.register
+def _(record: Reduction) -> Iterator[Row]:
+    for name, found in record.heuristics.items():
+        for k, n in enumerate(found.n.tolist()):
+            kept = tuple(record.columns.names[c] for c in sorted(found.subsets[k].tolist()))
+            error = float(found.torque_error[k])
+            yield {"heuristic": name, "n": n, "torque_error": error, "parameters": kept}
+
+
+@_rows.register
+def _(record: Validation) -> Iterator[Row]:
+    for name, judged in record.heuristics.items():
+        columns = {key: value for key, value in vars(judged).items() if np.ndim(value) == 1}
+        for k in range(judged.n.size):
+            yield {"heuristic": name} | {key: column[k] for key, column in columns.items()}
+
+
+@_rows.register
+def _(record: ReducedModel) -> Iterator[Row]:
+    expressions = record.expressions or record.names
+    for name, value, text in zip(record.names, record.values.tolist(), expressions, strict=True):
+        yield {"name": name, "value": value, "stands_for": text}
+
+
+@_rows.register
+def _(record: Identification) -> Iterator[Row]:
+    for which in ("full", "reduced"):
+        found = getattr(record, which)
+        columns = (found.names, found.values.tolist(), found.deviations.tolist())
+        for name, value, deviation in zip(*columns, strict=True):
+            yield {"model": which, "name": name, "value": value, "deviation": deviation}
