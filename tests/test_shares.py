@@ -1,5 +1,6 @@
 """Stages as several jobs: what they make is what one job makes, and what is missing is named."""
 
+import shutil
 from types import SimpleNamespace
 
 import h5py
@@ -89,15 +90,23 @@ def test_parts_of_one_recording(two_link_results, tmp_path):
     )
 
 
-@pytest.fixture
-def sampled(tmp_path):
-    """Both parts of the samples, and a runner to put them together."""
-    runner = Runner(config_of("two_link"), Store(tmp_path))
+@pytest.fixture(scope="module")
+def both_parts(tmp_path_factory):
+    """A folder with both parts of the samples; look, do not touch."""
+    folder = tmp_path_factory.mktemp("parts")
+    runner = Runner(config_of("two_link"), Store(folder))
     for name in ("build-model", "optimize-trajectories"):
         runner.run(STAGES[name])
     for number in (1, 2):
         runner.run(STAGES["sample"], share=Share(number, 2))
-    return runner, tmp_path / "samples.h5.parts"
+    return folder
+
+
+@pytest.fixture
+def sampled(both_parts, tmp_path):
+    """Both parts of the samples, and a runner to put them together."""
+    shutil.copytree(both_parts, tmp_path, dirs_exist_ok=True)
+    return Runner(config_of("two_link"), Store(tmp_path)), tmp_path / "samples.h5.parts"
 
 
 def test_a_part_that_is_done_is_not_done_again(sampled):

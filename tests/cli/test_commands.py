@@ -33,11 +33,12 @@ def test_every_command_explains_itself(invoke, command):
 
 
 def test_a_full_run_ends_with_a_table_and_the_report(invoke, tmp_path):
-    out, err = invoke("run", TWO_LINK, "--results", tmp_path / "r", "--jobs", 2)
+    run = ("run", TWO_LINK, "--results", tmp_path / "r")
+    out, err = invoke(*run, "--jobs", 2, settings=[ONE_FORMAT])
     assert "forward-selection" in out
     assert f"Report: {tmp_path / 'r' / 'report' / 'index.html'}" in out
     assert "validation-0000: done, kappa" in err  # plain lines, as there is no terminal
-    assert invoke("run", TWO_LINK, "--results", tmp_path / "r", "--quiet") == ("", "")
+    assert invoke(*run, "--quiet", settings=[ONE_FORMAT]) == ("", "")
 
 
 def test_stages_one_by_one_and_again(invoke, tmp_path):

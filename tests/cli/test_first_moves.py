@@ -7,7 +7,7 @@ import sys
 
 import h5py
 import pytest
-from conftest import CONFIGS
+from conftest import CONFIGS, ONE_FORMAT
 
 from paramreduce_cli.artifacts.hdf5 import SCHEMA
 
@@ -166,7 +166,8 @@ def test_examples_bring_the_files_they_name(invoke, tmp_path, monkeypatch):
 
 
 def test_json_is_a_line_for_every_event(invoke, folder):
-    lines = invoke("run", "configs/two_link.yaml", "--results", "done", "--json").out.splitlines()
+    run = ("run", "configs/two_link.yaml", "--results", "done", "--json")
+    lines = invoke(*run, settings=[ONE_FORMAT]).out.splitlines()
     events = [json.loads(line) for line in lines]
     assert [e["event"] for e in events if e["event"] != "progress"][-2:] == ["stage", "done"]
     assert events[-1]["selected"]["n"] == 4
@@ -180,7 +181,8 @@ def test_json_is_a_line_for_every_event(invoke, folder):
 
 
 def test_a_log_keeps_what_is_said(invoke, folder):
-    said = invoke("run", "configs/two_link.yaml", "--results", "done", "--log", "run.log").out
+    run = ("run", "configs/two_link.yaml", "--results", "done", "--log", "run.log")
+    said = invoke(*run, settings=[ONE_FORMAT]).out
     lines = (folder / "run.log").read_text().splitlines()
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d ", line) for line in lines)
     assert "$ paramreduce run configs/two_link.yaml" in lines[0]
