@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
+.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -30,6 +30,7 @@ help:
 	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
 	@echo "make docs        build the site, and run what it tells to type"
+	@echo "make serve       the site, to read in a browser"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -141,6 +142,10 @@ $(VENV)/.installed-docs: $(VENV)/.installed
 docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet
 	PYTHONPATH=tests $(BIN)/python -m tests.docs $(DOCS)
+
+# The site at http://localhost:8000.
+serve: $(VENV)/.installed-docs
+	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs serve
 
 # Damage, kills, odd configs and full disks by the thousand; SHARE=0.01 is a minute of it.
 SHARE ?= 1

@@ -4,6 +4,7 @@ import difflib
 import re
 import shlex
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 Words = list[str]
 
@@ -25,6 +26,15 @@ def corrected(message: str, words: Sequence[str]) -> str:
 def _file(message: str, words: Words) -> Words | None:
     found = re.match(r"(\S+): .*Did you mean ([^`\s]+)\?", message)
     return None if found is None else _exchanged(words, found[1], found[2])
+
+
+def _results(message: str, words: Words) -> Words | None:
+    """Results that are not there yet, of a config that is."""
+    found = re.match(
+        r"results/([\w.-]+?)(?:/\S*)?: (?:there is no such file|is not there)", message
+    )
+    config = Path("configs") / f"{found[1]}.yaml" if found else None
+    return ["run", str(config)] if config is not None and config.is_file() else None
 
 
 def _setting(message: str, words: Words) -> Words | None:
@@ -71,6 +81,7 @@ def _after_mending(message: str, words: Words) -> Words | None:
 
 
 _RULES: tuple[Callable[[str, Words], Words | None], ...] = (
+    _results,
     _file,
     _setting,
     _choice,

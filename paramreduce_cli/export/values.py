@@ -3,28 +3,38 @@
 import json
 
 from paramreduce_cli import __version__
-from paramreduce_cli.records import ReducedModel
+from paramreduce_cli.records import Mechanism, ReducedModel
 
 VALUES = "values"
 """Name of the format, beside languages and robots' files."""
 
 
-def values_file(chosen: ReducedModel, title: str, origin: str) -> dict[str, bytes]:
+def values_file(
+    chosen: ReducedModel, title: str, origin: str, mechanism: Mechanism | None = None
+) -> dict[str, bytes]:
     """The parameters that a model keeps, as JSON: in their order what they are called, worth, and stand for.
 
     Args:
         chosen: The model, with expressions.
         title: What it is called.
         origin: The artifact it is from, and its digest.
+        mechanism: Says units, coordinates and frames; None where there is none.
     """
     found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
+    units = {} if mechanism is None else {p.name: {"unit": p.unit} for p in mechanism.parameters}
+    known = {} if mechanism is None else {
+        "coordinates": mechanism.generalised_names,
+        "frames": mechanism.frames,
+        "geometry": mechanism.table,
+    }  # fmt: skip
     data = {
         "title": title,
         "from": origin,
         "paramreduce": __version__,
         "parameters": [
-            {"name": name, "value": value, "stands_for": expression}
+            {"name": name, "value": value, **units.get(name, {}), "stands_for": expression}
             for name, value, expression in found
         ],
+        **known,
     }
     return {"parameters.json": (json.dumps(data, indent=1) + "\n").encode()}

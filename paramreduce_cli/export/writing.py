@@ -161,14 +161,19 @@ def _validated(mechanism: Mechanism, validation: Validation) -> list[str]:
 
 def _ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
     """Of states, (3, n_dof) each, a line for every joint."""
-    kinds = ("position", "velocity", "acceleration")
-    return [
-        f"  {name}: "
-        + ", ".join(
-            f"{kind} {lower[k, j]:.4g} to {upper[k, j]:.4g}" for k, kind in enumerate(kinds)
+    lines = []
+    for j, name in enumerate(mechanism.coordinate_names):
+        kind = mechanism.bodies[mechanism.independent[j]].joint
+        unit = "rad" if kind == "revolute" else "m"
+        kinds = (f"{unit}, velocity", f"{unit}/s, acceleration", f"{unit}/s^2")
+        ranges = (
+            f"{low:.4g} to {high:.4g}" for low, high in zip(lower[:, j], upper[:, j], strict=True)
         )
-        for j, name in enumerate(mechanism.coordinate_names)
-    ]
+        lines.append(
+            f"  {name}: position "
+            + " ".join(f"{r} {k}" for r, k in zip(ranges, kinds, strict=True))
+        )
+    return lines
 
 
 def _frames(mechanism: Mechanism) -> tuple[str, ...]:

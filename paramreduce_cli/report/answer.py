@@ -29,6 +29,8 @@ class Answer:
     """What a reader has come for."""
 
     parameters: tuple[ShownParameter, ...]
+    kinds: tuple[tuple[str, str], ...]
+    """What the letters of their names stand for; empty where nothing is known of a robot."""
     worst_joint: str
     """The largest error of a joint's torque, in its unit; empty where nothing is known of units."""
     functions: tuple[str, str]
@@ -51,6 +53,7 @@ def answer(data: ReportData, asked: str) -> Answer:
     export = "paramreduce export" + (f" {asked}" if asked else "")
     return Answer(
         parameters=_parameters(data, data.validation.selected.model),
+        kinds=_kinds(data),
         worst_joint=_worst_joint(data),
         functions=data.functions,
         nanoseconds=_nanoseconds(data),
@@ -74,6 +77,33 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
         for k, (name, value, relation) in enumerate(
             zip(model.names, model.values, expressions, strict=True)
         )
+    )
+
+
+_KINDS = {
+    "m": "mass",
+    "mx my mz": "first moments",
+    "Ixx … Izz": "inertia about the body's frame",
+    "Ia": "rotor inertia",
+    "fv": "viscous friction",
+    "fc": "Coulomb friction",
+    "off": "constant torque",
+    "k": "stiffness",
+}
+"""What letters stand for, by those that are explained together."""
+
+
+def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
+    """Of the parameters that are shown."""
+    if data.known_model is None:
+        return ()
+    parameters = data.known_model.mechanism.parameters
+    symbols = {p.kind.symbol for p in parameters if p.name in data.validation.selected.model.names}
+    both = {f"I{a}{b}" for a in "xyz" for b in "xyz"}
+    return tuple(
+        (name, meaning)
+        for name, meaning in _KINDS.items()
+        if symbols & ({*name.split(" ")} | (both if name.startswith("Ixx") else set()))
     )
 
 

@@ -1,10 +1,10 @@
 """What the heuristics found, each curve once: those that found the same models share one."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramreduce_cli.records import HeuristicValidation, ModelChoice
+from paramreduce_cli.records import BoolArray, FloatArray, HeuristicValidation, ModelChoice
 from paramreduce_cli.report.data import ReportData
 
 COLOURS = (
@@ -25,6 +25,12 @@ class Curve:
     result: HeuristicValidation
     colour: str
     marker: str
+    own: BoolArray
+    """Which rows to draw: those that no curve before has, and where they meet it, (n_rows,)."""
+
+    def drawn(self, values: FloatArray) -> FloatArray:
+        """Values of all rows, not a number where a curve before has the very models."""
+        return np.where(self.own, values, np.nan)
 
     @property
     def label(self) -> str:
@@ -35,26 +41,50 @@ class Curve:
 def curves(data: ReportData) -> list[Curve]:
     """All heuristics, in their order; colours and markers are the same in all figures."""
     found: list[Curve] = []
+    seen: dict[int, list[_Values]] = {}
+    models: list[list[_Values]] = []
     for k, (name, result) in enumerate(data.validation.heuristics.items()):
-        for place, other in enumerate(found):
-            if _coincide(data, name, other.names[0]):
-                found[place] = Curve((*other.names, name), other.result, other.colour, other.marker)
-                break
-        else:
-            colour, marker = COLOURS[k % len(COLOURS)], _MARKERS[k % len(_MARKERS)]
-            found.append(Curve((name,), result, colour, marker))
+        sizes = result.n.tolist()
+        own = [_values(data, ModelChoice(name, n)) for n in sizes]
+        place = _same_curve(own, sizes, found, models)
+        if place is not None:
+            found[place] = replace(found[place], names=(*found[place].names, name))
+            continue
+        fresh = [
+            values is None or not any(_same(values, other) for other in seen.get(n, ()))
+            for n, values in zip(sizes, own, strict=True)
+        ]
+        for n, values in zip(sizes, own, strict=True):
+            seen.setdefault(n, []).append(values)
+        models.append(own)
+        colour, marker = COLOURS[k % len(COLOURS)], _MARKERS[k % len(_MARKERS)]
+        found.append(Curve((name,), result, colour, marker, _with_neighbours(np.array(fresh))))
     return found
 
 
-def _coincide(data: ReportData, one: str, other: str) -> bool:
-    sizes = data.validation.heuristics[one].n.tolist()
-    return sizes == data.validation.heuristics[other].n.tolist() and all(
-        _same(*(_model(data, ModelChoice(name, n)) for name in (one, other))) for n in sizes
-    )
+_Values = dict[int, float] | None
+"""Of a model by column; None where there is no such model."""
 
 
-def _model(data: ReportData, choice: ModelChoice) -> dict[int, float] | None:
-    """Values by column; None where there is no such model."""
+def _same_curve(
+    own: list[_Values], sizes: list[int], found: list[Curve], models: list[list[_Values]]
+) -> int | None:
+    """Which curve has the very same models, if any."""
+    for place, (curve, others) in enumerate(zip(found, models, strict=True)):
+        if curve.result.n.tolist() == sizes and all(map(_same, own, others)):
+            return place
+    return None
+
+
+def _with_neighbours(fresh: BoolArray) -> BoolArray:
+    """Those, and what is beside them, so that lines go on to where curves meet."""
+    result = fresh.copy()
+    result[1:] |= fresh[:-1]
+    result[:-1] |= fresh[1:]
+    return result
+
+
+def _values(data: ReportData, choice: ModelChoice) -> _Values:
     row = choice.row(data.reduction)
     if row is None:
         return None
@@ -62,7 +92,7 @@ def _model(data: ReportData, choice: ModelChoice) -> dict[int, float] | None:
     return dict(zip(found.subsets[row].tolist(), found.parameters[row].tolist(), strict=True))
 
 
-def _same(one: dict[int, float] | None, other: dict[int, float] | None) -> bool:
+def _same(one: _Values, other: _Values) -> bool:
     if one is None or other is None:
         return one is other
     return set(one) == set(other) and bool(

@@ -15,6 +15,15 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   // Colours of curves stand out from white; on a dark page they are lightened, but not on paper.
   const shade = (own) => (dark.matches ? `color-mix(in srgb, ${own} 60%, white)` : own);
+  // A canvas as PNG, on the ground that it lies on.
+  function picture(canvas) {
+    const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+    const context = copy.getContext("2d");
+    context.fillStyle = colour("--card");
+    context.fillRect(0, 0, copy.width, copy.height);
+    context.drawImage(canvas, 0, 0);
+    return copy.toDataURL();
+  }
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
   // ---- data
@@ -130,6 +139,8 @@
     if (acceleration) acceleration.textContent = pair(curve.acceleration, row);
     part("command").textContent = `${root.dataset.command} --model ${curve.names[0]}:${curve.n[row]}`;
     const values = new Map(Array.from(model.columns, (k, i) => [k, model.values[i]]));
+    const told = ([k, value]) => `${columns[k].name} = ${Number(value.toPrecision(6))} ${columns[k].unit.replace("^2", "²")}`.trimEnd();
+    part("values").textContent = [...values].map(told).join("; ");
     columns.forEach((column, k) => {
       const kept = values.has(k);
       column.chip.className = kept ? "chip kept" : "chip";
@@ -225,16 +236,26 @@
     return `${finders(k, row).join(", ")}: ${c.n[row]} parameters, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
   };
 
-  // Error against the number of parameters.
+  // Error against the number of parameters. What several heuristics found is drawn once, for the first one that is shown.
   const largest = Math.max(...curves.flatMap((c) => c.n));
   const ns = Array.from({ length: largest }, (_, k) => k + 1);
   const lines = curves.flatMap((c, k) => SETS.map((set) => ({ curve: k, set })));
-  const against = lines.map(({ curve, set }) => {
-    const own = curves[curve];
-    const values = new Array(largest).fill(null);
-    own.n.forEach((n, row) => { values[n - 1] = visible(own.torque[set][row]); });
-    return values;
-  });
+  function ownRows() {
+    const seen = new Set();
+    return curves.map((c, k) => {
+      const fresh = Array.from(c.model, (model) => model < 0 || !seen.has(model));
+      if (!state.hidden.has(k)) c.model.forEach((model) => seen.add(model));
+      return fresh.map((own, row) => own || fresh[row - 1] || fresh[row + 1]);  // lines go on to where curves meet
+    });
+  }
+  function against() {
+    const own = ownRows();
+    return lines.map(({ curve, set }) => {
+      const values = new Array(largest).fill(null);
+      curves[curve].n.forEach((n, row) => { if (own[curve][row]) values[n - 1] = visible(curves[curve].torque[set][row]); });
+      return values;
+    });
+  }
   const ring = (u, x, y, of) => {
     if (y === null || !Number.isFinite(y)) return;
     u.ctx.save();
@@ -267,7 +288,7 @@
       upright(u, own.n[state.row]);
       ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), shade(own.colour));
     }] },
-  }, [ns, ...against]);
+  }, [ns, ...against()]);
   pointing(errorChart, () => shownCurves().flatMap((k) => SETS.filter((s) => state.sets.has(s)).flatMap((set) =>
     curves[k].n.map((n, row) => ({ x: n, y: visible(curves[k].torque[set][row]), curve: k, row, text: spoken(k, row) })))
   ).filter((p) => p.y !== null), part("error-spot"));
@@ -277,6 +298,7 @@
   const legend = part("legend");
   const toggled = (button, on) => button.setAttribute("aria-pressed", String(on));
   function apply() {
+    errorChart.setData([ns, ...against()]);
     lines.forEach(({ curve, set }, k) => {
       const show = !state.hidden.has(curve) && state.sets.has(set);
       if (errorChart.series[k + 1].show !== show) errorChart.setSeries(k + 1, { show });
@@ -344,7 +366,7 @@
   }
   for (const name of ["error-chart", "inverse-chart", "direct-chart"]) {
     const place = part(name);
-    if (place) savable(place, `${name}.png`, () => place.querySelector("canvas").toDataURL());
+    if (place) savable(place, `${name}.png`, () => picture(place.querySelector("canvas")));
   }
 
   // Torques along the motion with what is missed; drawn when they come into view.
@@ -358,6 +380,7 @@
     place.append(upper, lower);
     part("torques").append(place);
     const given = Float64Array.from({ length: nSamples }, (_, t) => motion.tau[t * nDof + joint.index]);
+    savable(place, `torque-${joint.name}.png`, () => picture(upper.querySelector("canvas")));
     let charts = null;
     const show = (model) => {
       const values = torque(model, joint.index);
@@ -367,11 +390,12 @@
         charts[1].setData([motion.time, missed]);
         return;
       }
+      const numbers = (u, ticks) => ticks.map((v) => `${Number(v.toPrecision(3))}`);
       const shared = { scales: { x: { time: false } }, cursor: { drag: { x: true, y: false }, sync: { key: "time" } } };
       charts = [
-        plot(upper, 130, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 52 })],
+        plot(upper, 130, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 60, values: numbers })],
           series: [{}, { stroke: () => colour("--blue"), width: 1.8 }, { stroke: () => colour("--ink"), width: 1.2, dash: [5, 4] }] }, [motion.time, given, values]),
-        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 52, space: 11 })],
+        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 60, space: 11, values: numbers })],
           series: [{}, { stroke: () => colour("--bad"), width: 1.2 }] }, [motion.time, missed]),
       ];
     };
@@ -396,6 +420,7 @@
   function mechanism(place) {
     place.hidden = false;
     const canvas = place.querySelector("canvas");
+    savable(place, "mechanism.png", () => picture(canvas));
     const [button, time] = [place.querySelector("button"), place.querySelector("input")];
     const nPoints = figure.count;
     const nFrames = figure.points.length / 3 / nPoints;
@@ -457,7 +482,7 @@
       for (const piece of pieces) {
         const share = shares.get(figure.owners[piece.owner]);
         context.strokeStyle = share === undefined ? colour("--soft") : `color-mix(in srgb, ${colour("--blue")} ${Math.round(100 * share)}%, ${colour("--orange")})`;
-        context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2 }[piece.kind];
+        context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2, axis: 11 }[piece.kind];
         context.beginPath();
         context.moveTo(piece.from[0], piece.from[1]);
         context.lineTo(piece.to[0], piece.to[1]);

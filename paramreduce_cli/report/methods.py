@@ -5,6 +5,7 @@ from math import isfinite
 
 import numpy as np
 
+from paramreduce_cli import __version__
 from paramreduce_cli.records import (
     Identification,
     MeasuredLog,
@@ -20,6 +21,8 @@ _BIBTEX = {
     "Atkeson1986": ("article", "C. G. Atkeson and C. H. An and J. M. Hollerbach",
                     "Estimation of inertial parameters of manipulator loads and links",
                     "journal = {International Journal of Robotics Research}, volume = {5}, number = {3}", 1986),
+    "Furnival1974": ("article", "G. M. Furnival and R. W. Wilson", "Regressions by leaps and bounds",
+                     "journal = {Technometrics}, volume = {16}, number = {4}", 1974),
     "Gautier1991": ("article", "M. Gautier",
                     "Numerical calculation of the base inertial parameters of robots",
                     "journal = {Journal of Robotic Systems}, volume = {8}, number = {4}", 1991),
@@ -43,6 +46,12 @@ _BIBTEX = {
 }  # fmt: skip
 """Kind, authors, title, where and year of what is cited."""
 
+_SOFTWARE = (
+    "@software{paramreduce,\n  author = {{The paramreduce developers}},\n  title = {paramreduce},\n"
+    f"  version = {{{__version__}}}\n}}"
+)
+"""What made the page."""
+
 _HEURISTICS = {"qr": "Ros2019", "forward-selection": "Ros2019", "forward-selection-2": "Ros2019",
                "backward-elimination": "Ros2019", "floating": "Pudil1994", "essential": "Pham1991"}  # fmt: skip
 """Where heuristics were published."""
@@ -52,7 +61,7 @@ def methods(data: ReportData) -> tuple[str, str]:
     """The paragraph, with keys in brackets, and the BibTeX entries of these."""
     text = " ".join(_sentences(data))
     cited = [key for key in _BIBTEX if f"{key}]" in text or f"{key}," in text]
-    return text, "\n\n".join(_entry(key) for key in cited)
+    return text, "\n\n".join([*(_entry(key) for key in cited), _SOFTWARE])
 
 
 def _sentences(data: ReportData) -> Iterator[str]:
@@ -65,6 +74,7 @@ def _sentences(data: ReportData) -> Iterator[str]:
         yield from _terms(data.terms)
     if data.identification is not None:
         yield from _identification(data.identification)
+    yield f"All of this was done by paramreduce {__version__} [paramreduce]."
 
 
 def _model(data: ReportData) -> Iterator[str]:
@@ -154,7 +164,10 @@ def _selection(data: ReportData) -> Iterator[str]:
     proofs = data.reduction.proofs
     if proofs is not None:
         proven = sum(status is ProofStatus.OPTIMAL for status in proofs.status)
-        yield f"A branch-and-bound search proved the best subset by torque error for {proven} of {proofs.n.size} sizes."
+        yield (
+            "A branch-and-bound search [Furnival1974], with bounds and rules of its own, proved the best subset by torque "
+            f"error for {proven} of {proofs.n.size} sizes."
+        )
     if data.validation.cross_validation:
         yield "The size was chosen by cross-validation inside the estimation set with the one-standard-error rule [Hastie2009]."
 

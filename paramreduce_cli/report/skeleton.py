@@ -8,6 +8,9 @@ import numpy as np
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.records import BASE, Body, FloatArray, Kind, Mechanism, Model
 
+_AXIS = 0.05
+"""Half of a joint's axis as it is drawn, over the size of the motion."""
+
 
 @dataclass(frozen=True)
 class Skeleton:
@@ -56,7 +59,7 @@ class Animation:
     points: FloatArray
     """In the base frame, NaN where a body has no mass, (n_samples, n_points, 3), m."""
     lines: tuple[tuple[int, int, int, str], ...]
-    """From point to point, of which body, and as what: link, rail, mass or loop."""
+    """From point to point, of which body (:data:`BASE` for none), and as what: link, rail, mass, loop or axis."""
     owners: tuple[str, ...]
     """Names of the bodies."""
 
@@ -64,8 +67,11 @@ class Animation:
 def animation(model: Model, q: FloatArray) -> Animation:
     """The mechanism at some generalised coordinates, (n_samples, n_q)."""
     frames = [skeleton(model, row) for row in q]
+    places = np.array([one.poses[:, :3, 3] for one in frames])
+    half = _AXIS * float(np.ptp(places.reshape(-1, 3), axis=0).max()) or _AXIS
     points = [
-        np.vstack([np.zeros((1, 3)), one.joints[:, :3, 3], one.poses[:, :3, 3], one.masses, *one.closures])
+        np.vstack([np.zeros((1, 3)), one.joints[:, :3, 3], one.poses[:, :3, 3], one.masses, *one.closures,
+                   *(one.joints[:, :3, 3] + side * half * one.joints[:, :3, 2] for side in (-1, 1))])
         for one in frames
     ]  # fmt: skip
     names = tuple(body.name for body in model.mechanism.bodies)
@@ -73,13 +79,16 @@ def animation(model: Model, q: FloatArray) -> Animation:
 
 
 def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
-    """Base first, then frames of joints, of bodies, centres of mass, and points of closures."""
+    """Base first, then frames of joints, of bodies, centres of mass, points of closures, and ends of axes.
+
+    What leads from a body's frame to the next joint is part of that body, not of the next one.
+    """
     count = len(shown.parents)
     for body, parent in enumerate(shown.parents):
         before, joint, end = (0 if parent < 0 else 1 + count + parent), 1 + body, 1 + count + body
         sliding = bool(shown.closures) and shown.kinds[body] != "revolute"
         if not sliding and (parent >= 0 or not shown.closures):
-            yield before, joint, body, "link"
+            yield before, joint, parent, "link"
         if shown.kinds[body] != "hidden":
             yield joint, end, body, "rail" if sliding else "link"
         if body not in shown.parents and np.isfinite(shown.masses[body]).all():
@@ -89,6 +98,9 @@ def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
         for k, body in enumerate(bodies, first):
             yield k, k + 1, body, "loop"
         first += len(bodies) + 1
+    for body, kind in enumerate(shown.kinds):
+        if kind != "hidden":
+            yield first + body, first + count + body, body, "axis"
 
 
 def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:

@@ -30,6 +30,7 @@ def latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({}))
         table: What is set.
         symbols: Formulas by the names they stand for.
     """
+    table = _shares_in_the_heading(table)
     columns = [[row[k] for row in table.rows] for k in range(len(table.header))]
     kinds = [_kind(cells) for cells in columns]
     # siunitx takes what is in braces for text, and sets what is not.
@@ -56,6 +57,8 @@ def latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({}))
 def _over_pages(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
     turned = width > _WIDE
     size = r"\tiny" if turned else r"\footnotesize"
+    if width > _FITTING:
+        size = rf"{size}\setlength{{\tabcolsep}}{{3pt}}"
     return [
         f"% needs array, longtable, {'pdflscape, ' if turned else ''}siunitx",
         *([r"\begin{landscape}"] if turned else []),
@@ -83,6 +86,27 @@ def _on_a_page(kinds: str, caption: str, lines: Sequence[str], width: int) -> li
     ]
 
 
+def _shares_in_the_heading(table: Table) -> Table:
+    """Where all cells of a column are shares the per cent stands in its heading, and numbers are left."""
+    shares = [
+        all(re.fullmatch(r"[\d.]+ %", row[k]) for row in table.rows) and bool(table.rows)
+        for k in range(len(table.header))
+    ]
+    return Table(
+        table.title,
+        tuple(
+            f"{cell} / %" if own else cell for cell, own in zip(table.header, shares, strict=True)
+        ),
+        tuple(
+            tuple(
+                cell.removesuffix(" %") if own else cell
+                for cell, own in zip(row, shares, strict=True)
+            )
+            for row in table.rows
+        ),
+    )
+
+
 def _row(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
 
@@ -98,6 +122,6 @@ def _kind(cells: Sequence[str]) -> str:
         point = f".{after}" if after else ""
         return f"S[table-format={sign}{before}{point}{f'e{minus}{power}' if power else ''}]"
     if max(map(len, cells), default=0) > _LONG:
-        return r">{\raggedright\arraybackslash}p{0.56\linewidth}"
+        return r">{\raggedright\arraybackslash}p{0.5\linewidth}"
     shares = [cell.removesuffix(" %").removeprefix("> ").replace(".", "") for cell in cells]
     return "r" if cells and all(map(str.isdecimal, shares)) else "l"

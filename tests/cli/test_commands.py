@@ -153,6 +153,17 @@ def test_parameters_are_shown_with_units_and_deviations(invoke, two_link_results
     assert f"± {found.deviations[0]:.2g} " in invoke("inspect", measured).out
 
 
+def test_selected_is_that_of_the_only_results(invoke, two_link_results, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "`paramreduce run CONFIG`" in invoke("inspect", "selected", code=2).err
+    shutil.copytree(two_link_results, tmp_path / "results" / "a")
+    assert invoke("inspect", "selected").out == invoke("inspect", "results/a").out
+    shutil.copytree(two_link_results, tmp_path / "results" / "b")
+    assert (
+        "Here are 2; `paramreduce inspect results/a`" in invoke("inspect", "selected", code=2).err
+    )
+
+
 def test_datasets_of_every_size_are_one_line(invoke, two_link_results):
     file = two_link_results / "reduction.h5"
     (line,) = (

@@ -5,6 +5,15 @@ import pytest
 from paramreduce_cli.cli.corrections import corrected
 
 
+def test_results_that_are_not_there_are_made_with_their_config(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    message = "results/arm/validation.h5: there is no such file."
+    assert corrected(message, ["inspect", "results/arm"]) == ""
+    (tmp_path / "configs").mkdir()
+    (tmp_path / "configs" / "arm.yaml").write_text("")
+    assert corrected(message, ["inspect", "results/arm"]) == "paramreduce run configs/arm.yaml"
+
+
 @pytest.mark.parametrize(
     ("message", "typed", "meant"),
     [

@@ -25,6 +25,9 @@ SHORT = {
     prepared.recorded: ("logs.md",),
 }
 """Pages that are typed with short configs, by what their readers have in their folder."""
+CONTROLLER = "hold_controller.cpp"
+SYNTAX = ["g++", "-std=c++17", "-Wall", "-Wextra", "-fsyntax-only", "-I", str(ROOT / "tests/docs/stand_ins"), "-I", "two_link_c", CONTROLLER]  # fmt: skip
+"""ROS is not there where docs are tested."""
 NOTEBOOK = "tutorial.ipynb"
 _BLOCK = re.compile(
     r"(?:`(?P<file>[\w.]+\.(?:py|[ch]pp|m))`:\n\n)?```(?P<kind>\w*)\n(?P<text>.*?)```", re.DOTALL
@@ -67,6 +70,7 @@ def main():
             here = folder / page.removesuffix(".md")
             here.mkdir()
             failed |= all_typed(table, page, here, environment)
+        failed |= typed(table, "how-to.md", CONTROLLER, SYNTAX, folder / "how-to", environment)
         for prepare, pages in SHORT.items():
             here = folder / prepare.__name__
             here.mkdir()

@@ -32,6 +32,18 @@ def test_the_same_models_are_one_curve(found):
     assert curve.label == "one, two"
 
 
+def test_of_curves_that_meet_only_what_is_new_is_drawn(found):
+    two = found.reduction.heuristics["two"]
+    values = [np.array(v) for v in two.parameters]
+    values[3] = values[3] * 1.01
+    found.reduction.heuristics["two"] = replace(two, parameters=tuple(values))
+    one, other = curves(found)
+    assert one.own.all()
+    assert np.flatnonzero(other.own).tolist() == [2, 3, 4]  # and where it leaves and comes back
+    drawn = other.drawn(np.arange(float(one.own.size)))
+    assert np.flatnonzero(np.isfinite(drawn)).tolist() == [2, 3, 4]
+
+
 def test_one_other_value_is_another_curve(found):
     two = found.reduction.heuristics["two"]
     values = [np.array(v) for v in two.parameters]

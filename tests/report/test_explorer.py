@@ -116,6 +116,61 @@ def test_every_step_of_the_slider_shows_its_model(page, summary):
         assert complaints(driver) == []
 
 
+_WALK = """
+const chosen = document.querySelector("[data-part=heuristic]"), slider = document.querySelector("[data-part=n]");
+const part = (name) => document.querySelector(`[data-part=${name}]`).textContent;
+const seen = [];
+for (const option of chosen.options) {
+  chosen.value = option.value;
+  chosen.dispatchEvent(new Event("change"));
+  for (let row = 0; row <= +slider.max; row++) {
+    slider.value = row;
+    slider.dispatchEvent(new Event("input"));
+    seen.push([option.textContent, ...["count", "torque", "acceleration", "inverse", "direct", "values"].map(part)]);
+  }
+}
+return seen;
+"""
+
+
+@in_browser
+def test_every_model_is_shown_with_the_numbers_of_the_tables(page, summary):
+    with opened(page) as driver:
+        seen = driver.execute_script(_WALK)
+        assert complaints(driver) == []
+    shown = {(name, int(n)): rest for names, n, *rest in seen for name in names.split(", ")}
+    rows = {(name, row["n"]): row for name, all in summary["validation"].items() for row in all}
+    assert shown.keys() == rows.keys()
+    for key, (torque, acceleration, inverse, direct, values) in shown.items():
+        row = rows[key]
+        for text, kind in ((torque, "torque_error"), (acceleration, "acceleration_error")):
+            assert same_numbers(text, [row[kind][s] for s in ("estimation", "validation")])
+        assert (inverse, direct) == tuple(str(row["operations"][f]) for f in ("inverse", "direct"))
+        assert values.count(" = ") == key[1]
+
+
+def same_numbers(text, errors):
+    """Whether shares are written as they are, to three digits."""
+    for told, error in zip(text.replace(" %", "").split(" / "), errors, strict=True):
+        if error is None or error >= 10:
+            if told not in ("∞", "> 1000"):
+                return False
+        elif float(told) / 100 != pytest.approx(error, rel=6e-3, abs=1e-10):
+            return False
+    return True
+
+
+@in_browser
+def test_what_is_shown_can_be_saved(page):
+    with opened(page) as driver:
+        names = driver.execute_script(
+            "return [...document.querySelectorAll('button.save')].map((b) => b.textContent)"
+        )
+    assert {"error-chart.png", "inverse-chart.png", "mechanism.png", "references.bib", "summary.csv",
+            "errors-by-joint.csv", "torque-error.svg", "torque-z_fore.png"} <= set(names)  # fmt: skip
+    assert len(names) == len(set(names))
+
+
 @in_browser
 @pytest.mark.parametrize(("width", "dark"), [(1280, False), (390, True)])
 def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
@@ -133,6 +188,8 @@ def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
         assert (sum(map(int, re.findall(r"\d+", background)[:3])) < 200) == dark
         charts = driver.find_elements("css selector", ".uplot canvas")
         assert all(chart.size["width"] <= width for chart in charts)
+        wide = "return [...document.querySelectorAll('.tile b')].some((b) => b.scrollWidth > b.clientWidth + 1)"
+        assert not driver.execute_script(wide)
         assert len(charts) >= 3
         assert complaints(driver) == []
 

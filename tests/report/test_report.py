@@ -2,6 +2,7 @@ import csv
 import io
 import re
 import shutil
+import subprocess
 import xml.etree.ElementTree as ET
 from html.parser import HTMLParser
 
@@ -154,6 +155,32 @@ def test_latex_sets_numbers_breaks_texts_and_fits_the_line():
     assert r"\resizebox{\linewidth}" in scaled
     assert r"\begin{table}" in scaled
     assert r"\begin{sidewaystable}" in latex_table(Table("t", ("a", "b") * 6, many[:3]))
+
+
+def typeset(folder):
+    """What pdflatex says of all tables in one document."""
+    needed = ("siunitx.sty", "longtable.sty", "pdflscape.sty", "rotating.sty")
+    if shutil.which("pdflatex") is None or not all(
+        subprocess.run(["kpsewhich", name], capture_output=True, check=False).stdout
+        for name in needed
+    ):
+        pytest.skip("there is no LaTeX with siunitx")
+    packages = "amsmath,array,graphicx,longtable,pdflscape,rotating,siunitx"
+    lines = [r"\documentclass{article}", rf"\usepackage{{{packages}}}", r"\begin{document}"]
+    for path in sorted((folder / "tables").glob("*.tex")):
+        lines += [rf"\typeout{{TABLE {path.name}}}", path.read_text(), r"\clearpage"]
+    return "\n".join([*lines, r"\end{document}"])
+
+
+def test_latex_tables_fit_the_page(folder, tmp_path):
+    (tmp_path / "all.tex").write_text(typeset(folder))
+    words = ["pdflatex", "-interaction=nonstopmode", "all.tex"]
+    for _ in range(2):  # widths of longtables are those of the run before
+        done = subprocess.run(words, cwd=tmp_path, capture_output=True, check=False)
+    said = done.stdout.decode("latin1")
+    assert "TABLE pareto-front.tex" in said
+    assert not re.findall(r"^!.*", said, re.MULTILINE)
+    assert not re.findall(r"Overfull \\hbox \((?:[1-9]\d+|[2-9])\.\d+pt too wide.*", said)
 
 
 def test_warnings_of_a_run_stand_on_its_page(tmp_path):

@@ -8,6 +8,24 @@ from paramreduce_cli.records import BASE
 from paramreduce_cli.report.skeleton import animation, skeleton
 
 
+def test_what_leads_from_a_body_to_the_next_joint_is_part_of_that_body(puma):
+    """Its length does not change, and it turns with the body."""
+    rng = np.random.default_rng(0)
+    moving = animation(puma, rng.normal(size=(5, 6)))
+    owners = {body for _, _, body, _ in moving.lines}
+    assert owners == {BASE, *range(6)}
+    q = np.zeros((2, 6))
+    q[1, 2] = 1.0  # the third joint turns: what is on the first two bodies stays
+    both = animation(puma, q)
+    for start, end, body, _ in both.lines:
+        moved = np.ptp(both.points[:, [start, end]], axis=0).max() > 1e-9
+        assert not moved or body >= 2
+    (upper_arm,) = [line for line in moving.lines if line[2] == 1 and line[3] == "link"
+                    and np.ptp(moving.points[0][list(line[:2])], axis=0).max() > 0.1]  # fmt: skip
+    lengths = np.linalg.norm(np.diff(moving.points[:, upper_arm[:2]], axis=1), axis=2)
+    assert lengths == pytest.approx(np.hypot(0.4318, 0.1491))
+
+
 @pytest.mark.parametrize("robot", ["five_bar", "hexaglide"])
 def test_lines_along_closures_are_of_the_bodies_that_they_hold_together(robot):
     _, model = config_and_model(robot)

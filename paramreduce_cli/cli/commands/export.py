@@ -129,7 +129,8 @@ def export(
     folder = output or store.folder / "export" / kind
     origin = f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
     if kind == VALUES:
-        files = values_file(chosen, title, origin)
+        known = loading[Model].mechanism if Model in loading else None
+        files = values_file(chosen, title, origin, known)
     elif kind in FORMATS:
         assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)

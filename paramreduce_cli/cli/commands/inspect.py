@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import dataclasses
 import itertools
+import json
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -38,8 +39,12 @@ if TYPE_CHECKING:
 def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> None:
     """Show what is in an artifact and where it came from; of a results folder the selected model.
 
+    `inspect selected` is that of the only results here.
+
     Example: paramreduce inspect results/puma560/reduction.h5 --model forward-selection:18
     """
+    if str(file) == "selected" and not file.exists():
+        file = _only_results()
     folder = file if file.is_dir() else file.parent
     if file.is_dir() and chosen is None:
         if not (file / "validation.h5").exists() and (meant := results_below(file, "inspect")):
@@ -59,6 +64,19 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
         _say_contents(file, as_json)
 
 
+def _only_results() -> Path:
+    """The results folder that is meant where there is one.
+
+    Raises:
+        ConfigError: There is none, or more than one.
+    """
+    found = sorted(path.parent for path in Path("results").glob("*/validation.h5"))
+    if len(found) == 1:
+        return found[0]
+    meant = f"`paramreduce inspect {found[0]}`" if found else "`paramreduce run CONFIG` makes some"
+    raise ConfigError(f"selected: of which results? Here are {len(found)}; {meant}.")
+
+
 def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
     if as_json:
         emit(**found)
@@ -75,14 +93,21 @@ def _say_contents(file: Path, as_json: bool) -> None:
             attributes=attributes, datasets=[dict(zip(keys, row, strict=True)) for row in datasets]
         )
         return
-    _say_all(attributes, False)
+    _say_all({key: _briefly(value) for key, value in attributes.items()}, False)
     table = rich.table.Table(box=None, pad_edge=False)
-    table.add_column("dataset", no_wrap=True)
+    table.add_column("dataset", overflow="fold")
     table.add_column("shape", no_wrap=True)
     table.add_column("content", overflow="fold")
     for row in _folded(datasets):
         table.add_row(*(rich.markup.escape(harmless(cell)) for cell in row))
     say_table(table, max(len(name) + len(shape) + 20 for name, shape, _ in datasets))
+
+
+def _briefly(text: str) -> str:
+    """An attribute; of digests by name the names."""
+    if not text.startswith("{"):
+        return text
+    return ", ".join(json.loads(text)) or "none"
 
 
 def _folded(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[str, str, str]]:

@@ -15,7 +15,7 @@ def error_vs_operations(data: ReportData) -> Figure:
     drawn, *axes = pair_of_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
         for curve in curves(data):
-            values = visible(curve.result.torque_error_estimation)
+            values = curve.drawn(visible(curve.result.torque_error_estimation))
             one.semilogy(
                 getattr(curve.result, f"operations_{key}"), values,
                 color=curve.colour, marker=curve.marker, markersize=3, linewidth=0.8, label=curve.label,

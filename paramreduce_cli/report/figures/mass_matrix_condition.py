@@ -15,7 +15,7 @@ def mass_matrix_condition(data: ReportData) -> Figure:
     axes = drawn.subplots()
     for curve in curves(data):
         result, colour = curve.result, curve.colour
-        condition = visible(result.mass_matrix_condition)
+        condition = curve.drawn(visible(result.mass_matrix_condition))
         positive = result.mass_matrix_smallest_eigenvalue > 0
         axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=curve.label)
         for chosen, fill in ((positive, colour), (~positive, "white")):

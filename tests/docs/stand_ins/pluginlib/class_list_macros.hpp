@@ -1,0 +1,4 @@
+#pragma once
+
+#define PLUGINLIB_EXPORT_CLASS(own, base) \
+  base* made() { return new own; }
