@@ -5,10 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import ReducedModel
-from paramreduce_cli.report.data import ReportData
-
-_NO_TORQUE = 1e-100
-"""What stands for zero, N m or N."""
+from paramreduce_cli.report.data import NO_TORQUE, ReportData
 
 
 @dataclass(frozen=True)
@@ -124,7 +121,7 @@ def _worst_joint(data: ReportData) -> str:
     shares = np.where(np.isfinite(errors), errors / data.reduction.nominal_torque, -np.inf)
     j = int(shares.argmax())
     label = data.known_model.mechanism.coordinate_names[j]
-    whole = _two_digits(rms[j]) if rms[j] > _NO_TORQUE else "no"
+    whole = _two_digits(rms[j]) if rms[j] > NO_TORQUE else "no"
     return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole} {data.force_unit(j)}"
 
 

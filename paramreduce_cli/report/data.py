@@ -22,6 +22,9 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.report.skeleton import Animation, Skeleton
 
+NO_TORQUE = 1e-100
+"""What stands for zero, N m or N."""
+
 
 @dataclass(frozen=True)
 class ShownMotion:
@@ -101,6 +104,12 @@ class ReportData:
         mechanism = self.known_model.mechanism
         kind = mechanism.bodies[mechanism.independent[joint]].joint
         return "N m" if kind == "revolute" else "N"
+
+    def joint_label(self, joint: int) -> str:
+        """Name of a joint's coordinate."""
+        if self.known_model is None:
+            return f"joint {joint + 1}"
+        return self.known_model.mechanism.coordinate_names[joint]
 
     @property
     def functions(self) -> tuple[str, str]:

@@ -9,7 +9,6 @@ import numpy as np
 from paramreduce_cli.records import HeuristicValidation, IntArray, ModelChoice
 from paramreduce_cli.report.curves import EQUAL, curves
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.style import joint_label
 
 _NUMBERS = 600_000
 """Most entries of the observation matrix that the page carries; an arm of six joints has 300 per sample."""
@@ -129,7 +128,7 @@ def _joints(data: ReportData) -> list[dict[str, Any]]:
     return [
         {
             "index": j,
-            "name": joint_label(data, j),
+            "name": data.joint_label(j),
             "unit": data.force_unit(j),
             "rms": {s: float(rms[j]) for s, rms in data.rms_torque.items()},
         }

@@ -145,13 +145,6 @@ def joint_style(j: int) -> tuple[str, str]:
     return _JOINT_COLOURS[j % colours], _LINES[j // colours % len(_LINES)]
 
 
-def joint_label(data: ReportData, j: int) -> str:
-    """Name of a joint's coordinate."""
-    if data.known_model is None:
-        return f"joint {j + 1}"
-    return data.known_model.mechanism.coordinate_names[j]
-
-
 def legend_beside(axes: Axes) -> None:
     """A legend where it covers nothing: on the right, in a column below."""
     if not _is_narrow():

@@ -13,6 +13,7 @@ from conftest import run_stages
 
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.tables import tables
+from paramreduce_cli.texts import share
 from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.texts.table import Table
 
@@ -128,6 +129,23 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
             left = (tau - (W @ phi).reshape(tau.shape)) / weights
             expected = np.linalg.norm(left) / np.linalg.norm(tau / weights)
             assert summary["selected"]["torque_error"][which] == pytest.approx(expected, rel=1e-9)
+
+
+def test_errors_joint_by_joint_are_those_of_the_samples(summary, two_link_results):
+    path = two_link_results / "report" / "tables" / "joint-errors.csv"
+    header, *rows = csv.reader(io.StringIO(path.read_text()))
+    assert header == ["joint", "estimation", "estimation, share", "validation", "validation, share"]
+    with h5py.File(two_link_results / "samples.h5") as file:
+        names = [name.decode() for name in file["parameters/names"]]
+        phi = np.array([summary["selected"]["parameters"].get(name, 0.0) for name in names])
+        for k, which in enumerate(("estimation", "validation")):
+            tau = file[f"{which}/tau"][:]
+            left = tau - (file[f"{which}/W"][:] @ phi).reshape(tau.shape)
+            rms = np.sqrt(np.mean(left**2, axis=0))
+            shares = rms / np.sqrt(np.mean(tau**2, axis=0))
+            for row, error, relative in zip(rows, rms, shares, strict=True):
+                assert row[1 + 2 * k] == f"{error:.2g} N m"
+                assert row[2 + 2 * k] == share(relative)
 
 
 def test_latex_escapes_what_latex_would_trip_over():

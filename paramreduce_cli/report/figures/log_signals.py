@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, new_figure
+from paramreduce_cli.report.style import joint_style, new_figure
 
 _RAW = "#c3c9d0"
 
@@ -29,7 +29,7 @@ def log_signals(data: ReportData) -> Figure | None:
             axes.plot(shown.time, used[:, j], color=colour, linewidth=1.0)
             size = float(np.abs(used[:, j]).max()) or 1.0
             axes.set_ylim(-1.3 * size, 1.3 * size)
-            axes.set_ylabel(f"{label}  {joint_label(data, j)}", fontsize="x-small")
+            axes.set_ylabel(f"{label}  {data.joint_label(j)}", fontsize="x-small")
             axes.tick_params(labelsize="x-small")
     for axes in grid[-1]:
         axes.set_xlabel("t (s)")

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, legend_beside, pair_of_plots
+from paramreduce_cli.report.style import joint_style, legend_beside, pair_of_plots
 
 
 @placed(PageSection.LOG, 3)
@@ -23,7 +23,7 @@ def log_spectra(data: ReportData) -> Figure | None:
             colour, line = joint_style(j)
             axes.loglog(
                 spectra.frequency, np.maximum(density[:, j], 1e-300), line, color=colour, linewidth=0.9,
-                label=joint_label(data, j),
+                label=data.joint_label(j),
             )  # fmt: skip
         top = float(density.max()) or 1.0
         axes.set_ylim(top * 1e-12, top * 10)

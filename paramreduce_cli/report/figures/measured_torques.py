@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, legend_above, new_figure
+from paramreduce_cli.report.style import joint_style, legend_above, new_figure
 
 
 @placed(PageSection.IDENTIFICATION, 2)
@@ -30,7 +30,7 @@ def measured_torques(data: ReportData) -> Figure | None:
         ):
             right.plot(found.shown_time, measured - values[:, j], color=line_colour, linewidth=0.8,
                        label=label)  # fmt: skip
-        left.set_ylabel(f"τ  {joint_label(data, j)}", fontsize="x-small")
+        left.set_ylabel(f"τ  {data.joint_label(j)}", fontsize="x-small")
         for axes in (left, right):
             axes.tick_params(labelsize="x-small")
     for axes in grid[0]:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, new_figure
+from paramreduce_cli.report.style import joint_style, new_figure
 
 _DASHES = (0, (3, 2))
 _ANY = "#7d8590"
@@ -30,7 +30,7 @@ def torques(data: ReportData) -> Figure:
             data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=_DASHES,
             linewidth=1.1,
         )  # fmt: skip
-        axes.set_ylabel(f"τ / nom, {joint_label(data, j)}", fontsize="small")
+        axes.set_ylabel(f"τ / nom, {data.joint_label(j)}", fontsize="small")
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import broken, joint_label, joint_style, legend_beside, new_figure
+from paramreduce_cli.report.style import broken, joint_style, legend_beside, new_figure
 
 
 @placed(PageSection.TRACKING, 1)
@@ -22,7 +22,7 @@ def tracking(data: ReportData) -> Figure | None:
     time = result.paths.time[:count]
     for j in range(result.paths.z.shape[2]):
         colour, style = joint_style(j)
-        label = joint_label(data, j)
+        label = data.joint_label(j)
         top.plot(time, result.paths.z[:count, 0, j], color=colour, linestyle=style, label=label)
         for axes, errors in zip(below, result.errors.values(), strict=True):
             off = 1e3 * errors[:count, 0, j]

@@ -4,7 +4,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_label, joint_style, legend_above, new_figure
+from paramreduce_cli.report.style import joint_style, legend_above, new_figure
 
 
 @placed(PageSection.TRAJECTORIES, 1)
@@ -21,7 +21,7 @@ def trajectory(data: ReportData) -> Figure:
     for axes, (values, title) in zip(all_axes, rows, strict=True):
         for j in range(values.shape[1]):
             colour, style = joint_style(j)
-            label = joint_label(data, j)
+            label = data.joint_label(j)
             axes.plot(motion.time, values[:, j], color=colour, linestyle=style, label=label)
         axes.set_ylabel(title)
     legend_above(all_axes[0], min(values.shape[1], 7))

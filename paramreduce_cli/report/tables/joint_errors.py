@@ -1,0 +1,27 @@
+"""Errors of the selected model, joint by joint."""
+
+import numpy as np
+
+from paramreduce_cli.report.data import NO_TORQUE, ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
+
+
+@placed(PageSection.ANSWER, 3)
+def joint_errors(data: ReportData) -> Table:
+    """Root mean squares of what the selected model misses of each joint's torque, and as a share of that torque."""
+    selected = data.validation.selected
+    result = data.validation.heuristics[selected.heuristic]
+    row = result.row(selected.n)
+    rows = []
+    for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist():
+        cells = [data.joint_label(j)]
+        for which, rms in data.rms_torque.items():
+            relative = float(getattr(result, f"torque_error_joint_{which}")[row][j])
+            unit = data.force_unit(j)
+            cells.append(f"{relative * rms[j]:.2g} {unit}" if unit else "")
+            cells.append(share(relative) if rms[j] > NO_TORQUE else "no torque")
+        rows.append(tuple(cells))
+    header = ("joint", *(f"{which}{end}" for which in data.rms_torque for end in ("", ", share")))
+    return Table("Errors joint by joint", header, tuple(rows))
