@@ -109,20 +109,21 @@ def all_typed(table, page, folder, environment, short=None):
 def installed(folder, interpreter):
     """A wheel, made of the source distribution, in an environment of its own; what is set to run its programs."""
     python = folder / "venv" / "bin" / "python"
-    pip = [python, "-m", "pip", "--quiet", "--disable-pip-version-check"]
-    subprocess.run([interpreter, "-m", "venv", folder / "venv"], check=True)
-    subprocess.run([*pip, "install", "build>=1,<2"], check=True)
-    build = [python, "-m", "build", "--sdist", "--outdir", folder / "source", ROOT]
-    subprocess.run(build, check=True, stdout=subprocess.DEVNULL)
-    (source,) = (folder / "source").glob("*.tar.gz")
-    subprocess.run(
-        [*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", source], check=True
-    )
-    (wheel,) = (folder / "wheel").glob("*.whl")
-    extra = ["nbclient>=0.10,<1", "ipykernel>=6.29,<8"]
-    subprocess.run([*pip, "install", f"{wheel}[pandas,identify]", *extra], check=True)
-    path = f"{python.parent}:{os.environ['PATH']}"
     kept = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+
+    def call(*words):
+        subprocess.run([*map(str, words)], check=True, env=kept, stdout=subprocess.DEVNULL)
+
+    pip = (python, "-m", "pip", "--quiet", "--disable-pip-version-check")
+    call(interpreter, "-m", "venv", folder / "venv")
+    call(*pip, "install", "build>=1,<2")
+    call(python, "-m", "build", "--sdist", "--outdir", folder / "source", ROOT)
+    (source,) = (folder / "source").glob("*.tar.gz")
+    call(*pip, "wheel", "--no-deps", "--wheel-dir", folder / "wheel", source)
+    (wheel,) = (folder / "wheel").glob("*.whl")
+    extra = ("nbclient>=0.10,<1", "ipykernel>=6.29,<8")
+    call(*pip, "install", f"{wheel}[pandas,identify]", *extra)
+    path = f"{python.parent}:{os.environ['PATH']}"
     return {**kept, "PATH": path, "MPLBACKEND": "agg", "BROWSER": "true %s"}
 
 
