@@ -62,10 +62,10 @@ def _choice(message: str, words: Words) -> Words | None:
 
 def _in_range(name: str, number: str) -> str:
     """``swap:1...7`` with a number that it has."""
-    model, _, sizes = name.partition(":")
-    if not sizes:
+    found = re.fullmatch(r"(.*):(\d+)\.\.\.(\d+)", name)
+    if found is None:
         return name
-    low, high = map(int, sizes.split("..."))
+    model, low, high = found[1], int(found[2]), int(found[3])
     wanted = int(number) if number.isdecimal() else low
     return f"{model}:{min(max(wanted, low), high)}"
 

@@ -26,6 +26,9 @@ def test_results_that_are_not_there_are_made_with_their_config(tmp_path, monkeyp
         ("--model swop:3: there is swap:2...7.", "export --model swop:3", "export --model swap:3"),
         ("--results: say where, such as --results results/x.", "reduce --samples s.h5", "reduce --samples s.h5 --results results/x"),
         ("a.yaml, line 3: robot is missing.", "run a.yaml", "run a.yaml"),
+        ("--which validation:9: there is estimation:1...10, validation:1...2.",
+         "export-trajectory --which validation:9", "export-trajectory --which validation:2"),
+        ("--which a: there is b:c...d.", "export-trajectory --which a", "export-trajectory --which b:c...d"),
         ("something else is wrong.", "run a.yaml", None),
     ],
 )  # fmt: skip

@@ -76,6 +76,6 @@ def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
     sets = {"estimation": trajectories.estimation, "validation": trajectories.validation}
     found = sets.get(name, ())
     if not number.isdecimal() or not 1 <= int(number) <= len(found):
-        there = " and ".join(f"{key}:1 ... {key}:{len(own)}" for key, own in sets.items())
+        there = ", ".join(f"{key}:1...{len(own)}" for key, own in sets.items())
         raise ConfigError(f"--which {which}: there is {there}.")
     return found[int(number) - 1]
