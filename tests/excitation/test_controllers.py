@@ -262,7 +262,7 @@ def test_the_command(tmp_path, invoke):
     assert "joint_trajectory.yaml" in out
     assert "begins in motion" not in out
     error = invoke(*arguments, "--which", "estimation:9", settings=ASKED, code=2).err
-    assert "there is estimation:1 ... estimation:2" in error
+    assert "there is estimation:1...2, validation:1...1" in error
     others = [text for text in ASKED if "power" not in text]
     assert (
         "was made with another trajectories section"
