@@ -10,7 +10,7 @@ from paramreduce_cli.report.style import legend_beside, mark_selected, new_figur
 
 @placed(PageSection.ACCELERATIONS, 2)
 def mass_matrix_condition(data: ReportData) -> Figure:
-    """Largest condition number of the mass matrix over the samples; hollow where it is indefinite."""
+    """Largest condition number of the mass matrix over the samples; hollow where it is indefinite. What several heuristics found is drawn once, for the first of them."""
     drawn = new_figure()
     axes = drawn.subplots()
     for curve in curves(data):

@@ -10,7 +10,7 @@ from paramreduce_cli.report.style import FUNCTIONS, legend_beside, mark_selected
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
-    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters."""
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters. What several heuristics found is drawn once, for the first of them."""
     drawn = new_figure()
     axes = drawn.subplots()
     for curve in curves(data):
