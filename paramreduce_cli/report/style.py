@@ -98,7 +98,9 @@ def _encoded(
         for name in formats:
             buffer = io.BytesIO()
             drawn.savefig(buffer, format=name, **FORMATS[name])
-            drawn.set_layout_engine("none")  # the others keep what was laid out for the first
+            # The others keep what was laid out for the first; a placeholder would have all drawn twice.
+            with mpl.rc_context({"figure.constrained_layout.use": False}):
+                drawn.set_layout_engine(None)
             result[name] = buffer.getvalue()
     return result
 
