@@ -1,54 +1,65 @@
-"""Exported inverse dynamics, run here: what a controller would call, and how long it takes."""
+"""Exported functions, run here: what a controller would call, and how long it takes."""
 
 import ctypes
 import time
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Mapping
 
 import numpy as np
 
+from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.writing import Exported, export, exported_functions
 from paramreduce_cli.expressions.compiled import load
-from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.expressions.functions import Argument
 from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
 
 _ROUNDS, _TURNS = 20, 9
 """Evaluations of every state in one go, and how often each model is timed."""
 
 _LOOP = """
-void repeated(long rounds, long n, const double *phi, const double *const *in, double *tau) {{
+void repeated(long rounds, long n, const double *phi, const double *const *in, double *const *out) {{
   for (long r = 0; r < rounds; ++r)
     for (long k = 0; k < n; ++k)
-      {name}_inverse_dynamics(phi, {states}, tau + k * {n_dof});
+      {name}(phi, {arrays});
 }}
 """
 
 
 class RunningModel:
-    """The inverse dynamics of a model, from its exported C code; with loops, R is handed in.
+    """The inverse or the direct dynamics of a model, from its exported C code; with loops, R and b are handed in.
 
     Without a compiler its expressions are evaluated in Python.
 
     Args:
         model: Of the robot.
         chosen: The model.
+        what: Which function.
     """
 
-    def __init__(self, model: Model, chosen: ReducedModel) -> None:
+    def __init__(self, model: Model, chosen: ReducedModel, what: Exported = Exported.IDM) -> None:
         self._phi = np.ascontiguousarray(chosen.values)
-        files = export(model, chosen, title="", language="c", what=Exported.IDM)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ParamreduceWarning)  # nothing is simulated with it
+            files = export(model, chosen, title="", language="c", what=what)
+        (self._function,) = exported_functions(model, chosen, what)
         stem = next(file[:-2] for file in files if file.endswith(".h"))
         header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
         text = header + source.replace(f'#include "{stem}.h"', "")
-        n_q, self._n_dof = model.mechanism.n_q, model.mechanism.n_dof
-        sizes = [n_q] * 3
-        if model.mechanism.loops is not None:
-            sizes.append((n_q - self._n_dof) * self._n_dof)
-        states = ", ".join(f"in[{i}] + k * {size}" for i, size in enumerate(sizes))
-        loop = _LOOP.format(name=stem, states=states, n_dof=self._n_dof)
-        self._library = load(text + loop)
-        self._function: Function | None = None
-        if self._library is None:
-            (self._function,) = exported_functions(model, chosen, Exported.IDM)
+        sides = {"in": self._states, "out": self._function.results}
+        arrays = (
+            f"{s}[{i}] + k * {a.size}" for s, side in sides.items() for i, a in enumerate(side)
+        )
+        name = f"{stem}_{self._function.name}"
+        self._library = load(text + _LOOP.format(name=name, arrays=", ".join(arrays)))
+
+    @property
+    def _states(self) -> list[Argument]:
+        return [argument for argument in self._function.arguments if argument.name != "phi"]
+
+    @property
+    def takes(self) -> list[str]:
+        """Names of what it is handed, in their order: of q, dq, ddq, R and b."""
+        return [argument.name for argument in self._states]
 
     @property
     def language(self) -> str:
@@ -56,24 +67,30 @@ class RunningModel:
         return "C" if self._library is not None else "Python"
 
     def __call__(self, *states: FloatArray, rounds: int = 1) -> FloatArray:
-        """Torques of some states, (n_states, n_dof); the same is done several times if asked for.
+        """Results for some states, (n_states, n): torques, or mass matrices row by row and then delta.
 
         Args:
-            states: q, dq and ddq, (n_states, n_q) each, and with loops R, (n_states, n_q - n_dof, n_dof).
-            rounds: How often.
+            states: What it takes: q, dq and ddq, (n_states, n_q) each, and with loops R, (n_states, n_q - n_dof, n_dof),
+                and b, (n_states, n_q - n_dof).
+            rounds: How often the same is done.
         """
         count = len(states[0])
         arrays = [np.ascontiguousarray(x).reshape(count, -1) for x in states]
-        if self._function is not None:
+        if self._library is None:
             inputs = [np.broadcast_to(value, count) for value in self._phi]
             inputs += [column for array in arrays for column in array.T]
             return np.column_stack(self._function.program.evaluated(inputs))
-        assert self._library is not None
-        tau = np.empty((count, self._n_dof))
-        pointers = (ctypes.c_void_p * len(arrays))(*(x.ctypes.data for x in arrays))
-        phi, result = (ctypes.c_void_p(x.ctypes.data) for x in (self._phi, tau))
-        self._library.repeated(ctypes.c_long(rounds), ctypes.c_long(count), phi, pointers, result)
-        return tau
+        results = [np.empty((count, result.size)) for result in self._function.results]
+        self._library.repeated(
+            ctypes.c_long(rounds),
+            ctypes.c_long(count),
+            ctypes.c_void_p(self._phi.ctypes.data),
+            *(
+                (ctypes.c_void_p * len(some))(*(x.ctypes.data for x in some))
+                for some in (arrays, results)
+            ),
+        )
+        return np.concatenate(results, axis=1)
 
     def seconds(self, *states: FloatArray) -> float:
         """Of one evaluation, mean over some states, s."""
@@ -84,9 +101,10 @@ class RunningModel:
         return (time.perf_counter() - started) / rounds / len(states[0])
 
 
-def speed(models: Mapping[str, RunningModel], states: Sequence[FloatArray]) -> Speed:
-    """How long models take on the same states, which are as those of :class:`RunningModel`."""
+def speed(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:
+    """How long models take on the same states, by the names of what :class:`RunningModel` takes."""
     # In turns, and the shortest: whatever else the machine does meets all of them alike.
-    turns = [{name: m.seconds(*states) for name, m in models.items()} for _ in range(_TURNS)]
+    handed = {name: [states[key] for key in model.takes] for name, model in models.items()}
+    turns = [{name: m.seconds(*handed[name]) for name, m in models.items()} for _ in range(_TURNS)]
     least = {name: min(turn[name] for turn in turns) for name in models}
     return Speed(least, next(m.language for m in models.values()))

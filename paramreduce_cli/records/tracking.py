@@ -10,7 +10,7 @@ from paramreduce_cli.records.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Speed:
-    """How long exported inverse dynamics take on the machine at hand."""
+    """How long an exported function takes on the machine at hand."""
 
     seconds: Mapping[str, float]
     """Of one evaluation by model, the full one first, s."""

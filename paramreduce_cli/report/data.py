@@ -74,7 +74,9 @@ class ReportData:
     animation: Animation | None
     """Of the motion, where there is a mechanism."""
     speed: Speed | None
-    """Of the full and of the selected model; None without a robot."""
+    """Of the inverse dynamics of the full and of the selected model; None without a robot."""
+    speed_direct: Speed | None
+    """Of their direct dynamics."""
     tracking: Tracking | None
     """Where it was asked for."""
     log: MeasuredLog | None

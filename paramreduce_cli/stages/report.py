@@ -10,7 +10,7 @@ from paramreduce_cli.config.schema import ReductionSection, ReportSection, Sampl
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.running import RunningModel, speed
-from paramreduce_cli.export.writing import export
+from paramreduce_cli.export.writing import Exported, export
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
@@ -25,7 +25,6 @@ from paramreduce_cli.records import (
     Report,
     Samples,
     Selected,
-    Speed,
     Tell,
     TermReduction,
     Tracking,
@@ -76,7 +75,9 @@ def report(
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), selected.model, reduction.nominal_torque)
-    running = _running(model, selected)
+    running = _running(model, selected, Exported.IDM)
+    direct = _running(model, selected, Exported.DDM) if running else {}
+    states = {} if model is None else _states(model, motion)
     data = ReportData(
         title=section.title or provenance.robot,
         known_model=model,
@@ -91,7 +92,8 @@ def report(
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
         animation=None if model is None else _animation(model, motion),
-        speed=_speed(model, running, motion),
+        speed=speed(running, states) if running else None,
+        speed_direct=speed(direct, states) if direct else None,
         tracking=_tracking(section, model, running, motion),
         log=log,
         identification=identification,
@@ -132,31 +134,29 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
     ]
 
 
-def _running(model: Model | None, selected: Selected) -> dict[str, RunningModel]:
+def _running(model: Model | None, selected: Selected, what: Exported) -> dict[str, RunningModel]:
     """The exported code of the full and of the selected model; none in doubt."""
     if model is None:
         return {}
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
     try:
-        return {title: RunningModel(model, chosen) for title, chosen in models.items()}
+        return {title: RunningModel(model, chosen, what) for title, chosen in models.items()}
     except FormulationError as error:
         warnings.warn(f"nothing is timed: {error}", ParamreduceWarning, stacklevel=2)
         return {}
 
 
-def _speed(
-    model: Model | None, running: Mapping[str, RunningModel], motion: ShownMotion
-) -> Speed | None:
-    """Of the models on the states of a motion."""
-    if model is None or not running:
-        return None
+def _states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
+    """What exported functions take along a motion."""
     mechanism = model.mechanism
     if mechanism.loops is None:
-        return speed(running, (motion.z, motion.dz, motion.ddz))
+        return {"q": motion.z, "dq": motion.dz, "ddq": motion.ddz}
     coordinates = Coordinates(mechanism)
-    rates = coordinates.rates(motion.q, motion.dz, motion.ddz)
-    R = coordinates.tangent(motion.q)[:, list(mechanism.dependent)]
-    return speed(running, (motion.q, *rates, R))
+    dq, ddq = coordinates.rates(motion.q, motion.dz, motion.ddz)
+    dependent = list(mechanism.dependent)
+    R = coordinates.tangent(motion.q)[:, dependent]
+    b = coordinates.rates(motion.q, motion.dz, np.zeros_like(motion.ddz))[1][:, dependent]
+    return {"q": motion.q, "dq": dq, "ddq": ddq, "R": R, "b": b}
 
 
 def _tracking(
