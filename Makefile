@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers torture graph clean
+.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers pages torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -27,6 +27,7 @@ help:
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
+	@echo "make pages       reports in a browser: sizes and times"
 	@echo "make identification  intervals and hints on simulated logs"
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
 	@echo "make docs        build the site, and run what it tells to type"
@@ -115,7 +116,7 @@ reference: $(REFERENCES)
 	  cp results/$$robot/report/summary.json results/reference/$$robot.json; \
 	done
 
-benchmark robots identification controllers: export PYTHONPATH := tests
+benchmark robots identification controllers pages: export PYTHONPATH := tests
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
@@ -124,6 +125,10 @@ benchmark: $(VENV)/.installed-dev
 # Arms that people have, from their URDF to code: sizes, operations and times in results/robots.
 robots: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.benchmarks.robots
+
+# How large pages are, how soon they can be used, and what a step of their slider takes.
+pages: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.benchmarks.page $(patsubst %/report/index.html,%,$(wildcard results/*/report/index.html))
 
 # How often intervals hold the truth and hints are right, on hundreds of simulated logs.
 identification: $(VENV)/.installed-dev

@@ -5,6 +5,7 @@ mkdocs runs this when the site is built; `python docs/generated.py FOLDER` write
 
 import ast
 import inspect
+import json
 import re
 import sys
 from collections.abc import Iterator, Mapping
@@ -22,6 +23,7 @@ from paramreduce_cli.config.loading import config_schema
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 KEYS = Path(__file__).resolve().parent / "keys"
 """Configs that use what the others do not need."""
+NOTEBOOK = Path(__file__).resolve().parent / "tutorial.ipynb"
 _LONGEST = 120
 """Characters of an example."""
 RECORDS = Path(__file__).resolve().parents[1] / "paramreduce_cli" / "records"
@@ -96,6 +98,17 @@ def python_page() -> str:
                 if not own.startswith("_") and isinstance(member, property | cached_property) and member.__doc__:  # fmt: skip
                     lines += [f"- `.{own}`: {_roles(_text(member.__doc__))}"]
     return "\n".join(lines) + "\n"
+
+
+def notebook_page() -> str:
+    """The tutorial in Python, cell by cell; `make docs` runs the notebook itself."""
+    cells = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
+    blocks = []
+    for cell in cells:
+        text = "".join(cell["source"]).rstrip()
+        blocks.append(text if cell["cell_type"] == "markdown" else f"```python\n{text}\n```")
+    blocks.append(f"This page is [{NOTEBOOK.name}]({NOTEBOOK.name}), cell by cell.")
+    return "\n\n".join(blocks) + "\n"
 
 
 def _documented(name: str, thing: Any) -> Iterator[str]:
@@ -257,6 +270,7 @@ PAGES = {
     "reference/commands.md": commands_page,
     "reference/records.md": records_page,
     "reference/python.md": python_page,
+    "notebook.md": notebook_page,
 }
 
 if __name__ == "<run_path>" or "mkdocs_gen_files" in sys.modules:

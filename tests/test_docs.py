@@ -2,6 +2,7 @@
 
 import importlib.util
 import inspect
+import json
 import re
 import shlex
 import shutil
@@ -68,6 +69,13 @@ def test_every_function_is_on_its_page_with_what_it_takes(generated):
             assert f"pr.{name}(" in text
             described = re.findall(r"^    (\w+):", inspect.cleandoc(thing.__doc__), re.MULTILINE)
             assert all(f"- `{one}`: " in text for one in described)
+
+
+def test_the_notebook_is_a_page(generated):
+    page = generated.notebook_page()
+    cells = json.loads((DOCS / "tutorial.ipynb").read_text())["cells"]
+    assert page.count("```python") == sum(cell["cell_type"] == "code" for cell in cells)
+    assert all("".join(cell["source"]).strip() in page for cell in cells)
 
 
 @pytest.mark.parametrize("path", sorted((DOCS / "keys").glob("*.yaml")), ids=lambda p: p.stem)
