@@ -20,8 +20,8 @@ def values_file(
         origin: The artifact it is from, and its digest.
         mechanism: Says units, coordinates and frames; None where there is none.
     """
-    found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
-    units = {} if mechanism is None else {p.name: {"unit": p.unit} for p in mechanism.parameters}
+    found = zip(chosen.first, chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
+    units = [] if mechanism is None else [{"unit": p.unit} for p in mechanism.parameters]
     known = {} if mechanism is None else {
         "coordinates": mechanism.generalised_names,
         "frames": mechanism.frames,
@@ -32,8 +32,8 @@ def values_file(
         "from": origin,
         "paramreduce": __version__,
         "parameters": [
-            {"name": name, "value": value, **units.get(name, {}), "stands_for": expression}
-            for name, value, expression in found
+            {"name": name, "value": value, **(units[k] if units else {}), "stands_for": expression}
+            for k, name, value, expression in found
         ],
         **known,
     }

@@ -198,11 +198,10 @@ def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
 
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
     """Values with units: those of the first standard parameter that has each."""
-    first = [int(np.flatnonzero(chosen.position == k)[0]) for k in range(chosen.n)]
     return tuple(
         ParameterValue(name, float(value), model.mechanism.parameters[k].unit, expression)
         for k, name, value, expression in zip(
-            first, chosen.names, chosen.values, chosen.expressions, strict=True
+            chosen.first, chosen.names, chosen.values, chosen.expressions, strict=True
         )
     )
 

@@ -64,6 +64,11 @@ class ReducedModel:
         return np.flatnonzero(self.position != NOT_KEPT)
 
     @property
+    def first(self) -> list[int]:
+        """The first standard parameter that has each value, whose unit and kind are the value's."""
+        return [int(np.flatnonzero(self.position == k)[0]) for k in range(self.n)]
+
+    @property
     def standard(self) -> FloatArray:
         """Values of the standard parameters, zero where none is kept, (n_standard,)."""
         result = np.zeros(self.position.size)

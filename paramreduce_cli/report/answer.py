@@ -70,12 +70,12 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
         ShownParameter(
             name,
             f"{value:.6g}",
-            data.unit(int(np.flatnonzero(model.position == k)[0])).replace("^2", "²"),
+            data.unit(parameter).replace("^2", "²"),
             f"{deviations[name]:.2g}" if name in deviations else "",
             relation if relation != name else "",
         )
-        for k, (name, value, relation) in enumerate(
-            zip(model.names, model.values, expressions, strict=True)
+        for parameter, name, value, relation in zip(
+            model.first, model.names, model.values, expressions, strict=True
         )
     )
 
@@ -98,7 +98,7 @@ def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
     if data.known_model is None:
         return ()
     parameters = data.known_model.mechanism.parameters
-    symbols = {p.kind.symbol for p in parameters if p.name in data.validation.selected.model.names}
+    symbols = {parameters[k].kind.symbol for k in data.validation.selected.model.first}
     both = {f"I{a}{b}" for a in "xyz" for b in "xyz"}
     return tuple(
         (name, meaning)

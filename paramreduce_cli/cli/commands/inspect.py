@@ -166,11 +166,10 @@ def _parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
     found = _beside(folder / "identification.h5", Identification)
     deviations = {} if found is None else found.reduced.deviations_of(chosen)
     units = [] if model is None else [p.unit for p in model.mechanism.parameters]
-    first = {k: column for column, k in reversed(list(enumerate(chosen.position.tolist())))}
     return [
-        _Parameter(name, value, units[first[k]] if units else "", deviations.get(name), expression)
-        for k, (name, value, expression) in enumerate(
-            zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
+        _Parameter(name, value, units[k] if units else "", deviations.get(name), expression)
+        for k, name, value, expression in zip(
+            chosen.first, chosen.names, chosen.values.tolist(), chosen.expressions, strict=True
         )
     ]
 
