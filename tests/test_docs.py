@@ -14,13 +14,17 @@ import h5py
 import pytest
 import yaml
 from conftest import ROOT, model_of
+from pydantic import ValidationError
 
 from paramreduce_cli import api
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import config_schema
+from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.writing import export
+from paramreduce_cli.fields.section import Section
+from paramreduce_cli.sweep import SweepSection
 
 DOCS = ROOT / "docs"
 ENDINGS = r"(_(joint|estimation|validation|inverse|direct|plain|paper_rule|training|held_out))+$"
@@ -171,31 +175,30 @@ def test_calls_of_exported_c_compile(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_every_key_in_an_example_is_known():
-    schema = config_schema()
+def sections_below(kind):
+    for one in kind.__subclasses__():
+        yield one
+        yield from sections_below(one)
+
+
+def wrong_in(content, kind, constants):
+    """What a section refuses of an example that need not be whole."""
+    try:
+        kind.model_validate(content, context={"constants": constants})
+    except ValidationError as error:
+        return [one for one in error.errors() if one["type"] != "missing"]
+    return []
+
+
+def test_every_example_of_a_config_is_valid():
+    """Its keys and values, as a config or as a section of one; constants are its own or those of its page."""
     found = list(blocks("yaml"))
     assert len(found) > 10
     for page, text in found:
         content = yaml.safe_load(text)
-        candidates = [schema, *schema["$defs"].values()]
-        sweep = "robots" in content  # has a schema of its own
-        assert sweep or any(fits(content, one, schema) for one in candidates), (page, text)
-
-
-def fits(node, schema, root):
-    """Whether all keys are those of a JSON schema; values are of no concern."""
-    if "$ref" in schema:
-        return fits(node, root["$defs"][schema["$ref"].rpartition("/")[2]], root)
-    if "anyOf" in schema:
-        return any(fits(node, one, root) for one in schema["anyOf"])
-    if isinstance(node, dict):
-        own, other = schema.get("properties", {}), schema.get("additionalProperties", False)
-        return all(
-            fits(value, own[key], root)
-            if key in own
-            else other is True or (other is not False and fits(value, other, root))
-            for key, value in node.items()
-        )
-    if isinstance(node, list) and "items" in schema:
-        return all(fits(value, schema["items"], root) for value in node)
-    return schema.get("type") != "object"
+        constants = {"h": 0.3, "far": 0.4, "R": 0.5, "r": 0.2} if page == "mechanisms.md" else {}
+        wrong = {kind: wrong_in(content, kind, constants) for kind in sections_below(Section)}
+        assert not all(wrong.values()), (page, text, min(wrong.values(), key=len))
+    assert SweepSection in wrong
+    assert wrong_in({"torque_error": 2}, TermsSection, {}), "values count"
+    assert wrong_in({"torque_eror": 0.01}, TermsSection, {}), "keys count"

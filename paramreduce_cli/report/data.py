@@ -14,6 +14,7 @@ from paramreduce_cli.records import (
     Model,
     ReducedModel,
     Reduction,
+    Samples,
     Speed,
     TermReduction,
     Tracking,
@@ -72,7 +73,7 @@ class ReportData:
     motion: ShownMotion
     skeletons: tuple[Skeleton, ...]
     animation: Animation | None
-    """Of the motion, where there is a mechanism."""
+    """Of the motions of both sets, where there is a mechanism."""
     speed: Speed | None
     """Of the inverse dynamics of the full and of the selected model; None without a robot."""
     speed_direct: Speed | None
@@ -132,6 +133,27 @@ class ReportData:
         if self.known_model is None:
             raise LookupError("a figure or a table of a mechanism, and there is none")
         return self.known_model
+
+
+def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
+    """Generalised coordinates along the trajectories of both sets, that of :func:`first_motion` first.
+
+    Args:
+        samples: Both sets.
+        most: Trajectories of each set at most, the first ones.
+        frames: Of all motions together, about.
+
+    Returns:
+        (n_frames, n_q) by the name of each motion, evenly spread over it.
+    """
+    found: dict[str, list[FloatArray]] = {}
+    for name, part in (("validation", samples.validation), ("estimation", samples.estimation)):
+        for block in part.blocks() if part is not None else ():
+            if block.trajectory >= most:
+                break
+            found.setdefault(f"{name} {block.trajectory + 1}", []).append(block.q)
+    whole = {name: np.concatenate(parts) for name, parts in found.items()}
+    return {name: q[:: max(1, -(-len(q) * len(whole) // frames))] for name, q in whole.items()}
 
 
 def first_motion(

@@ -421,20 +421,24 @@
     place.hidden = false;
     const canvas = place.querySelector("canvas");
     savable(place, "mechanism.png", () => picture(canvas));
-    const [button, time] = [place.querySelector("button"), place.querySelector("input")];
+    const [select, button, time] = ["select", "button", "input"].map((name) => place.querySelector(name));
     const nPoints = figure.count;
-    const nFrames = figure.points.length / 3 / nPoints;
-    const used = new Set(figure.lines.flatMap(([a, b]) => [a, b]));
+    const points = Float32Array.from(figure.points, (share, k) => figure.low[k % 3] + share * figure.step);
+    // Of each motion where its frames begin, and how many there are.
+    let begin = 0;
+    const motions = figure.motions.map(({ name, frames }) => ({ name, frames, begin: (begin += frames) - frames }));
+    select.replaceChildren(...motions.map(({ name }, k) => new Option(name, k)));
+    select.hidden = motions.length < 2;
+    let now = motions[0];
     const [middle, reach] = extent();
     const view = { azimuth: widest() + 0.35, elevation: 0.38, frame: 0, playing: false, drag: null };
     let shares = new Map();
-    time.max = nFrames - 1;
+    time.max = now.frames - 1;
     view.frame = mostSpread();
     time.value = view.frame;
     function extent() {
       const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-      figure.points.forEach((v, k) => {
-        if (!used.has(Math.floor(k / 3) % nPoints)) return;
+      points.forEach((v, k) => {
         low[k % 3] = Math.min(low[k % 3], v);
         high[k % 3] = Math.max(high[k % 3], v);
       });
@@ -442,21 +446,20 @@
     }
     function mostSpread() {
       let [best, most] = [0, -1];
-      for (let f = 0; f < nFrames; f++) {
+      for (let f = now.begin; f < now.begin + now.frames; f++) {
         let spread = 0;
         for (const [a, b] of figure.lines) {
-          for (const k of [a, b]) for (let i = 0; i < 3; i++) spread += Math.abs(figure.points[3 * (f * nPoints + k) + i] - figure.points[3 * f * nPoints + i]);
+          for (const k of [a, b]) for (let i = 0; i < 3; i++) spread += Math.abs(points[3 * (f * nPoints + k) + i] - points[3 * f * nPoints + i]);
         }
-        if (spread > most) [best, most] = [f, spread];
+        if (spread > most) [best, most] = [f - now.begin, spread];
       }
       return best;
     }
     // From where the motion is seen from its broad side.
     function widest() {
       let [xx, xy, yy] = [0, 0, 0];
-      for (let k = 0; k < figure.points.length / 3; k++) {
-        if (!used.has(k % nPoints)) continue;
-        const [x, y] = [figure.points[3 * k] - middle[0], figure.points[3 * k + 1] - middle[1]];
+      for (let k = 0; k < points.length / 3; k++) {
+        const [x, y] = [points[3 * k] - middle[0], points[3 * k + 1] - middle[1]];
         [xx, xy, yy] = [xx + x * x, xy + x * y, yy + y * y];
       }
       return Math.atan2(2 * xy, xx - yy) / 2 - Math.PI / 2;
@@ -471,8 +474,8 @@
       const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
       const zoom = (0.8 * Math.min(width, height)) / reach;
       const project = (k) => {
-        const at = 3 * (view.frame * nPoints + k);
-        const [x, y, z] = [0, 1, 2].map((i) => figure.points[at + i] - middle[i]);
+        const at = 3 * ((now.begin + view.frame) * nPoints + k);
+        const [x, y, z] = [0, 1, 2].map((i) => points[at + i] - middle[i]);
         const across = -sa * x + ca * y, near = ca * x + sa * y;
         return [width / 2 + zoom * across, height / 2 - zoom * (ce * z - se * near), ce * near + se * z];
       };
@@ -500,12 +503,18 @@
       draw();
     });
     time.addEventListener("input", () => { view.frame = +time.value; draw(); });
+    select.addEventListener("change", () => {
+      now = motions[select.value];
+      time.max = now.frames - 1;
+      time.value = view.frame = Math.min(view.frame, now.frames - 1);
+      draw();
+    });
     let last = 0;
-    const step = (now) => {
+    const step = (instant) => {
       if (!view.playing) return;
-      if (now - last > 60) {
-        last = now;
-        time.value = view.frame = (view.frame + 1) % nFrames;
+      if (instant - last > 60) {
+        last = instant;
+        time.value = view.frame = (view.frame + 1) % now.frames;
         draw();
       }
       requestAnimationFrame(step);

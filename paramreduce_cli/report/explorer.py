@@ -12,6 +12,7 @@ from paramreduce_cli.report.data import ReportData
 
 _NUMBERS = 600_000
 """Most entries of the observation matrix that the page carries; an arm of six joints has 300 per sample."""
+_FINEST = np.iinfo(np.uint16).max
 _SETS = ("estimation", "validation")
 _FUNCTIONS = ("inverse", "direct")
 
@@ -165,14 +166,27 @@ def _motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
 
 
 def _figure(data: ReportData) -> dict[str, Any] | None:
-    """The mechanism along the motion: points in the base frame, and lines between them by body."""
-    if data.animation is None:
+    """The mechanism along its motions: points in the base frame, and lines between them by body.
+
+    Coordinates are embedded as shares of the box that they move in, in 16 bits: a hundred thousandth of it
+    is less than a pixel.
+    """
+    shown = data.animation
+    if shown is None:
         return None
+    used = np.unique([line[:2] for line in shown.lines])
+    place = {int(point): k for k, point in enumerate(used)}
+    points = shown.points[:, used]
+    low = np.nanmin(points, axis=(0, 1))
+    size = float(np.max(np.nanmax(points, axis=(0, 1)) - low)) or 1.0
     return {
-        "count": data.animation.points.shape[1],
-        "points": packed(data.animation.points.astype(np.float32)),
-        "lines": data.animation.lines,
-        "owners": list(data.animation.owners),
+        "count": used.size,
+        "points": packed(np.round((points - low) / size * _FINEST).astype(np.uint16)),
+        "low": low.tolist(),
+        "step": size / _FINEST,
+        "motions": [{"name": name, "frames": frames} for name, frames in shown.motions],
+        "lines": [(place[start], place[end], body, kind) for start, end, body, kind in shown.lines],
+        "owners": list(shown.owners),
     }
 
 

@@ -1,6 +1,6 @@
 """A mechanism in one pose, for drawing."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,19 +54,22 @@ def skeleton(model: Model, q: FloatArray) -> Skeleton:
 
 @dataclass(frozen=True)
 class Animation:
-    """A mechanism along a motion, for drawing: points that move, and lines between them."""
+    """A mechanism along its motions, for drawing: points that move, and lines between them."""
 
     points: FloatArray
-    """In the base frame, NaN where a body has no mass, (n_samples, n_points, 3), m."""
+    """In the base frame, NaN where a body has no mass, of all motions one after the other,
+    (n_frames, n_points, 3), m."""
+    motions: tuple[tuple[str, int], ...]
+    """Name and number of frames of each motion."""
     lines: tuple[tuple[int, int, int, str], ...]
     """From point to point, of which body (:data:`BASE` for none), and as what: link, rail, mass, loop or axis."""
     owners: tuple[str, ...]
     """Names of the bodies."""
 
 
-def animation(model: Model, q: FloatArray) -> Animation:
-    """The mechanism at some generalised coordinates, (n_samples, n_q)."""
-    frames = [skeleton(model, row) for row in q]
+def animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
+    """The mechanism along motions, each of generalised coordinates (n_frames, n_q)."""
+    frames = [skeleton(model, row) for q in motions.values() for row in q]
     places = np.array([one.poses[:, :3, 3] for one in frames])
     half = _AXIS * float(np.ptp(places.reshape(-1, 3), axis=0).max()) or _AXIS
     points = [
@@ -75,7 +78,8 @@ def animation(model: Model, q: FloatArray) -> Animation:
         for one in frames
     ]  # fmt: skip
     names = tuple(body.name for body in model.mechanism.bodies)
-    return Animation(np.array(points), tuple(_lines(frames[0])), names)
+    lengths = tuple((name, len(q)) for name, q in motions.items())
+    return Animation(np.array(points), lengths, tuple(_lines(frames[0])), names)
 
 
 def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:

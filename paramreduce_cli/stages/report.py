@@ -33,7 +33,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import full_model
 from paramreduce_cli.registry import Registry
-from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion
+from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion, motions
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
@@ -43,8 +43,10 @@ from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.tracking.demonstration import tracked
 
 _POSES = 3
-_FRAMES = 120
-"""Most poses of the animation."""
+_MOTIONS, _FRAMES = 40, 1200
+"""Motions of each set that are animated at most, and poses of all of them together."""
+_ANIMATED = 100_000
+"""Samples of a set from which on its first motion alone is animated: finding the others would take long."""
 
 
 def report(
@@ -91,7 +93,7 @@ def report(
         rms_torque=_rms_torque(samples, reduction.nominal_torque),
         motion=motion,
         skeletons=() if model is None else _skeletons(section, model, motion),
-        animation=None if model is None else _animation(model, motion),
+        animation=None if model is None else _animation(model, samples),
         speed=speed(running, states) if running else None,
         speed_direct=speed(direct, states) if direct else None,
         tracking=_tracking(section, model, running, motion),
@@ -203,9 +205,10 @@ def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
     return found
 
 
-def _animation(model: Model, motion: ShownMotion) -> Animation:
-    step = max(1, -(-motion.time.size // _FRAMES))
-    return animation(model, motion.q[::step])
+def _animation(model: Model, samples: Samples) -> Animation:
+    sets = [part for part in (samples.validation, samples.estimation) if part is not None]
+    short = all(part.n_samples <= _ANIMATED for part in sets)
+    return animation(model, motions(samples, _MOTIONS if short else 1, _FRAMES))
 
 
 def _skeletons(section: ReportSection, model: Model, motion: ShownMotion) -> tuple[Skeleton, ...]:

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.terms.likeness import Ways, alike
 from paramreduce_cli.terms.samples import TermSamples, signed_outputs
-from paramreduce_cli.terms.tape import Tape
+from paramreduce_cli.terms.tape import WHOLE, Remains, Tape
 
 _LARGEST = 1e100
 """Share of an allowed error from which on it does not matter how large it is."""
@@ -47,7 +48,7 @@ class Linear:
 class Fit:
     """A program without some of its terms, its parameters fitted."""
 
-    mask: BoolArray
+    left: Remains
     beta: FloatArray
     """(n_parameters,)"""
     torque_error: float
@@ -55,6 +56,8 @@ class Fit:
     """Infinite where a mass matrix is not positive definite; not a number where it is not asked for."""
     cost: float
     """Sum of the squares of both errors over the allowed ones."""
+    strain: float
+    """The same with errors on watched samples, which are looked at where the others are allowed."""
     excess: float
     """The largest of all errors over the allowed one."""
     linear: Linear
@@ -90,6 +93,7 @@ class Fitting:
         self.n = n_parameters
         self._watched, self._poses = watched, poses
         self._parameters = tape.parameters(n_parameters)
+        self._made, self._in_parameters = tape.made(), tape.linear(n_parameters)
         chi = samples.tau / samples.nominal_torque[:, None]
         self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi))
         nominal = samples.nominal_acceleration
@@ -100,19 +104,19 @@ class Fitting:
         m = samples.tau.shape[1]
         return np.vstack([np.broadcast_to(beta[:, None], (self.n, m)), samples.states])
 
-    def fit(self, mask: BoolArray, beta: FloatArray, looks: int = 1) -> Fit:
+    def fit(self, left: Remains, beta: FloatArray, looks: int = 1) -> Fit:
         """Fit the parameters.
 
         Args:
-            mask: What is kept of the program.
+            left: Of the program.
             beta: Values to start from, for the mass matrices that accelerations are found with.
             looks: How often these are found anew.
         """
         samples, program = self.samples, self.tape.program
-        values, _ = self.tape.values(mask, self._inputs(beta, samples))
-        adjoints = self.tape.adjoints(mask, values, samples.seeds)
+        values, _ = self.tape.values(left, self._inputs(beta, samples))
+        adjoints = self.tape.adjoints(left, values, samples.seeds)
         present = self._parameters >= 0
-        present[present] = mask[self._parameters[present], 2]
+        present[present] = left.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
         W[present] = adjoints[self._parameters[present]]
         inverse = samples.inverse_masses(signed_outputs(program, values))
@@ -125,24 +129,27 @@ class Fitting:
             if not samples.direct:
                 break
             # Accelerations go with the mass matrices of the fitted values.
-            values, _ = self.tape.values(mask, self._inputs(beta, samples))
+            values, _ = self.tape.values(left, self._inputs(beta, samples))
             inverse = samples.inverse_masses(signed_outputs(program, values))
         residual = self._weighed(off[None], metric)[0]
         errors = self._errors(off, inverse)
-        return self._judged(mask, beta, errors, Linear(rows, factor, residual, metric))
+        return self._judged(left, beta, errors, Linear(rows, factor, residual, metric))
 
     def _judged(
-        self, mask: BoolArray, beta: FloatArray, errors: tuple[float, float], linear: Linear
+        self, left: Remains, beta: FloatArray, errors: tuple[float, float], linear: Linear
     ) -> Fit:
         shares = self._shares(errors)
         cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
+        strain = cost
         if self._watched is not None and max(shares) <= 1.0:
-            shares += self._shares(self.errors(mask, beta, self._watched))
+            watched = self._shares(self.errors(left, beta, self._watched))
+            strain += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
+            shares += watched
         if self._poses is not None and max(shares) <= 1.0:
-            values, _ = self.tape.values(mask, self._inputs(beta, self._poses))
+            values, _ = self.tape.values(left, self._inputs(beta, self._poses))
             if self._poses.inverse_masses(signed_outputs(self.tape.program, values)) is None:
                 shares.append(np.inf)
-        return Fit(mask, beta, *errors, cost, float(max(shares)), linear)
+        return Fit(left, beta, *errors, cost, strain, float(max(shares)), linear)
 
     def _shares(self, errors: tuple[float, float]) -> list[float]:
         """Errors over the allowed ones."""
@@ -163,19 +170,30 @@ class Fitting:
         caused = np.einsum("mij,jm->im", inverse, off) * self._acceleration_scale[:, None]
         return torque, float(np.linalg.norm(caused))
 
-    def errors(
-        self, mask: BoolArray, beta: FloatArray, samples: TermSamples
-    ) -> tuple[float, float]:
+    def errors(self, left: Remains, beta: FloatArray, samples: TermSamples) -> tuple[float, float]:
         """Errors of torques and of accelerations on other samples."""
-        values, _ = self.tape.values(mask, self._inputs(beta, samples))
+        values, _ = self.tape.values(left, self._inputs(beta, samples))
         return samples.errors(signed_outputs(self.tape.program, values))
 
     def effects(self, fit: Fit, candidates: IntArray) -> FloatArray:
         """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
-        values, own = self.tape.values(fit.mask, self._inputs(fit.beta, self.samples))
-        adjoints = self.tape.adjoints(fit.mask, values, self.samples.seeds)
+        values, own, adjoints = self._derived(fit)
         found = self.tape.effects(candidates, values, own, adjoints)
         return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
+
+    def stand_ins(self, fit: Fit) -> tuple[Ways, FloatArray]:
+        """Nodes that could stand for others, and what the rows of a fit lose, (n_ways, n_rows)."""
+        values, _, adjoints = self._derived(fit)
+        pulls = self._weighed(adjoints, fit.linear.metric).reshape(adjoints.shape)
+        itself = fit.left.kept[:, WHOLE] & (fit.left.source == np.arange(self.tape.size))
+        residual = fit.linear.residual.reshape(pulls.shape[1:])
+        ways = alike(values, pulls, residual, self._made & itself, self._in_parameters)
+        return ways, ways.changes(values, pulls)
+
+    def _derived(self, fit: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Values of the nodes, their own ones, and derivatives of the torques by them."""
+        values, own = self.tape.values(fit.left, self._inputs(fit.beta, self.samples))
+        return values, own, self.tape.adjoints(fit.left, values, self.samples.seeds)
 
     def _metric(self, inverse: FloatArray | None) -> FloatArray | None:
         """Square roots of the quadratic forms that take differences of torques to the cost.

@@ -6,11 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 
+import numba
 import numpy as np
 
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.records import Block, FloatArray, Mechanism
+from paramreduce_cli.records import Block, FloatArray, IntArray, Mechanism
 
 
 @dataclass(frozen=True)
@@ -57,28 +58,23 @@ class TermSamples:
         Args:
             outputs: Of the program, (n_outputs, n_samples).
         """
-        n = len(self.ddq)
-        torques = outputs
-        if self.direct:
-            torques = np.einsum("mij,jm->im", self._masses(outputs), self.ddq) + outputs[-n:]
-        if self.tangent is not None:
-            torques = np.einsum("mij,im->jm", self.tangent, torques)
+        live = np.flatnonzero(outputs.any(axis=1))
+        torques = np.einsum("oim,om->im", self.seeds[live], outputs[live])
         result: FloatArray = self.tau - torques
         return result
 
-    def _masses(self, outputs: FloatArray) -> FloatArray:
-        n = len(self.ddq)
-        rows, columns = np.tril_indices(n)
-        M = np.empty((outputs.shape[1], n, n))
-        M[:, rows, columns] = M[:, columns, rows] = outputs[:-n].T
-        return M
-
     def mass_matrices(self, outputs: FloatArray) -> FloatArray:
         """Of the independent coordinates, (n_samples, n_dof, n_dof)."""
-        M = self._masses(outputs)
-        if self.tangent is not None:
-            M = np.swapaxes(self.tangent, 1, 2) @ M @ self.tangent
-        return M
+        n, count = self.ddq.shape
+        rows, columns = np.tril_indices(n)
+        lower = outputs[:-n]
+        if self.tangent is None:
+            M = np.empty((count, n, n))
+            M[:, rows, columns] = M[:, columns, rows] = lower.T
+            return M
+        live = np.flatnonzero(lower.any(axis=1))
+        entries = np.ascontiguousarray(lower[live].T)
+        return np.asarray(_projected(entries, rows[live], columns[live], self.tangent))
 
     def inverse_masses(self, outputs: FloatArray) -> FloatArray | None:
         """Inverses of the mass matrices, (n_samples, n_dof, n_dof).
@@ -90,9 +86,10 @@ class TermSamples:
         M = self.mass_matrices(outputs)
         try:
             np.linalg.cholesky(M)
+            # One that is singular to rounding may pass as positive definite, but has no inverse.
+            return np.asarray(np.linalg.inv(M), dtype=float)
         except np.linalg.LinAlgError:
             return None
-        return np.asarray(np.linalg.inv(M), dtype=float)
 
     def errors(self, outputs: FloatArray) -> tuple[float, float]:
         """Normalised errors of torques and of accelerations [Ros2019].
@@ -122,6 +119,37 @@ def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float,
         squares[3] += np.sum((part.ddz / scale) ** 2)
     torque, acceleration = np.sqrt(squares[[0, 2]] / squares[[1, 3]])
     return float(torque), float(acceleration)
+
+
+@numba.njit(cache=True, nogil=True)
+def _projected(
+    entries: FloatArray, rows: IntArray, columns: IntArray, tangent: FloatArray
+) -> FloatArray:
+    """J^T M J of symmetric matrices, most of whose entries are zero.
+
+    Args:
+        entries: Of their lower triangles, (n_samples, n_entries).
+        rows: Of these, (n_entries,).
+        columns: Of these, (n_entries,).
+        tangent: J, (n_samples, n, n_dof).
+    """
+    count, n, n_dof = tangent.shape
+    result = np.zeros((count, n_dof, n_dof))
+    across = np.empty((n, n_dof))
+    for m in range(count):
+        across[:] = 0.0
+        for e in range(rows.size):
+            i, j, x = rows[e], columns[e], entries[m, e]
+            for a in range(n_dof):
+                across[i, a] += x * tangent[m, j, a]
+            if i != j:
+                for a in range(n_dof):
+                    across[j, a] += x * tangent[m, i, a]
+        for i in range(n):
+            for a in range(n_dof):
+                for b in range(n_dof):
+                    result[m, a, b] += tangent[m, i, a] * across[i, b]
+    return result
 
 
 def signed_outputs(program: Program, values: FloatArray) -> FloatArray:

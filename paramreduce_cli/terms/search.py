@@ -1,4 +1,7 @@
-"""Which terms to leave out: down greedily, then some back in and down again, round by round."""
+"""Which terms to leave out: down greedily, then some back in and down again, round by round.
+
+Where no term can go any more, a node may still stand for a multiple of another one, or for a number.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.fitting import Fit, Fitting
+from paramreduce_cli.terms.tape import ITSELF
 
 _TRIED = 8
 """Most promising terms that are tried: by the error with parameters fitted again, and without."""
@@ -48,6 +52,10 @@ class Search:
         self._fitting = fitting
         self._tape = fitting.tape
         self._candidates = self._tape.candidates()
+        self._itself = np.zeros(self._tape.size, dtype=np.int64)
+        for number, (k, what) in enumerate(self._candidates.tolist()):
+            if what == ITSELF:
+                self._itself[k] = number
         self._rng = np.random.default_rng(seed)
 
     def start(self, beta: FloatArray) -> Step:
@@ -80,6 +88,9 @@ class Search:
                 visit(step)
             elif noise == 0 and looked_at == _TRIED:
                 looked_at = _TRIED_LAST
+            elif (other := self._stand_in(step, weights)) is not None:
+                step = other
+                visit(step)
             else:
                 return step
 
@@ -94,7 +105,7 @@ class Search:
             if found.count <= now.count + int(self._rng.random() < _WORSE):
                 now = found
             if found.count < best.count or (
-                found.count == best.count and found.fit.cost < best.fit.cost
+                found.count == best.count and found.fit.strain < best.fit.strain
             ):
                 best = found
             if now.count > best.count + 2:
@@ -114,42 +125,55 @@ class Search:
         for number in np.unique(np.concatenate(lists)):
             changed = self._with(fit, live[number : number + 1])
             if changed.within:
-                tried.append(((changed.cost - fit.cost) / saved[number], number, changed))
+                tried.append(((changed.strain - fit.strain) / saved[number], number, changed))
         if not tried:
             return None
         tried.sort(key=lambda entry: entry[0])
         _, number, best = tried[0]
         chosen = [number]
         for _, number, alone in tried[1:_AT_ONCE]:
-            expected = best.cost + max(alone.cost - fit.cost, 0.0) * _SUM_HOLDS
+            expected = best.strain + max(alone.strain - fit.strain, 0.0) * _SUM_HOLDS
             changed = self._with(fit, live[[*chosen, number]])
-            if changed.within and changed.cost <= expected:
+            if changed.within and changed.strain <= expected:
                 best, chosen = changed, [*chosen, number]
         return self._step(best)
 
+    def _stand_in(self, step: Step, weights: FloatArray) -> Step | None:
+        """The program with one node that stands for another one, None if all are too dear."""
+        fit = step.fit
+        ways, D = self._fitting.stand_ins(fit)
+        counts = self._tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
+        own = weights[self._itself[ways.nodes]]
+        useful = np.flatnonzero((counts < step.count) & np.isfinite(own))
+        again, _ = self._first_order(fit, D[useful])
+        saved = (step.count - counts[useful]).astype(float)
+        tried = []
+        for place in np.argsort(again * own[useful] / saved, kind="stable")[:_TRIED]:
+            changed = self._fitting.fit(fit.left.standing(*ways.one(useful[place])), fit.beta)
+            if changed.within:
+                tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
+        return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
+
     def _useful(self, step: Step, allowed: BoolArray) -> tuple[IntArray, FloatArray]:
         """Numbers of terms without which there are fewer operations, and how many fewer."""
-        mask = step.fit.mask
-        numbers = np.flatnonzero(allowed & self._kept(mask))
-        saved = step.count - self._tape.counts(mask, self._candidates[numbers])
+        left = step.fit.left
+        numbers = np.flatnonzero(allowed & left.has(self._candidates))
+        saved = step.count - self._tape.counts(left, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
-    def _kept(self, mask: BoolArray) -> BoolArray:
-        kept: BoolArray = mask[self._candidates[:, 0], self._candidates[:, 1]]
-        return kept
-
     def _step(self, fit: Fit) -> Step:
-        return Step(fit, self._tape.count(fit.mask))
+        return Step(fit, self._tape.count(fit.left))
 
     def _with(self, fit: Fit, flipped: IntArray) -> Fit:
         """Fitted with some terms the other way round."""
-        mask = fit.mask.copy()
-        mask[flipped[:, 0], flipped[:, 1]] ^= True
-        return self._fitting.fit(mask, fit.beta)
+        return self._fitting.fit(fit.left.flipped(flipped), fit.beta)
 
     def _costs(self, fit: Fit, live: IntArray) -> tuple[FloatArray, FloatArray]:
         """What leaving each term out costs to first order, with parameters fitted again and without."""
-        D = self._fitting.effects(fit, live)
+        return self._first_order(fit, self._fitting.effects(fit, live))
+
+    def _first_order(self, fit: Fit, D: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """The same of what rows lose, (n_ways, n_rows)."""
         plain = np.einsum("cr,cr->c", D, D) + 2 * (D @ fit.linear.residual)
         return plain - fit.linear.explained(D), plain
 
@@ -180,13 +204,13 @@ class Search:
 
     def _one_back(self, fit: Fit, back: list[int], spread: float) -> Fit:
         """Put back one of the terms that help most for what they cost, none of some; note its number."""
-        gone = ~self._kept(fit.mask)
+        gone = ~fit.left.has(self._candidates)
         gone[back] = False
         numbers = np.flatnonzero(gone)
         if not numbers.size:
             return fit
         terms = self._candidates[numbers]
-        dearer = self._tape.counts(fit.mask, terms) - self._tape.count(fit.mask)
+        dearer = self._tape.counts(fit.left, terms) - self._tape.count(fit.left)
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.explained(G)

@@ -104,7 +104,7 @@ class _Way:
     def simplified(self, fit: Fit) -> Simplified:
         """A program on the way, its sums and products rearranged."""
         graph = Graph()
-        outputs = self.tape.rebuilt(fit.mask).rebuilt(graph)
+        outputs = self.tape.rebuilt(fit.left).rebuilt(graph)
         program = Program.of_graph(*least([Written(graph, outputs)]))
         return Simplified(self.start, self.operations_start, program, fit.beta)
 

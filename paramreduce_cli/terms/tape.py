@@ -1,8 +1,13 @@
 """A program in arrays, of which terms can be left out: values, derivatives and operations, by Numba.
 
-A term is an operand of a sum, or a node as a whole, which then is zero wherever it is used.
-Programs are linear in their parameters, which are their first inputs, and stay so.
+A term is an operand of a sum, or a node as a whole, which then is zero wherever it is used. Instead
+a node may stand for another one times a factor, or for a number. Programs are linear in their
+parameters, which are their first inputs, and stay so.
 """
+
+from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numba
 import numpy as np
@@ -17,13 +22,47 @@ _CODES = {
     "sin": _SIN, "cos": _COS, "tanh": _TANH, "sign": _SIGN,
 }  # fmt: skip
 _NONE = -1
+_FIRST, _SECOND, WHOLE, ITSELF = range(4)
+"""What of a node can be otherwise: its operands in a sum, whether it is zero, what it stands for."""
+NUMBER = -1
+"""What a node stands for that is a number."""
+
+
+@dataclass(frozen=True)
+class Remains:
+    """What is left of a program."""
+
+    kept: BoolArray
+    """Of every node whether its first and its second operand are kept, which matters to sums, and whether
+    it is kept itself, (n_nodes, 3)."""
+    source: IntArray
+    """The node before it that a node stands for, mostly itself; NUMBER for a number, (n_nodes,)."""
+    factor: FloatArray
+    """By which that is multiplied, or the number, (n_nodes,)."""
+
+    def has(self, terms: IntArray) -> BoolArray:
+        """Which terms, as :meth:`Tape.candidates` gives them, are as in the whole program."""
+        nodes, what = terms.T
+        kept: BoolArray = self.kept[nodes, np.minimum(what, WHOLE)]
+        return np.where(what == ITSELF, self.source[nodes] == nodes, kept)
+
+    def flipped(self, terms: IntArray) -> Remains:
+        """The same with some terms the other way round; nodes can only come to stand for themselves."""
+        kept, source, factor = self.kept.copy(), self.source.copy(), self.factor.copy()
+        own = terms[:, 1] == ITSELF
+        kept[tuple(terms[~own].T)] ^= True
+        source[terms[own, 0]], factor[terms[own, 0]] = terms[own, 0], 1.0
+        return Remains(kept, source, factor)
+
+    def standing(self, node: int, source: int, factor: float) -> Remains:
+        """The same with a node standing for another one times a factor, or for a number."""
+        sources, factors = self.source.copy(), self.factor.copy()
+        sources[node], factors[node] = source, factor
+        return Remains(self.kept, sources, factors)
 
 
 class Tape:
     """A program whose terms can be left out.
-
-    What is left out is said by a mask: of every node whether its first and its second operand are
-    kept, which matters to sums, and whether it is kept itself, (n_nodes, 3).
 
     Args:
         program: Of sums, products, sines, cosines and friction's functions.
@@ -42,16 +81,39 @@ class Tape:
         self._numbers = np.array(numbers)
         self._outputs = np.array(program.outputs, dtype=np.int64)
 
-    def everything(self) -> BoolArray:
-        """The mask that leaves nothing out."""
-        return np.ones((self.size, 3), dtype=np.bool_)
+    def everything(self) -> Remains:
+        """The whole program."""
+        return Remains(
+            np.ones((self.size, 3), dtype=np.bool_), np.arange(self.size), np.ones(self.size)
+        )
 
     def candidates(self) -> IntArray:
-        """Terms that can be left out: numbers of nodes and what of them, (n_candidates, 2)."""
+        """Terms that can be left out: numbers of nodes and what of them, (n_candidates, 2).
+
+        The last ones are nodes as what they are, which can be put back where they stand for others.
+        """
         sums = np.flatnonzero(self._codes == _SUM)
         whole = np.flatnonzero(self._codes != _CONSTANT)
-        terms = [*((k, side) for k in sums for side in (0, 1)), *((k, 2) for k in whole)]
+        terms = [
+            *((k, side) for k in sums for side in (_FIRST, _SECOND)),
+            *((k, WHOLE) for k in whole),
+            *((k, ITSELF) for k in np.flatnonzero(self.made())),
+        ]
         return np.array(terms, dtype=np.int64).reshape(-1, 2)
+
+    def made(self) -> BoolArray:
+        """Which nodes are computed, neither constants nor inputs, (n_nodes,)."""
+        result: BoolArray = self._codes > _INPUT
+        return result
+
+    def linear(self, n: int) -> BoolArray:
+        """Of which nodes the first n inputs are part, (n_nodes,)."""
+        result = np.zeros(self.size, dtype=np.bool_)
+        for k, (operation, operands, number) in enumerate(self.program.nodes):
+            result[k] = (operation == "input" and number < n) or any(
+                result[value >> 1] for value in operands
+            )
+        return result
 
     def parameters(self, n: int) -> IntArray:
         """Nodes of the first inputs, -1 for those that the program does not use, (n,)."""
@@ -62,27 +124,32 @@ class Tape:
         result[positions[first]] = inputs[first]
         return result
 
-    def values(self, mask: BoolArray, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of all nodes, and what they would be if they were kept, each (n_nodes, n_samples).
+    def values(self, left: Remains, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Of all nodes, and what they would be if they were kept as they are, each (n_nodes, n_samples).
 
         Args:
-            mask: What is kept.
+            left: Of the program.
             inputs: By position, (n_inputs, n_samples).
         """
-        return _values(self._codes, self._operands, self._numbers, mask, inputs)
+        return _values(
+            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor, inputs
+        )
 
-    def adjoints(self, mask: BoolArray, values: FloatArray, seeds: FloatArray) -> FloatArray:
+    def adjoints(self, left: Remains, values: FloatArray, seeds: FloatArray) -> FloatArray:
         """Derivatives of quantities that are linear in the outputs, by all nodes.
 
         Args:
-            mask: What is kept.
+            left: Of the program.
             values: Of the nodes.
             seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
 
         Returns:
             (n_nodes, n_quantities, n_samples)
         """
-        return _adjoints(self._codes, self._operands, self._outputs, mask, values, seeds)
+        return _adjoints(
+            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            values, seeds,
+        )  # fmt: skip
 
     def effects(
         self, candidates: IntArray, values: FloatArray, own: FloatArray, adjoints: FloatArray
@@ -93,52 +160,94 @@ class Tape:
         """
         return _effects(self._operands, candidates, values, own, adjoints)
 
-    def count(self, mask: BoolArray) -> int:
+    def count(self, left: Remains) -> int:
         """Operations left, nearly: sums and products are not rearranged."""
-        return int(_count(self._codes, self._operands, self._outputs, mask))
+        return int(
+            _count(self._codes, self._operands, self._outputs, left.kept, left.source, left.factor)
+        )
 
-    def counts(self, mask: BoolArray, candidates: IntArray) -> IntArray:
-        """Operations left when one more term is the other way round, (n_candidates,)."""
-        return _counts(self._codes, self._operands, self._outputs, mask, candidates)
+    def counts(self, left: Remains, candidates: IntArray) -> IntArray:
+        """Operations left when one more term is the other way round, (n_candidates,).
 
-    def rebuilt(self, mask: BoolArray) -> Program:
+        Nodes that stand for themselves and could only stand for others stay as they are.
+        """
+        return _counts(
+            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            candidates,
+        )  # fmt: skip
+
+    def counts_standing(
+        self, left: Remains, nodes: IntArray, sources: IntArray, factors: FloatArray
+    ) -> IntArray:
+        """Operations left when one more node stands for another one, (n_ways,)."""
+        return _counts_standing(
+            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            nodes, sources, factors,
+        )  # fmt: skip
+
+    def rebuilt(self, left: Remains) -> Program:
         """The program that is left."""
-        # Node 0 is zero, which left-out operands refer to; all others move up by one.
         nodes = [Node("constant")]
+        stands_for: list[int] = []
+
+        def constant(number: float) -> int:
+            nodes.append(Node("constant", (), abs(number)))
+            return 2 * (len(nodes) - 1) + (number < 0)
+
         for k, (operation, operands, number) in enumerate(self.program.nodes):
-            left_out = (operation == "+" and not mask[k, side] for side in range(len(operands)))
-            kept = tuple(
-                ZERO if out else value + 2 for out, value in zip(left_out, operands, strict=True)
-            )
-            nodes.append(Node(operation, kept, number) if mask[k, 2] else Node("constant"))
-        whole = Program(tuple(nodes), tuple(value + 2 for value in self.program.outputs))
+            source, factor = int(left.source[k]), float(left.factor[k])
+            if not left.kept[k, WHOLE]:
+                stands_for.append(ZERO)
+            elif source == NUMBER:
+                stands_for.append(constant(factor))
+            elif source != k and abs(factor) == 1.0:
+                stands_for.append(stands_for[source] ^ (factor < 0))
+            elif source != k:
+                nodes.append(Node("*", (constant(factor), stands_for[source])))
+                stands_for.append(2 * (len(nodes) - 1))
+            else:
+                left_out = (operation == "+" and not left.kept[k, s] for s in range(len(operands)))
+                nodes.append(
+                    Node(
+                        operation,
+                        tuple(
+                            ZERO if out else stands_for[value >> 1] ^ (value & 1)
+                            for out, value in zip(left_out, operands, strict=True)
+                        ),
+                        number,
+                    )
+                )
+                stands_for.append(2 * (len(nodes) - 1))
+        outputs = tuple(stands_for[value >> 1] ^ (value & 1) for value in self.program.outputs)
         graph = Graph()
-        return Program.of_graph(graph, whole.rebuilt(graph))
+        return Program.of_graph(graph, Program(tuple(nodes), outputs).rebuilt(graph))
 
 
 @numba.njit(cache=True, nogil=True)
 def _values(
-    codes: IntArray, operands: IntArray, numbers: FloatArray, mask: BoolArray, inputs: FloatArray
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    inputs: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
     n, m = codes.size, inputs.shape[1]
     v, own = np.zeros((n, m)), np.empty((n, m))
     for k in range(n):
-        if k > 0 and mask[k - 1, 2]:
-            v[k - 1] = own[k - 1]
         code = codes[k]
-        if code == _CONSTANT:
-            own[k] = numbers[k]
-            continue
-        if code == _INPUT:
-            own[k] = inputs[int(numbers[k])]
-            continue
         a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
         s = -1.0 if operands[k, 0] & 1 else 1.0
         t = -1.0 if operands[k, 1] & 1 else 1.0
-        if code == _SUM:
-            if not mask[k, 0]:
+        if code == _CONSTANT:
+            own[k] = numbers[k]
+        elif code == _INPUT:
+            own[k] = inputs[int(numbers[k])]
+        elif code == _SUM:
+            if not kept[k, _FIRST]:
                 s = 0.0
-            if not mask[k, 1]:
+            if not kept[k, _SECOND]:
                 t = 0.0
             for i in range(m):
                 own[k, i] = s * v[a, i] + t * v[b, i]
@@ -156,8 +265,15 @@ def _values(
                     own[k, i] = np.tanh(x)
                 else:
                     own[k, i] = np.sign(x)
-    if mask[n - 1, 2]:
-        v[n - 1] = own[n - 1]
+        if not kept[k, WHOLE]:
+            continue
+        if source[k] == k:
+            v[k] = own[k]
+        elif source[k] == NUMBER:
+            v[k] = factor[k]
+        else:
+            for i in range(m):
+                v[k, i] = factor[k] * v[source[k], i]
     return v, own
 
 
@@ -166,7 +282,9 @@ def _adjoints(
     codes: IntArray,
     operands: IntArray,
     outputs: IntArray,
-    mask: BoolArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
     v: FloatArray,
     seeds: FloatArray,
 ) -> FloatArray:
@@ -183,7 +301,7 @@ def _adjoints(
                     adjoints[k, q, i] += s * seeds[o, q, i]
     for k in range(n - 1, -1, -1):
         code = codes[k]
-        if code <= _INPUT or not mask[k, 2]:
+        if code <= _INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
             continue
         a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
         s = -1.0 if operands[k, 0] & 1 else 1.0
@@ -191,12 +309,16 @@ def _adjoints(
         for q in range(quantities):
             if not reached[k, q]:
                 continue
-            if code == _SUM:
-                if mask[k, 0]:
+            if source[k] != k:
+                reached[source[k], q] = True
+                for i in range(m):
+                    adjoints[source[k], q, i] += factor[k] * adjoints[k, q, i]
+            elif code == _SUM:
+                if kept[k, _FIRST]:
                     reached[a, q] = True
                     for i in range(m):
                         adjoints[a, q, i] += s * adjoints[k, q, i]
-                if mask[k, 1]:
+                if kept[k, _SECOND]:
                     reached[b, q] = True
                     for i in range(m):
                         adjoints[b, q, i] += t * adjoints[k, q, i]
@@ -228,30 +350,46 @@ def _effects(
     for c in range(candidates.shape[0]):
         k, what = candidates[c]
         node, s = k, 1.0
-        if what < 2:
+        if what < WHOLE:
             node = operands[k, what] >> 1
             s = -1.0 if operands[k, what] & 1 else 1.0
-        source = v if what < 2 else own
+        source = v if what < WHOLE else own
         for q in range(quantities):
             for i in range(m):
-                result[c, q * m + i] = s * adjoints[k, q, i] * source[node, i]
+                given = source[node, i]
+                if what == ITSELF:
+                    given -= v[k, i]
+                result[c, q * m + i] = s * adjoints[k, q, i] * given
     return result
 
 
 @numba.njit(cache=True, nogil=True)
-def _count(codes: IntArray, operands: IntArray, outputs: IntArray, mask: BoolArray) -> int:
+def _count(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+) -> int:
     n = codes.size
     stands_for = np.arange(n)
     for k in range(n):
         code = codes[k]
-        if not mask[k, 2]:
+        if not kept[k, WHOLE]:
             stands_for[k] = _NONE
+        elif source[k] == NUMBER:
+            continue
+        elif source[k] != k:
+            j = stands_for[source[k]]
+            if j == _NONE or np.abs(factor[k]) == 1.0:
+                stands_for[k] = j
         elif code > _INPUT:
             a, b = stands_for[operands[k, 0] >> 1], stands_for[operands[k, 1] >> 1]
             if code == _SUM:
-                if not mask[k, 0]:
+                if not kept[k, _FIRST]:
                     a = _NONE
-                if not mask[k, 1]:
+                if not kept[k, _SECOND]:
                     b = _NONE
                 if a == _NONE:
                     stands_for[k] = b
@@ -269,9 +407,12 @@ def _count(codes: IntArray, operands: IntArray, outputs: IntArray, mask: BoolArr
             needed[node] = True
     count = 0
     for k in range(n - 1, -1, -1):
-        if not needed[k] or codes[k] <= _INPUT:
+        if not needed[k] or codes[k] <= _INPUT or source[k] == NUMBER:
             continue
         count += 1
+        if source[k] != k:
+            needed[stands_for[source[k]]] = True
+            continue
         sides = 2 if codes[k] <= _PRODUCT else 1
         for side in range(sides):
             node = stands_for[operands[k, side] >> 1]
@@ -282,13 +423,47 @@ def _count(codes: IntArray, operands: IntArray, outputs: IntArray, mask: BoolArr
 
 @numba.njit(cache=True, nogil=True)
 def _counts(
-    codes: IntArray, operands: IntArray, outputs: IntArray, mask: BoolArray, candidates: IntArray
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    candidates: IntArray,
 ) -> IntArray:
     result = np.empty(candidates.shape[0], dtype=np.int64)
-    changed = mask.copy()
+    changed, sources = kept.copy(), source.copy()
     for c in range(candidates.shape[0]):
         k, what = candidates[c]
-        changed[k, what] = not changed[k, what]
-        result[c] = _count(codes, operands, outputs, changed)
-        changed[k, what] = not changed[k, what]
+        if what == ITSELF:
+            sources[k] = k
+        else:
+            changed[k, what] = not changed[k, what]
+        result[c] = _count(codes, operands, outputs, changed, sources, factor)
+        if what == ITSELF:
+            sources[k] = source[k]
+        else:
+            changed[k, what] = not changed[k, what]
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def _counts_standing(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    nodes: IntArray,
+    standing_for: IntArray,
+    times: FloatArray,
+) -> IntArray:
+    result = np.empty(nodes.size, dtype=np.int64)
+    sources, factors = source.copy(), factor.copy()
+    for c in range(nodes.size):
+        k = nodes[c]
+        sources[k], factors[k] = standing_for[c], times[c]
+        result[c] = _count(codes, operands, outputs, kept, sources, factors)
+        sources[k], factors[k] = source[k], factor[k]
     return result

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from browser import MISSING, complaints, opened
 
+import paramreduce_cli as pr
+from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.texts import share
 
 in_browser = pytest.mark.skipif(MISSING, reason="there is no Chromium with its driver")
@@ -66,6 +68,53 @@ def test_torques_are_those_of_the_samples(carried, summary, two_link_results):
     expected = (W @ phi).reshape(tau.shape)[::step][: len(embedded)]
     assert np.abs(embedded - expected).max() < 1e-5 * np.abs(expected).max()
     assert np.abs(motion["tau"] - tau[::step][: len(embedded)]).max() < 1e-5 * np.abs(tau).max()
+
+
+def test_every_trajectory_moves(carried, two_link_results):
+    """Points of the bodies' frames, by the forward kinematics of the samples."""
+    figure = carried["figure"]
+    model = pr.open_results(two_link_results).model
+    with h5py.File(two_link_results / "samples.h5") as file:
+        recorded = {
+            f"{name} {int(k) + 1}": file[f"{name}/z"][file[f"{name}/trajectory"][()] == k]
+            for name in ("validation", "estimation")
+            for k in np.unique(file[f"{name}/trajectory"])
+        }
+    assert [motion["name"] for motion in figure["motions"]] == list(recorded)
+    points = figure["points"] * figure["step"] + np.array(figure["low"])
+    begin = 0
+    for motion in figure["motions"]:
+        frames = points[begin : begin + motion["frames"]]
+        begin += motion["frames"]
+        q = recorded[motion["name"]]
+        q = q[:: -(-len(q) // motion["frames"])]
+        assert len(q) == motion["frames"] >= 10
+        for moving, row in zip(frames[::7], q[::7], strict=True):
+            for pose in body_poses(model.mechanism, row):
+                off = np.linalg.norm(moving - pose[:3, 3], axis=1).min()
+                assert off < 2 * figure["step"], "some point is the frame's origin"
+    assert begin == len(points)
+
+
+@in_browser
+def test_another_motion_can_be_chosen(page, carried):
+    from selenium.webdriver.support.ui import Select
+
+    motions = carried["figure"]["motions"]
+    with opened(page) as driver:
+        place = driver.find_element("css selector", ".mechanism")
+        select = Select(place.find_element("tag name", "select"))
+        assert [option.text for option in select.options] == [m["name"] for m in motions]
+        time = place.find_element("css selector", "input")
+        shown = "return arguments[0].querySelector('canvas').toDataURL()"
+        before = driver.execute_script(shown, place)
+        for k, motion in enumerate(motions[1:], 1):
+            select.select_by_index(k)
+            assert int(time.get_attribute("max")) == motion["frames"] - 1
+            now = driver.execute_script(shown, place)
+            assert now != before
+            before = now
+        assert not complaints(driver)
 
 
 def test_heuristics_that_found_the_same_are_one_curve(carried, summary):

@@ -1,6 +1,7 @@
 """Fits and searches on a small arm, against definitions and against all that could be left out."""
 
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -45,7 +46,7 @@ def fitting_of(model, direct, budget, count=60, reduced=None):
 
 def predicted(fitting, fit, samples, direct):
     """Torques, and mass matrices, from the program that is left, written out."""
-    program = fitting.tape.rebuilt(fit.mask)
+    program = fitting.tape.rebuilt(fit.left)
     m = samples.tau.shape[1]
     given = program.evaluated(
         [*np.broadcast_to(fit.beta[:, None], (fit.beta.size, m)), *samples.states]
@@ -76,12 +77,7 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
         rows = (
             np.array(
                 [
-                    predicted(
-                        fitting,
-                        type(found)(found.mask, e, *[None] * 4, found.linear),
-                        samples,
-                        False,
-                    )[0]
+                    predicted(fitting, replace(found, beta=e), samples, False)[0]
                     for e in np.eye(found.beta.size)
                 ]
             )
@@ -120,10 +116,10 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm):
     assert 5 <= len(sums) <= 10, "an arm of this size can be searched exhaustively"
     fewest = tape.count(tape.everything())
     for ways in itertools.product(((True, True), (True, False), (False, True)), repeat=len(sums)):
-        mask = tape.everything()
-        mask[sums, :2] = ways
-        if tape.count(mask) < fewest and fitting.fit(mask, values).within:
-            fewest = tape.count(mask)
+        left = tape.everything()
+        left.kept[sums, :2] = ways
+        if tape.count(left) < fewest and fitting.fit(left, values).within:
+            fewest = tape.count(left)
     search = Search(fitting, 0)
     found = search.descended(search.start(values))
     found = search.improved(found, 200, lambda _: None)

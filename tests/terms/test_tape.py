@@ -5,7 +5,7 @@ import pytest
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.terms.tape import Tape
+from paramreduce_cli.terms.tape import ITSELF, NUMBER, Tape
 
 
 @pytest.fixture
@@ -26,45 +26,66 @@ def inputs():
     return np.vstack([np.full((2, 20), [[0.7], [-0.3]]), rng.uniform(-1, 1, (2, 20))])
 
 
-def random_mask(tape, seed):
-    mask = tape.everything()
-    candidates = tape.candidates()
+def random_remains(tape, seed):
+    """Some terms left out, and some nodes that stand for others, times a factor, or for numbers."""
     rng = np.random.default_rng(seed)
-    for k, what in candidates[rng.random(len(candidates)) < 0.15]:
-        mask[k, what] = False
-    return mask
+    candidates = tape.candidates()
+    left = tape.everything().flipped(candidates[rng.random(len(candidates)) < 0.12])
+    linear, made = tape.linear(2), tape.made()
+    for k in np.flatnonzero(made & (rng.random(tape.size) < 0.15)):
+        like = np.flatnonzero(linear[:k] == linear[k])
+        factor = rng.choice([1.0, -1.0, 0.37, -2.2])
+        if not linear[k] and rng.random() < 0.3:
+            left = left.standing(k, NUMBER, factor)
+        elif like.size:
+            left = left.standing(k, int(rng.choice(like)), factor)
+    return left
 
 
-def outputs_of(tape, mask, inputs):
-    values, _ = tape.values(mask, inputs)
+def outputs_of(tape, left, inputs):
+    values, _ = tape.values(left, inputs)
     return [values[o >> 1] * (-1 if o & 1 else 1) for o in tape.program.outputs]
 
 
-@pytest.mark.parametrize("seed", range(20))
+@pytest.mark.parametrize("seed", range(40))
 def test_what_is_left_is_the_program_with_terms_set_to_zero(program, inputs, seed):
     tape = Tape(program)
-    mask = random_mask(tape, seed)
-    rebuilt = tape.rebuilt(mask)
+    left = random_remains(tape, seed)
+    rebuilt = tape.rebuilt(left)
     expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluated(list(inputs))]
-    np.testing.assert_allclose(outputs_of(tape, mask, inputs), expected, atol=1e-14)
-    assert rebuilt.n_operations <= tape.count(mask) <= program.n_operations
+    np.testing.assert_allclose(outputs_of(tape, left, inputs), expected, atol=1e-14)
+    assert rebuilt.n_operations <= tape.count(left) <= program.n_operations
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_left_is_linear_in_the_parameters(program, inputs, seed):
+    tape = Tape(program)
+    left = random_remains(tape, seed)
+
+    def at(a, b):
+        return np.array(
+            outputs_of(tape, left, np.vstack([np.full(20, a), np.full(20, b), inputs[2:]]))
+        )
+
+    np.testing.assert_allclose(at(0, 0), 0, atol=1e-14)
+    np.testing.assert_allclose(2 * at(1, 0) - 3 * at(0, 1), at(2, -3), atol=1e-13)
 
 
 @pytest.mark.parametrize("seed", range(5))
 def test_adjoints_are_derivatives(program, inputs, seed):
     tape = Tape(program)
-    mask = random_mask(tape, seed) if seed else tape.everything()
-    values, _ = tape.values(mask, inputs)
+    left = random_remains(tape, seed) if seed else tape.everything()
+    values, _ = tape.values(left, inputs)
     seeds = np.eye(2)[:, :, None] * np.ones(20)
-    adjoints = tape.adjoints(mask, values, seeds)
+    adjoints = tape.adjoints(left, values, seeds)
     places = {int(n.number): k for k, n in enumerate(program.nodes) if n.operation == "input"}
     for position in (0, 1, 3):
-        if not mask[places[position], 2]:
+        if not left.kept[places[position], 2]:
             continue
         ahead, behind = inputs.copy(), inputs.copy()
         ahead[position] += 1e-6
         behind[position] -= 1e-6
-        change = np.subtract(outputs_of(tape, mask, ahead), outputs_of(tape, mask, behind)) / 2e-6
+        change = np.subtract(outputs_of(tape, left, ahead), outputs_of(tape, left, behind)) / 2e-6
         np.testing.assert_allclose(adjoints[places[position]], change, atol=1e-8)
 
 
@@ -85,24 +106,44 @@ def test_effects_of_addends_are_what_is_lost_without_them(program, inputs):
     for (k, what), effect in zip(candidates, effects, strict=True):
         if program.nodes[k].operation != "+" or what == 2 or k in angles:
             continue
-        mask = tape.everything()
-        mask[k, what] = False
-        np.testing.assert_allclose(whole - outputs_of(tape, mask, inputs), effect, atol=1e-14)
+        left = everything.flipped(np.array([[k, what]]))
+        np.testing.assert_allclose(whole - outputs_of(tape, left, inputs), effect, atol=1e-14)
         # Put back, it gives the same again.
-        v, o = tape.values(mask, inputs)
+        v, o = tape.values(left, inputs)
         back = tape.effects(
-            np.array([[k, what]]), v, o, tape.adjoints(mask, v, np.eye(2)[:, :, None] * np.ones(20))
+            np.array([[k, what]]), v, o, tape.adjoints(left, v, np.eye(2)[:, :, None] * np.ones(20))
         )
         np.testing.assert_allclose(back.reshape(2, 20), effect, atol=1e-14)
         tried += 1
     assert tried >= 4
 
 
-def test_counts_of_single_changes(program):
+def test_effects_of_nodes_that_stand_for_others_are_what_is_gained_without_that(program, inputs):
     tape = Tape(program)
-    mask = random_mask(tape, 3)
+    everything = tape.everything()
+    whole = np.array(outputs_of(tape, everything, inputs))
+    last = int(np.flatnonzero(tape.made() & tape.linear(2))[-1])
+    left = everything.standing(last, last - 1, 0.7)
+    v, o = tape.values(left, inputs)
+    adjoints = tape.adjoints(left, v, np.eye(2)[:, :, None] * np.ones(20))
+    back = np.array([[last, ITSELF]])
+    effect = tape.effects(back, v, o, adjoints).reshape(2, 20)
+    np.testing.assert_allclose(whole - outputs_of(tape, left, inputs), effect, atol=1e-14)
+    again = left.flipped(back)
+    assert again.has(back).all()
+    assert not left.has(back).any()
+    np.testing.assert_array_equal(outputs_of(tape, again, inputs), whole)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_counts_of_single_changes(program, seed):
+    tape = Tape(program)
+    left = random_remains(tape, seed)
     candidates = tape.candidates()
-    for (k, what), count in zip(candidates, tape.counts(mask, candidates), strict=True):
-        changed = mask.copy()
-        changed[k, what] ^= True
-        assert count == tape.count(changed)
+    for term, count in zip(candidates, tape.counts(left, candidates), strict=True):
+        assert count == tape.count(left.flipped(term[None]))
+    nodes = np.flatnonzero(tape.made())
+    sources, factors = np.maximum(nodes - 3, NUMBER), np.tile([1.0, 0.3], nodes.size)[: nodes.size]
+    counts = tape.counts_standing(left, nodes, sources, factors)
+    for *way, count in zip(nodes, sources, factors, counts, strict=True):
+        assert count == tape.count(left.standing(*way))

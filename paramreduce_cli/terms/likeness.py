@@ -1,0 +1,93 @@
+"""Which nodes of a program are nearly a multiple of another one, or nearly constant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+from paramreduce_cli.terms.tape import NUMBER
+
+_OTHERS = 3
+"""Nodes that each one is compared with closely."""
+_WAYS = 400
+"""Most promising ones of all that are compared closely."""
+
+
+@dataclass(frozen=True)
+class Ways:
+    """Nodes that could stand for others."""
+
+    nodes: IntArray
+    """(n_ways,)"""
+    sources: IntArray
+    """Nodes that these would stand for, NUMBER for numbers."""
+    factors: FloatArray
+    """By which they are multiplied, or the numbers."""
+
+    def __getitem__(self, which: IntArray) -> Ways:
+        return Ways(self.nodes[which], self.sources[which], self.factors[which])
+
+    def one(self, which: int) -> tuple[int, int, float]:
+        """Node, source and factor of one way."""
+        return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])
+
+    def changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
+        """What rows lose, to first order, (n_ways, n_rows); for arguments see :func:`alike`."""
+        stand_in = np.where(
+            (self.sources == NUMBER)[:, None],
+            self.factors[:, None],
+            self.factors[:, None] * values[self.sources],
+        )
+        lost = pulls[self.nodes] * (values[self.nodes] - stand_in)[:, None]
+        return lost.reshape(len(self.nodes), -1)
+
+
+def alike(
+    values: FloatArray, pulls: FloatArray, residual: FloatArray, free: BoolArray, linear: BoolArray
+) -> Ways:
+    """The most promising ways to let a node stand for a multiple of one before it.
+
+    With w the weighed derivatives of the rows by node k, v values, and r the residual, the cost of
+    c v_j in place of v_k is c^2 sum w^2 v_j^2 - 2 c sum (w^2 v_k v_j + w r v_j) + constant, whose
+    least is known in closed form. Factors of one cost no product and are offered beside the best ones;
+    nodes that the parameters are not part of may be numbers.
+
+    Args:
+        values: Of the nodes, (n_nodes, n_samples).
+        pulls: Weighed derivatives of the rows by the nodes, (n_nodes, n_dof, n_samples).
+        residual: Of the rows, (n_dof, n_samples).
+        free: Which nodes may come to stand for others, (n_nodes,).
+        linear: Which nodes are linear in the parameters, (n_nodes,); these stand for their like alone.
+    """
+    squares = np.einsum("nqm,nqm->nm", pulls, pulls)
+    along = np.einsum("nqm,qm->nm", pulls, residual)
+    used = squares.any(axis=1)
+    nodes = np.flatnonzero(free & used)
+    v, squares, along = values[nodes], squares[nodes], along[nodes]
+    here = np.einsum("nm,nm->n", squares, v**2) + 2 * np.einsum("nm,nm->n", along, v)
+
+    across = (squares * v + along) @ values.T
+    size = squares @ (values**2).T
+    possible = np.arange(len(values)) < nodes[:, None]
+    possible &= (linear[nodes][:, None] == linear) & used & (size > 0)
+    size[~possible] = 1.0
+    costs = np.where(possible, here[:, None] - across**2 / size, np.inf)
+    places = np.argsort(costs, axis=1)[:, :_OTHERS]
+    rows = np.arange(len(nodes))[:, None]
+    factors = (across[rows, places] / size[rows, places]).ravel()
+    costs = costs[rows, places].ravel()
+    found = Ways(np.repeat(nodes, places.shape[1]), places.ravel(), factors)
+    found = found[np.argsort(costs, kind="stable")[: min(_WAYS, int(np.isfinite(costs).sum()))]]
+
+    plain = ~linear[nodes]
+    sums = np.einsum("nm,nm->n", squares, v) + along.sum(axis=1)
+    numbers = (sums / squares.sum(axis=1))[plain]
+    fixed = np.full(numbers.size, NUMBER)
+    ones = np.copysign(1.0, found.factors)
+    return Ways(
+        np.concatenate([found.nodes, found.nodes, nodes[plain]]),
+        np.concatenate([found.sources, found.sources, fixed]),
+        np.concatenate([found.factors, ones, numbers]),
+    )
