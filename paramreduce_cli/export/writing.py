@@ -185,7 +185,9 @@ def _frames(mechanism: Mechanism) -> tuple[str, ...]:
 
 def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
     """Where a function with terms left out holds, line by line."""
-    lines = ["TERMS WERE LEFT OUT: it holds inside the ranges that it was fitted in, which are"]
+    lines = [
+        "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are"
+    ]
     lines += _ranges(mechanism, simplified.lower, simplified.upper)
     largest = ", ".join(f"{value:.3g}" for value in simplified.largest_difference)
     where = "both sets"

@@ -203,7 +203,8 @@ def _terms(found: TermReduction) -> Iterator[str]:
         if name == "direct" and isfinite(found.acceleration_budget):
             acceleration = f" and an acceleration error of {share(found.acceleration_budget)}"
         yield (
-            f"Terms of the {name} dynamics that hardly matter were left out and the {term.values.size} parameters fitted again "
+            f"Terms of the {name} dynamics that hardly matter were left out or replaced by multiples of others, and the "
+            f"{term.values.size} parameters fitted again "
             f"within a torque error of {share(found.torque_budget)}{acceleration}: {term.operations} operations instead of "
             f"{term.operations_start}."
         )

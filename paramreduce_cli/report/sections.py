@@ -50,7 +50,8 @@ class PageSection(Enum):
     )
     TERMS = (
         "Without small terms",
-        "Addends of the lean functions were left out too, and the parameters that remain fitted again; each "
+        "Addends of the lean functions were left out too, nodes that hardly differ from a multiple of others replaced by "
+        "it, and the parameters that remain fitted again; each "
         "function has values of its own. Such a function holds where it was fitted: inside the ranges of the "
         "estimation set. <code>paramreduce export --model terms --what idm</code> (or <code>ddm</code>) writes it.",
         True,
