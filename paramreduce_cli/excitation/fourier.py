@@ -66,6 +66,22 @@ def fourier_basis(period: float, harmonics: int, time: FloatArray) -> FourierBas
     return FourierBasis(time, position, velocity, acceleration)
 
 
+def begun_at(coefficients: FloatArray, period: float, time: float) -> FloatArray:
+    """Coefficients of the same motion with the clock set to zero at some time, by the addition theorems.
+
+    Args:
+        coefficients: (n_dof, 1 + 2 harmonics)
+        period: s.
+        time: s.
+    """
+    phase = 2 * np.pi / period * time * np.arange(1, (coefficients.shape[1] + 1) // 2)
+    sine, cosine = np.sin(phase), np.cos(phase)
+    a, b = coefficients[:, 1::2], coefficients[:, 2::2]
+    result = coefficients.copy()
+    result[:, 1::2], result[:, 2::2] = a * cosine + b * sine, b * cosine - a * sine
+    return result
+
+
 def grid_margin(harmonics: int, points: int) -> float:
     """By what factor limits must be tightened on a grid to hold everywhere.
 

@@ -11,7 +11,13 @@ import numpy as np
 
 from paramreduce_cli.config.schema import InputSection, SamplingSection, SimulationSection
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import (
+    FINER,
+    FourierBasis,
+    begun_at,
+    fourier_basis,
+    sample_times,
+)
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
@@ -48,8 +54,6 @@ from paramreduce_cli.records import (
 ComputedSet = ObservedSet | LoggedSet
 StatesAt = Callable[[Span], StateBlock]
 
-_BASES = 128
-"""Spans whose Fourier functions are kept, as all trajectories need them: 40 kB each for five harmonics."""
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
 
@@ -292,19 +296,20 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
     """States of every series, with positions on a finer grid on which loops are followed."""
     times, finer_times = sample_times(period, points), sample_times(period, finer * points)
 
-    @lru_cache(_BASES)
-    def basis(harmonics: int, start: int, stop: int) -> tuple[FourierBasis, FourierBasis | None]:
-        between = finer_times[finer * start : finer * stop]
+    @lru_cache
+    def basis(harmonics: int, count: int) -> tuple[FourierBasis, FourierBasis | None]:
+        """Of the first samples: what comes later is the same functions with other coefficients."""
         return (
-            fourier_basis(period, harmonics, times[start:stop]),
-            fourier_basis(period, harmonics, between) if finer > 1 else None,
+            fourier_basis(period, harmonics, times[:count]),
+            fourier_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,
         )
 
     def at(span: Span) -> StateBlock:
-        coefficients = series[span.trajectory]
-        own, between = basis((coefficients.shape[1] - 1) // 2, span.start, span.stop)
+        coefficients = begun_at(series[span.trajectory], period, times[span.start])
+        own, between = basis((coefficients.shape[1] - 1) // 2, span.stop - span.start)
         way = None if between is None else between.states(coefficients)[0]
-        return StateBlock(span.trajectory, own.time, *own.states(coefficients), way=way)
+        states = own.states(coefficients)
+        return StateBlock(span.trajectory, times[span.start : span.stop], *states, way=way)
 
     return at
 

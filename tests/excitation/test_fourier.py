@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramreduce_cli.excitation.fourier import fourier_basis, grid_margin, sample_times
+from paramreduce_cli.excitation.fourier import begun_at, fourier_basis, grid_margin, sample_times
 
 
 def series(coefficients, period, t):
@@ -46,3 +46,13 @@ def test_no_series_exceeds_its_grid_by_more_than_the_margin(harmonics, seed, ext
 def test_a_grid_too_coarse_for_the_harmonics_is_refused():
     with pytest.raises(ValueError, match="8 points"):
         grid_margin(4, 8)
+
+
+@pytest.mark.parametrize("time", [0.0, 0.3, 2.9, 400.1])
+def test_a_motion_can_begin_later(time):
+    rng = np.random.default_rng(0)
+    coefficients, times = rng.normal(size=(3, 9)), np.linspace(0, 1, 7)
+    later = fourier_basis(2.0, 4, time + times).states(coefficients)
+    moved = fourier_basis(2.0, 4, times).states(begun_at(coefficients, 2.0, time))
+    for one, other in zip(moved, later, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 if time > 100 else 1e-12)
