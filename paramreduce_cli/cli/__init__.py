@@ -9,7 +9,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.hints import after, meant_command, next_command, with_arguments
+from paramreduce_cli.cli.hints import after, after_usage, meant_command, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
 from paramreduce_cli.cli.terminal import complain, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
@@ -36,8 +36,7 @@ def main() -> None:
         code = error.exit_code
     except click.ClickException as error:
         show_errors(error.format_message())
-        context = getattr(error, "ctx", None)
-        complain(next_command(context.command if context and context.parent else None))
+        complain(after_usage(error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(

@@ -15,6 +15,8 @@ from paramreduce_cli.cli.corrections import corrected
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.5
+_LIKE = 0.75
+"""Of options, which look alike by their dashes."""
 
 
 def meant_command(name: str, known: Sequence[str]) -> str:
@@ -45,6 +47,28 @@ def after(message: str, command: click.Command | None) -> str:
     if not mended:
         return next_command(command)
     return f"{'Then again' if shlex.split(mended)[1:] == typed else 'Next'}: {mended}"
+
+
+def after_usage(error: click.ClickException) -> str:
+    """What to type after a call that cannot be read: the same with the option that was meant, or an example."""
+    context = getattr(error, "ctx", None)
+    command = context.command if context and context.parent else None
+    if isinstance(error, click.NoSuchOption) and command is not None:
+        meant = _meant_option(error.option_name, command)
+        typed = sys.argv[1:]
+        if meant and error.option_name in typed:
+            mended = [meant if word == error.option_name else word for word in typed]
+            return f"Next: {shlex.join(['paramreduce', *mended])}"
+    return next_command(command)
+
+
+def _meant_option(name: str, command: click.Command) -> str | None:
+    """The option that is spelt alike, or begins with the one letter that was typed."""
+    options = [option for parameter in command.params for option in parameter.opts]
+    if not name.startswith("--"):
+        return next((option for option in options if option.startswith(f"-{name}")), None)
+    near = difflib.get_close_matches(name, options, n=1, cutoff=_LIKE)
+    return near[0] if near else None
 
 
 def with_arguments(text: str) -> str:
