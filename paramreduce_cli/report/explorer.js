@@ -423,7 +423,8 @@
     savable(place, "mechanism.png", () => picture(canvas));
     const [select, button, time] = ["select", "button", "input"].map((name) => place.querySelector(name));
     const nPoints = figure.count;
-    const points = Float32Array.from(figure.points, (share, k) => figure.low[k % 3] + share * figure.step);
+    const points = new Float32Array(figure.points.length);
+    for (let k = 0; k < points.length; k++) points[k] = figure.low[k % 3] + figure.points[k] * figure.step;
     // Of each motion where its frames begin, and how many there are.
     let begin = 0;
     const motions = figure.motions.map(({ name, frames }) => ({ name, frames, begin: (begin += frames) - frames }));
@@ -438,10 +439,10 @@
     time.value = view.frame;
     function extent() {
       const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-      points.forEach((v, k) => {
-        low[k % 3] = Math.min(low[k % 3], v);
-        high[k % 3] = Math.max(high[k % 3], v);
-      });
+      for (let k = 0; k < points.length; k++) {
+        if (points[k] < low[k % 3]) low[k % 3] = points[k];
+        if (points[k] > high[k % 3]) high[k % 3] = points[k];
+      }
       return [low.map((v, k) => (v + high[k]) / 2), Math.max(...low.map((v, k) => high[k] - v), 1e-9)];
     }
     function mostSpread() {
@@ -482,9 +483,10 @@
       const pieces = figure.lines.map(([a, b, owner, kind]) => ({ from: project(a), to: project(b), owner, kind }));
       pieces.sort((p, q) => p.from[2] + p.to[2] - q.from[2] - q.to[2]);
       context.lineCap = "round";
+      const [none, all, unknown] = [colour("--orange"), colour("--blue"), colour("--soft")];
       for (const piece of pieces) {
         const share = shares.get(figure.owners[piece.owner]);
-        context.strokeStyle = share === undefined ? colour("--soft") : `color-mix(in srgb, ${colour("--blue")} ${Math.round(100 * share)}%, ${colour("--orange")})`;
+        context.strokeStyle = share === undefined ? unknown : `color-mix(in srgb, ${all} ${Math.round(100 * share)}%, ${none})`;
         context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2, axis: 11 }[piece.kind];
         context.beginPath();
         context.moveTo(piece.from[0], piece.from[1]);
