@@ -16,7 +16,7 @@ from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.5
 _LIKE = 0.75
-"""Of options, which look alike by their dashes."""
+"""How alike options must be: all look alike a little, by their dashes."""
 
 
 def meant_command(name: str, known: Sequence[str]) -> str:
@@ -56,19 +56,27 @@ def after_usage(error: click.ClickException) -> str:
     if isinstance(error, click.NoSuchOption) and command is not None:
         meant = _meant_option(error.option_name, command)
         typed = sys.argv[1:]
-        if meant and error.option_name in typed:
-            mended = [meant if word == error.option_name else word for word in typed]
+        if meant:
+            mended = [_exchanged(word, error.option_name, meant) for word in typed]
             return f"Next: {shlex.join(['paramreduce', *mended])}"
     return next_command(command)
 
 
 def _meant_option(name: str, command: click.Command) -> str | None:
     """The option that is spelt alike, or begins with the one letter that was typed."""
-    options = [option for parameter in command.params for option in parameter.opts]
+    taken = (parameter for parameter in command.params if isinstance(parameter, click.Option))
+    options = [option for parameter in taken for option in parameter.opts]
     if not name.startswith("--"):
-        return next((option for option in options if option.startswith(f"-{name}")), None)
+        begun = [option for option in options if option.startswith(f"-{name}")]
+        return begun[0] if len(begun) == 1 else None
     near = difflib.get_close_matches(name, options, n=1, cutoff=_LIKE)
     return near[0] if near else None
+
+
+def _exchanged(word: str, name: str, meant: str) -> str:
+    """The option in a word, which may be joined to its value, by another one."""
+    option, equals, value = word.partition("=")
+    return f"{meant}{equals}{value}" if option == name else word
 
 
 def with_arguments(text: str) -> str:

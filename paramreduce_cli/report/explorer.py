@@ -168,8 +168,8 @@ def _motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
 def _figure(data: ReportData) -> dict[str, Any] | None:
     """The mechanism along its motions: points in the base frame, and lines between them by body.
 
-    Coordinates are embedded as shares of the box that they move in, in 16 bits: a hundred thousandth of it
-    is less than a pixel.
+    Coordinates are embedded as shares of the box that they move in, in 16 bits: a step is
+    much less than a pixel.
     """
     shown = data.animation
     if shown is None:

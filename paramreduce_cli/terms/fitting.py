@@ -149,7 +149,7 @@ class Fitting:
             values, _ = self.tape.values(left, self._inputs(beta, self._poses))
             if self._poses.inverse_masses(signed_outputs(self.tape.program, values)) is None:
                 shares.append(np.inf)
-        return Fit(left, beta, *errors, cost, strain, float(max(shares)), linear)
+        return Fit(left, beta, *errors, cost, strain, float(np.max(shares)), linear)
 
     def _shares(self, errors: tuple[float, float]) -> list[float]:
         """Errors over the allowed ones."""

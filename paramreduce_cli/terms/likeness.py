@@ -10,9 +10,9 @@ from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.tape import NUMBER
 
 _OTHERS = 3
-"""Nodes that each one is compared with closely."""
+"""Nodes that are offered for each one."""
 _WAYS = 400
-"""Most promising ones of all that are compared closely."""
+"""Most promising ones of all that are offered."""
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,9 @@ class Ways:
     nodes: IntArray
     """(n_ways,)"""
     sources: IntArray
-    """Nodes that these would stand for, NUMBER for numbers."""
+    """Nodes that these would stand for, NUMBER for numbers, (n_ways,)."""
     factors: FloatArray
-    """By which they are multiplied, or the numbers."""
+    """By which they are multiplied, or the numbers, (n_ways,)."""
 
     def __getitem__(self, which: IntArray) -> Ways:
         return Ways(self.nodes[which], self.sources[which], self.factors[which])
@@ -41,7 +41,7 @@ class Ways:
             self.factors[:, None] * values[self.sources],
         )
         lost = pulls[self.nodes] * (values[self.nodes] - stand_in)[:, None]
-        return lost.reshape(len(self.nodes), -1)
+        return lost.reshape(len(self.nodes), pulls[0].size)
 
 
 def alike(
@@ -74,7 +74,7 @@ def alike(
     possible &= (linear[nodes][:, None] == linear) & used & (size > 0)
     size[~possible] = 1.0
     costs = np.where(possible, here[:, None] - across**2 / size, np.inf)
-    places = np.argsort(costs, axis=1)[:, :_OTHERS]
+    places = np.argsort(costs, axis=1, kind="stable")[:, :_OTHERS]
     rows = np.arange(len(nodes))[:, None]
     factors = (across[rows, places] / size[rows, places]).ravel()
     costs = costs[rows, places].ravel()

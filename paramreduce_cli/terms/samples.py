@@ -39,18 +39,24 @@ class TermSamples:
     @cached_property
     def seeds(self) -> FloatArray:
         """Torques by outputs of the program, (n_outputs, n_dof, n_samples)."""
+        n = len(self.ddq)
+        return self._seeds(np.arange(n * (n + 3) // 2 if self.direct else n))
+
+    def _seeds(self, outputs: IntArray) -> FloatArray:
+        """The same of some outputs, by their numbers in order; whole sets are judged without keeping all."""
         n, count = self.ddq.shape
         tangent = (
             np.broadcast_to(np.eye(n), (count, n, n)) if self.tangent is None else self.tangent
         )
         across = np.moveaxis(tangent, 0, 2)
         if not self.direct:
-            return np.ascontiguousarray(across)
+            return np.ascontiguousarray(across[outputs])
         rows, columns = np.tril_indices(n)
-        mirrored = np.where(rows == columns, 0.0, 1.0)[:, None, None]
-        lower = across[rows] * self.ddq[columns][:, None]
-        lower = lower + mirrored * across[columns] * self.ddq[rows][:, None]
-        return np.concatenate([lower, across])
+        i, j = (which[outputs[outputs < rows.size]] for which in (rows, columns))
+        mirrored = np.where(i == j, 0.0, 1.0)[:, None, None]
+        lower = across[i] * self.ddq[j][:, None]
+        lower = lower + mirrored * across[j] * self.ddq[i][:, None]
+        return np.concatenate([lower, across[outputs[outputs >= rows.size] - rows.size]])
 
     def differences(self, outputs: FloatArray) -> FloatArray:
         """Torques to be met less those of a program, (n_dof, n_samples).
@@ -59,7 +65,7 @@ class TermSamples:
             outputs: Of the program, (n_outputs, n_samples).
         """
         live = np.flatnonzero(outputs.any(axis=1))
-        torques = np.einsum("oim,om->im", self.seeds[live], outputs[live])
+        torques = np.einsum("oim,om->im", self._seeds(live), outputs[live])
         result: FloatArray = self.tau - torques
         return result
 

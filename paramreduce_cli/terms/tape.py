@@ -161,7 +161,7 @@ class Tape:
         return _effects(self._operands, candidates, values, own, adjoints)
 
     def count(self, left: Remains) -> int:
-        """Operations left, nearly: sums and products are not rearranged."""
+        """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
         return int(
             _count(self._codes, self._operands, self._outputs, left.kept, left.source, left.factor)
         )

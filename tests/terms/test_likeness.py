@@ -68,6 +68,13 @@ def test_like_stands_for_like_alone(nodes):
     assert 8 not in ways.sources
 
 
+def test_there_may_be_nothing_to_stand_for(nodes):
+    values, pulls, residual = nodes
+    ways = alike(values, pulls, residual, np.zeros(N, dtype=bool), np.ones(N, dtype=bool))
+    assert ways.nodes.size == 0
+    assert ways.changes(values, pulls).shape == (0, DOF * SAMPLES)
+
+
 def test_changes_are_what_rows_lose(nodes):
     values, pulls, residual = nodes
     ways = alike(values, pulls, residual, np.ones(N, dtype=bool), np.zeros(N, dtype=bool))
