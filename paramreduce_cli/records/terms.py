@@ -37,7 +37,7 @@ class TermFront:
 
 @dataclass(frozen=True)
 class TermModel:
-    """A function of the dynamics of which terms were left out, and what that does."""
+    """A function of the dynamics without small terms, some nodes standing for others; what that does."""
 
     heuristic: str
     """Whose subset it started from."""

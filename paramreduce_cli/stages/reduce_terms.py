@@ -147,11 +147,11 @@ def _record(
 
 def _front(judge: Judge, programs: list[Simplified]) -> TermFront:
     """What programs are worth that no leaner one beats."""
-    kept: list[tuple[int, tuple[float, float], tuple[float, float]]] = []
-    for one in sorted(programs, key=lambda one: one.program.n_operations):
-        estimation, validation = judge.errors(one)
-        if not kept or estimation[0] < kept[-1][1][0]:
-            kept.append((one.program.n_operations, estimation, validation))
+    judged = sorted((one.program.n_operations, *judge.errors(one)) for one in programs)
+    kept = judged[:1]
+    for entry in judged[1:]:
+        if entry[0] > kept[-1][0] and entry[1][0] < kept[-1][1][0]:
+            kept.append(entry)
     errors = np.array([[estimation, validation] for _, estimation, validation in kept])
     return TermFront(
         operations=np.array([count for count, _, _ in kept], dtype=np.int64),

@@ -8,6 +8,7 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.terms.likeness import Ways, alike
+from paramreduce_cli.terms.matrices import positive_definite, roots, times
 from paramreduce_cli.terms.samples import TermSamples, signed_outputs
 from paramreduce_cli.terms.tape import WHOLE, Remains, Tape
 
@@ -37,7 +38,7 @@ class Linear:
     residual: FloatArray
     """(n_rows,)"""
     metric: FloatArray | None
-    """Where accelerations matter, (n_samples, n_dof, n_dof)."""
+    """Where accelerations matter, (n_dof, n_dof, n_samples)."""
 
     def explained(self, changes: FloatArray) -> FloatArray:
         """Squares of what the parameters make up for, (k,), of changes (k, n_rows)."""
@@ -46,7 +47,7 @@ class Linear:
 
 @dataclass(frozen=True)
 class Fit:
-    """A program without some of its terms, its parameters fitted."""
+    """What remains of a program, its parameters fitted."""
 
     left: Remains
     beta: FloatArray
@@ -69,7 +70,7 @@ class Fit:
 
 
 class Fitting:
-    """Fits a program whose terms are left out.
+    """Fits what remains of a program: terms are left out, nodes stand for others.
 
     Args:
         tape: The program.
@@ -113,8 +114,9 @@ class Fitting:
             looks: How often these are found anew.
         """
         samples, program = self.samples, self.tape.program
-        values, _ = self.tape.values(left, self._inputs(beta, samples))
-        adjoints = self.tape.adjoints(left, values, samples.seeds)
+        needed = self.tape.needed(left)
+        values = self.tape.values(left, self._inputs(beta, samples), needed)
+        adjoints = self.tape.adjoints(left, values, samples.seeds, self._in_parameters)
         present = self._parameters >= 0
         present[present] = left.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
@@ -129,7 +131,7 @@ class Fitting:
             if not samples.direct:
                 break
             # Accelerations go with the mass matrices of the fitted values.
-            values, _ = self.tape.values(left, self._inputs(beta, samples))
+            values = self.tape.values(left, self._inputs(beta, samples), needed)
             inverse = samples.inverse_masses(signed_outputs(program, values))
         residual = self._weighed(off[None], metric)[0]
         errors = self._errors(off, inverse)
@@ -146,8 +148,8 @@ class Fitting:
             strain += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
             shares += watched
         if self._poses is not None and max(shares) <= 1.0:
-            values, _ = self.tape.values(left, self._inputs(beta, self._poses))
-            if self._poses.inverse_masses(signed_outputs(self.tape.program, values)) is None:
+            masses = self._poses.mass_matrices(self._outputs(left, beta, self._poses))
+            if not positive_definite(masses):
                 shares.append(np.inf)
         return Fit(left, beta, *errors, cost, strain, float(np.max(shares)), linear)
 
@@ -172,47 +174,56 @@ class Fitting:
 
     def errors(self, left: Remains, beta: FloatArray, samples: TermSamples) -> tuple[float, float]:
         """Errors of torques and of accelerations on other samples."""
-        values, _ = self.tape.values(left, self._inputs(beta, samples))
-        return samples.errors(signed_outputs(self.tape.program, values))
+        return samples.errors(self._outputs(left, beta, samples))
+
+    def _outputs(self, left: Remains, beta: FloatArray, samples: TermSamples) -> FloatArray:
+        """Of the program, (n_outputs, n_samples)."""
+        values = self.tape.values(left, self._inputs(beta, samples), self.tape.needed(left))
+        return signed_outputs(self.tape.program, values)
 
     def effects(self, fit: Fit, candidates: IntArray) -> FloatArray:
         """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
         values, own, adjoints = self._derived(fit)
-        found = self.tape.effects(candidates, values, own, adjoints)
+        found = self.tape.effects(fit.left, candidates, values, own, adjoints)
         return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
-    def stand_ins(self, fit: Fit) -> tuple[Ways, FloatArray]:
-        """Nodes that could stand for others, and what the rows of a fit lose, (n_ways, n_rows)."""
+    def stand_ins(self, fit: Fit) -> tuple[Ways, FloatArray, FloatArray]:
+        """Nodes that could stand for others, and what :meth:`Ways.changes` wants to know.
+
+        That is the values of all nodes, and the weighed derivatives of the torques by them.
+        """
         values, _, adjoints = self._derived(fit)
         pulls = self._weighed(adjoints, fit.linear.metric).reshape(adjoints.shape)
         itself = fit.left.kept[:, WHOLE] & (fit.left.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
         ways = alike(values, pulls, residual, self._made & itself, self._in_parameters)
-        return ways, ways.changes(values, pulls)
+        return ways, values, pulls
 
     def _derived(self, fit: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Values of the nodes, their own ones, and derivatives of the torques by them."""
-        values, own = self.tape.values(fit.left, self._inputs(fit.beta, self.samples))
-        return values, own, self.tape.adjoints(fit.left, values, self.samples.seeds)
+        """Values of the nodes, what they would be, and derivatives of the torques by them."""
+        inputs, everywhere = self._inputs(fit.beta, self.samples), np.ones(self.tape.size, np.bool_)
+        values = self.tape.values(fit.left, inputs, everywhere)
+        adjoints = self.tape.adjoints(fit.left, values, self.samples.seeds, everywhere)
+        return values, self.tape.own_values(fit.left, inputs, values), adjoints
 
     def _metric(self, inverse: FloatArray | None) -> FloatArray | None:
         """Square roots of the quadratic forms that take differences of torques to the cost.
 
-        None where only torques matter, whose form is diagonal; (n_samples, n_dof, n_dof).
+        None where only torques matter, whose form is diagonal; (n_dof, n_dof, n_samples).
         """
         if inverse is None or np.isinf(self.budget.acceleration):
             return None
         caused = inverse * (self._acceleration_scale / self.budget.acceleration)[:, None]
         torque = np.diag((self._torque_scale / self.budget.torque) ** 2)
         forms = np.swapaxes(caused, 1, 2) @ caused + torque
-        return np.swapaxes(np.linalg.cholesky(forms), 1, 2)
+        return roots(forms)
 
     def _weighed(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
         """Torques as they enter the cost, (k, n_rows)."""
         if metric is None:
             scaled = torques * (self._torque_scale / self.budget.torque)[:, None]
         else:
-            scaled = np.einsum("mij,kjm->kim", metric, torques)
+            scaled = times(metric, np.ascontiguousarray(torques))
         return scaled.reshape(torques.shape[0], -1)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, FloatArray, IntArray, Mechanism
+from paramreduce_cli.terms.matrices import inverses
 
 
 @dataclass(frozen=True)
@@ -89,13 +90,7 @@ class TermSamples:
         """
         if not self.direct:
             return None
-        M = self.mass_matrices(outputs)
-        try:
-            np.linalg.cholesky(M)
-            # One that is singular to rounding may pass as positive definite, but has no inverse.
-            return np.asarray(np.linalg.inv(M), dtype=float)
-        except np.linalg.LinAlgError:
-            return None
+        return inverses(self.mass_matrices(outputs))
 
     def errors(self, outputs: FloatArray) -> tuple[float, float]:
         """Normalised errors of torques and of accelerations [Ros2019].

@@ -41,7 +41,7 @@ class Step:
 
 
 class Search:
-    """Leaves terms of one program out.
+    """Leaves terms of one program out, and lets nodes stand for others.
 
     Args:
         fitting: Fits the program.
@@ -52,6 +52,7 @@ class Search:
         self._fitting = fitting
         self._tape = fitting.tape
         self._candidates = self._tape.candidates()
+        self._droppable: BoolArray = self._candidates[:, 1] != ITSELF
         self._itself = np.zeros(self._tape.size, dtype=np.int64)
         for number, (k, what) in enumerate(self._candidates.tolist()):
             if what == ITSELF:
@@ -141,15 +142,15 @@ class Search:
     def _stand_in(self, step: Step, weights: FloatArray) -> Step | None:
         """The program with one node that stands for another one, None if all are too dear."""
         fit = step.fit
-        ways, D = self._fitting.stand_ins(fit)
+        ways, values, pulls = self._fitting.stand_ins(fit)
         counts = self._tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero((counts < step.count) & np.isfinite(own))
-        again, _ = self._first_order(fit, D[useful])
-        saved = (step.count - counts[useful]).astype(float)
+        ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
+        again, _ = self._first_order(fit, ways.changes(values, pulls))
         tried = []
-        for place in np.argsort(again * own[useful] / saved, kind="stable")[:_TRIED]:
-            changed = self._fitting.fit(fit.left.standing(*ways.one(useful[place])), fit.beta)
+        for place in np.argsort(again * own / saved, kind="stable")[:_TRIED]:
+            changed = self._fitting.fit(fit.left.standing(*ways.one(place)), fit.beta)
             if changed.within:
                 tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
@@ -157,7 +158,8 @@ class Search:
     def _useful(self, step: Step, allowed: BoolArray) -> tuple[IntArray, FloatArray]:
         """Numbers of terms without which there are fewer operations, and how many fewer."""
         left = step.fit.left
-        numbers = np.flatnonzero(allowed & left.has(self._candidates))
+        # That a node is itself is no term to be left out: see stand-ins.
+        numbers = np.flatnonzero(allowed & self._droppable & left.has(self._candidates))
         saved = step.count - self._tape.counts(left, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
@@ -214,7 +216,10 @@ class Search:
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.explained(G)
-        order = np.argsort(-gain / np.maximum(dearer, 0.5), kind="stable")
+        helps = np.flatnonzero(gain > 0)
+        if not helps.size:
+            return fit
+        order = helps[np.argsort(-gain[helps] / np.maximum(dearer[helps], 0.5), kind="stable")]
         place = order[self._drawn(order.size, spread)]
         back.append(int(numbers[place]))
         return self._with(fit, terms[place][None])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import heapq
-import itertools
 import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -123,7 +122,7 @@ def simplified(
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
 ) -> tuple[list[Simplified], list[Simplified]]:
-    """Leave terms out as long as errors stay within a budget.
+    """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
     Every start is gone down from in its leanest formulations; from the best ends terms are put back
     and others left out instead.
@@ -139,14 +138,14 @@ def simplified(
         rounds: How often terms are put back.
         seed: Of what is put back.
         jobs: Threads; what is found does not depend on them.
-        progress: Told what share is done, and where the last search has ended.
+        progress: Told what share is done, and the fewest operations so far.
 
     Returns:
         Programs, the leanest first, and programs on the way to them, by operations; both are empty
         where no start is within the budget.
     """
     stop = threading.Event()
-    done = itertools.count(1)
+    ended: list[int] = []
 
     def begun(start: Start, program: Program) -> _Way:
         n, n_standard, place = start.model.n, lean.n_parameters, start.model.position
@@ -172,15 +171,19 @@ def simplified(
     begins += [way for s in starts[1] if s.model.names not in known for way in several(s)]
     total = len(begins) + _IMPROVED
 
+    def tell(operations: int) -> None:
+        ended.append(operations)
+        progress(len(ended) / total, f"{min(ended)} operations")
+
     def descended(way: _Way) -> _Way:
         way.note(way.end)
         way = replace(way, end=way.search.descended(way.end, way.note))
-        progress(next(done) / total, f"{way.end.count} operations")
+        tell(way.end.count)
         return way
 
     def improved(way: _Way) -> None:
         way.search.improved(way.end, rounds, way.note)
-        progress(next(done) / total, f"{min(way.visited)} operations")
+        tell(min(way.visited))
 
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:

@@ -62,7 +62,7 @@ class Remains:
 
 
 class Tape:
-    """A program whose terms can be left out.
+    """A program whose terms can be left out, and whose nodes can stand for others.
 
     Args:
         program: Of sums, products, sines, cosines and friction's functions.
@@ -88,9 +88,10 @@ class Tape:
         )
 
     def candidates(self) -> IntArray:
-        """Terms that can be left out: numbers of nodes and what of them, (n_candidates, 2).
+        """Terms: numbers of nodes and what of them, (n_candidates, 2).
 
-        The last ones are nodes as what they are, which can be put back where they stand for others.
+        All but the last ones can be left out. These are nodes as what they are, which can be put back
+        where they stand for others.
         """
         sums = np.flatnonzero(self._codes == _SUM)
         whole = np.flatnonzero(self._codes != _CONSTANT)
@@ -124,41 +125,75 @@ class Tape:
         result[positions[first]] = inputs[first]
         return result
 
-    def values(self, left: Remains, inputs: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Of all nodes, and what they would be if they were kept as they are, each (n_nodes, n_samples).
+    def needed(self, left: Remains) -> BoolArray:
+        """Nodes that outputs are made of, (n_nodes,)."""
+        needed: BoolArray = _needed(
+            self._codes, self._operands, self._outputs, left.kept, left.source
+        )
+        return needed
+
+    def values(self, left: Remains, inputs: FloatArray, which: BoolArray) -> FloatArray:
+        """Of nodes, (n_nodes, n_samples); zero where they are left out, or not asked for.
 
         Args:
             left: Of the program.
             inputs: By position, (n_inputs, n_samples).
+            which: Nodes that are asked for, with all that they are made of, (n_nodes,).
         """
-        return _values(
-            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor, inputs
-        )
+        values: FloatArray = _values(
+            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor,
+            inputs, which,
+        )  # fmt: skip
+        return values
 
-    def adjoints(self, left: Remains, values: FloatArray, seeds: FloatArray) -> FloatArray:
-        """Derivatives of quantities that are linear in the outputs, by all nodes.
+    def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
+        """What nodes would be if they were kept as they are, (n_nodes, n_samples).
+
+        Args:
+            left: Of the program.
+            inputs: By position, (n_inputs, n_samples).
+            values: Of all nodes.
+        """
+        own: FloatArray = _own_values(
+            self._codes, self._operands, self._numbers, left.kept, inputs, values
+        )
+        return own
+
+    def adjoints(
+        self, left: Remains, values: FloatArray, seeds: FloatArray, which: BoolArray
+    ) -> FloatArray:
+        """Derivatives of quantities that are linear in the outputs, by nodes.
 
         Args:
             left: Of the program.
             values: Of the nodes.
             seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
+            which: Nodes that are asked for, with all that is made of them, (n_nodes,).
 
         Returns:
-            (n_nodes, n_quantities, n_samples)
+            Zero for other nodes, (n_nodes, n_quantities, n_samples).
         """
         return _adjoints(
             self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
-            values, seeds,
+            values, seeds, which,
         )  # fmt: skip
 
     def effects(
-        self, candidates: IntArray, values: FloatArray, own: FloatArray, adjoints: FloatArray
+        self,
+        left: Remains,
+        candidates: IntArray,
+        values: FloatArray,
+        own: FloatArray,
+        adjoints: FloatArray,
     ) -> FloatArray:
         """What terms give to quantities, to first order, (n_candidates, n_quantities n_samples).
 
-        Terms that are left out get what they would give.
+        Terms that are left out get what they would give, nodes that stand for others what they would
+        give beyond that as what they are.
         """
-        return _effects(self._operands, candidates, values, own, adjoints)
+        return _effects(
+            self._operands, left.kept, left.source, left.factor, candidates, values, own, adjoints
+        )
 
     def count(self, left: Remains) -> int:
         """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
@@ -224,6 +259,70 @@ class Tape:
 
 
 @numba.njit(cache=True, nogil=True)
+def _needed(
+    codes: IntArray, operands: IntArray, outputs: IntArray, kept: BoolArray, source: IntArray
+) -> BoolArray:
+    needed = np.zeros(codes.size, dtype=np.bool_)
+    for value in outputs:
+        needed[value >> 1] = True
+    for k in range(codes.size - 1, -1, -1):
+        code = codes[k]
+        if not needed[k] or code <= _INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
+            continue
+        if source[k] != k:
+            needed[source[k]] = True
+            continue
+        if code != _SUM or kept[k, _FIRST]:
+            needed[operands[k, 0] >> 1] = True
+        if code == _PRODUCT or (code == _SUM and kept[k, _SECOND]):
+            needed[operands[k, 1] >> 1] = True
+    return needed
+
+
+@numba.njit(cache=True, nogil=True)
+def _made(
+    k: int,
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    inputs: FloatArray,
+    v: FloatArray,
+    result: FloatArray,
+) -> None:
+    """What node k makes of its operands."""
+    code, m = codes[k], inputs.shape[1]
+    a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
+    s = -1.0 if operands[k, 0] & 1 else 1.0
+    t = -1.0 if operands[k, 1] & 1 else 1.0
+    if code == _CONSTANT:
+        result[:] = numbers[k]
+    elif code == _INPUT:
+        result[:] = inputs[int(numbers[k])]
+    elif code == _SUM:
+        if not kept[k, _FIRST]:
+            s = 0.0
+        if not kept[k, _SECOND]:
+            t = 0.0
+        for i in range(m):
+            result[i] = s * v[a, i] + t * v[b, i]
+    elif code == _PRODUCT:
+        for i in range(m):
+            result[i] = s * t * v[a, i] * v[b, i]
+    else:
+        for i in range(m):
+            x = s * v[a, i]
+            if code == _SIN:
+                result[i] = np.sin(x)
+            elif code == _COS:
+                result[i] = np.cos(x)
+            elif code == _TANH:
+                result[i] = np.tanh(x)
+            else:
+                result[i] = np.sign(x)
+
+
+@numba.njit(cache=True, nogil=True)
 def _values(
     codes: IntArray,
     operands: IntArray,
@@ -232,49 +331,35 @@ def _values(
     source: IntArray,
     factor: FloatArray,
     inputs: FloatArray,
-) -> tuple[FloatArray, FloatArray]:
-    n, m = codes.size, inputs.shape[1]
-    v, own = np.zeros((n, m)), np.empty((n, m))
-    for k in range(n):
-        code = codes[k]
-        a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
-        s = -1.0 if operands[k, 0] & 1 else 1.0
-        t = -1.0 if operands[k, 1] & 1 else 1.0
-        if code == _CONSTANT:
-            own[k] = numbers[k]
-        elif code == _INPUT:
-            own[k] = inputs[int(numbers[k])]
-        elif code == _SUM:
-            if not kept[k, _FIRST]:
-                s = 0.0
-            if not kept[k, _SECOND]:
-                t = 0.0
-            for i in range(m):
-                own[k, i] = s * v[a, i] + t * v[b, i]
-        elif code == _PRODUCT:
-            for i in range(m):
-                own[k, i] = s * t * v[a, i] * v[b, i]
-        else:
-            for i in range(m):
-                x = s * v[a, i]
-                if code == _SIN:
-                    own[k, i] = np.sin(x)
-                elif code == _COS:
-                    own[k, i] = np.cos(x)
-                elif code == _TANH:
-                    own[k, i] = np.tanh(x)
-                else:
-                    own[k, i] = np.sign(x)
-        if not kept[k, WHOLE]:
+    which: BoolArray,
+) -> FloatArray:
+    v = np.zeros((codes.size, inputs.shape[1]))
+    for k in range(codes.size):
+        if not which[k] or not kept[k, WHOLE]:
             continue
         if source[k] == k:
-            v[k] = own[k]
+            _made(k, codes, operands, numbers, kept, inputs, v, v[k])
         elif source[k] == NUMBER:
             v[k] = factor[k]
         else:
-            for i in range(m):
+            for i in range(v.shape[1]):
                 v[k, i] = factor[k] * v[source[k], i]
-    return v, own
+    return v
+
+
+@numba.njit(cache=True, nogil=True)
+def _own_values(
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    inputs: FloatArray,
+    v: FloatArray,
+) -> FloatArray:
+    own = np.empty(v.shape)
+    for k in range(codes.size):
+        _made(k, codes, operands, numbers, kept, inputs, v, own[k])
+    return own
 
 
 @numba.njit(cache=True, nogil=True)
@@ -287,12 +372,15 @@ def _adjoints(
     factor: FloatArray,
     v: FloatArray,
     seeds: FloatArray,
+    which: BoolArray,
 ) -> FloatArray:
     n, quantities, m = codes.size, seeds.shape[1], v.shape[1]
     adjoints = np.zeros((n, quantities, m))
     reached = np.zeros((n, quantities), dtype=np.bool_)
     for o in range(outputs.size):
         k = outputs[o] >> 1
+        if not which[k]:
+            continue
         s = -1.0 if outputs[o] & 1 else 1.0
         for q in range(quantities):
             if np.any(seeds[o, q]):
@@ -301,7 +389,7 @@ def _adjoints(
                     adjoints[k, q, i] += s * seeds[o, q, i]
     for k in range(n - 1, -1, -1):
         code = codes[k]
-        if code <= _INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
+        if not which[k] or code <= _INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
             continue
         a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
         s = -1.0 if operands[k, 0] & 1 else 1.0
@@ -314,20 +402,24 @@ def _adjoints(
                 for i in range(m):
                     adjoints[source[k], q, i] += factor[k] * adjoints[k, q, i]
             elif code == _SUM:
-                if kept[k, _FIRST]:
+                if kept[k, _FIRST] and which[a]:
                     reached[a, q] = True
                     for i in range(m):
                         adjoints[a, q, i] += s * adjoints[k, q, i]
-                if kept[k, _SECOND]:
+                if kept[k, _SECOND] and which[b]:
                     reached[b, q] = True
                     for i in range(m):
                         adjoints[b, q, i] += t * adjoints[k, q, i]
             elif code == _PRODUCT:
-                reached[a, q] = reached[b, q] = True
-                for i in range(m):
-                    adjoints[a, q, i] += s * t * adjoints[k, q, i] * v[b, i]
-                    adjoints[b, q, i] += s * t * adjoints[k, q, i] * v[a, i]
-            elif code != _SIGN:
+                if which[a]:
+                    reached[a, q] = True
+                    for i in range(m):
+                        adjoints[a, q, i] += s * t * adjoints[k, q, i] * v[b, i]
+                if which[b]:
+                    reached[b, q] = True
+                    for i in range(m):
+                        adjoints[b, q, i] += s * t * adjoints[k, q, i] * v[a, i]
+            elif code != _SIGN and which[a]:
                 reached[a, q] = True
                 for i in range(m):
                     x = s * v[a, i]
@@ -343,23 +435,39 @@ def _adjoints(
 
 @numba.njit(cache=True, nogil=True)
 def _effects(
-    operands: IntArray, candidates: IntArray, v: FloatArray, own: FloatArray, adjoints: FloatArray
+    operands: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    candidates: IntArray,
+    v: FloatArray,
+    own: FloatArray,
+    adjoints: FloatArray,
 ) -> FloatArray:
     _, quantities, m = adjoints.shape
     result = np.empty((candidates.shape[0], quantities * m))
+    given = np.empty(m)
     for c in range(candidates.shape[0]):
         k, what = candidates[c]
-        node, s = k, 1.0
-        if what < WHOLE:
-            node = operands[k, what] >> 1
-            s = -1.0 if operands[k, what] & 1 else 1.0
-        source = v if what < WHOLE else own
+        # Terms of nodes that are left out, or stand for others, give nothing.
+        given[:] = 0.0
+        if what == WHOLE:
+            if source[k] == k:
+                given[:] = own[k]
+            elif source[k] == NUMBER:
+                given[:] = factor[k]
+            else:
+                given[:] = factor[k] * v[source[k]]
+        elif what == ITSELF:
+            if kept[k, WHOLE]:
+                given[:] = own[k] - v[k]
+        elif kept[k, WHOLE] and source[k] == k:
+            given[:] = v[operands[k, what] >> 1]
+            if operands[k, what] & 1:
+                given *= -1.0
         for q in range(quantities):
             for i in range(m):
-                given = source[node, i]
-                if what == ITSELF:
-                    given -= v[k, i]
-                result[c, q * m + i] = s * adjoints[k, q, i] * given
+                result[c, q * m + i] = adjoints[k, q, i] * given[i]
     return result
 
 

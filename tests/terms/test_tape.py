@@ -5,7 +5,7 @@ import pytest
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.terms.tape import ITSELF, NUMBER, Tape
+from paramreduce_cli.terms.tape import ITSELF, NUMBER, WHOLE, Tape
 
 
 @pytest.fixture
@@ -42,8 +42,12 @@ def random_remains(tape, seed):
     return left
 
 
+def everywhere(tape):
+    return np.ones(tape.size, dtype=bool)
+
+
 def outputs_of(tape, left, inputs):
-    values, _ = tape.values(left, inputs)
+    values = tape.values(left, inputs, tape.needed(left))
     return [values[o >> 1] * (-1 if o & 1 else 1) for o in tape.program.outputs]
 
 
@@ -75,12 +79,12 @@ def test_what_is_left_is_linear_in_the_parameters(program, inputs, seed):
 def test_adjoints_are_derivatives(program, inputs, seed):
     tape = Tape(program)
     left = random_remains(tape, seed) if seed else tape.everything()
-    values, _ = tape.values(left, inputs)
+    values = tape.values(left, inputs, everywhere(tape))
     seeds = np.eye(2)[:, :, None] * np.ones(20)
-    adjoints = tape.adjoints(left, values, seeds)
+    adjoints = tape.adjoints(left, values, seeds, everywhere(tape))
     places = {int(n.number): k for k, n in enumerate(program.nodes) if n.operation == "input"}
     for position in (0, 1, 3):
-        if not left.kept[places[position], 2]:
+        if not left.kept[places[position], WHOLE]:
             continue
         ahead, behind = inputs.copy(), inputs.copy()
         ahead[position] += 1e-6
@@ -89,50 +93,50 @@ def test_adjoints_are_derivatives(program, inputs, seed):
         np.testing.assert_allclose(adjoints[places[position]], change, atol=1e-8)
 
 
-def test_effects_of_addends_are_what_is_lost_without_them(program, inputs):
-    """Exactly, as outputs are linear in every addend that no function is taken of."""
+@pytest.mark.parametrize("seed", range(10))
+def test_nodes_that_are_not_asked_for_change_nothing(program, inputs, seed):
     tape = Tape(program)
-    everything = tape.everything()
-    values, own = tape.values(everything, inputs)
-    adjoints = tape.adjoints(everything, values, np.eye(2)[:, :, None] * np.ones(20))
+    left = random_remains(tape, seed)
+    seeds, linear = np.eye(2)[:, :, None] * np.ones(20), tape.linear(2)
+    values = tape.values(left, inputs, everywhere(tape))
+    some = tape.values(left, inputs, tape.needed(left))
+    np.testing.assert_array_equal(some[tape.needed(left)], values[tape.needed(left)])
+    np.testing.assert_array_equal(
+        tape.adjoints(left, some, seeds, linear)[linear],
+        tape.adjoints(left, values, seeds, everywhere(tape))[linear],
+    )
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_effects_are_what_outputs_lose_or_gain(program, inputs, seed):
+    """Exactly, where the parameters are part of a node: outputs are linear in those."""
+    tape = Tape(program)
+    left = random_remains(tape, seed) if seed else tape.everything()
+    values = tape.values(left, inputs, everywhere(tape))
+    own = tape.own_values(left, inputs, values)
+    adjoints = tape.adjoints(left, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
     candidates = tape.candidates()
-    effects = tape.effects(candidates, values, own, adjoints).reshape(-1, 2, 20)
-    whole = np.array(outputs_of(tape, everything, inputs))
-    angles = {
-        value >> 1 for n in program.nodes if n.operation in ("sin", "cos", "tanh", "sign")
-        for value in n.operands
-    }  # fmt: skip
-    tried = 0
-    for (k, what), effect in zip(candidates, effects, strict=True):
-        if program.nodes[k].operation != "+" or what == 2 or k in angles:
-            continue
-        left = everything.flipped(np.array([[k, what]]))
-        np.testing.assert_allclose(whole - outputs_of(tape, left, inputs), effect, atol=1e-14)
-        # Put back, it gives the same again.
-        v, o = tape.values(left, inputs)
-        back = tape.effects(
-            np.array([[k, what]]), v, o, tape.adjoints(left, v, np.eye(2)[:, :, None] * np.ones(20))
-        )
-        np.testing.assert_allclose(back.reshape(2, 20), effect, atol=1e-14)
-        tried += 1
-    assert tried >= 4
+    candidates = candidates[tape.linear(2)[candidates[:, 0]]]
+    effects = tape.effects(left, candidates, values, own, adjoints).reshape(-1, 2, 20)
+    now = np.array(outputs_of(tape, left, inputs))
+    for term, here, effect in zip(candidates, left.has(candidates), effects, strict=True):
+        other = outputs_of(tape, left.flipped(term[None]), inputs)
+        lost = now - other if here and term[1] != ITSELF else other - now
+        np.testing.assert_allclose(effect, lost, atol=1e-13)
 
 
-def test_effects_of_nodes_that_stand_for_others_are_what_is_gained_without_that(program, inputs):
+def test_nodes_that_stand_for_others_can_be_what_they_are_again(program, inputs):
     tape = Tape(program)
     everything = tape.everything()
-    whole = np.array(outputs_of(tape, everything, inputs))
     last = int(np.flatnonzero(tape.made() & tape.linear(2))[-1])
     left = everything.standing(last, last - 1, 0.7)
-    v, o = tape.values(left, inputs)
-    adjoints = tape.adjoints(left, v, np.eye(2)[:, :, None] * np.ones(20))
     back = np.array([[last, ITSELF]])
-    effect = tape.effects(back, v, o, adjoints).reshape(2, 20)
-    np.testing.assert_allclose(whole - outputs_of(tape, left, inputs), effect, atol=1e-14)
     again = left.flipped(back)
     assert again.has(back).all()
     assert not left.has(back).any()
-    np.testing.assert_array_equal(outputs_of(tape, again, inputs), whole)
+    np.testing.assert_array_equal(
+        outputs_of(tape, again, inputs), outputs_of(tape, everything, inputs)
+    )
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -1,0 +1,110 @@
+"""Symmetric matrices of a few rows, one for each sample: what a search does thousands of times."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from paramreduce_cli.records import FloatArray
+
+_SINGULAR = 1e-14
+"""Pivot over the diagonal element it comes from, below which a matrix has no inverse but for rounding."""
+
+
+def inverses(matrices: FloatArray) -> FloatArray | None:
+    """Inverses of positive definite matrices; None where one of them is not.
+
+    Args:
+        matrices: (n_samples, n, n)
+    """
+    found, positive = _inverses(matrices)
+    return found if positive else None
+
+
+def positive_definite(matrices: FloatArray) -> bool:
+    """Whether all matrices are, (n_samples, n, n)."""
+    return bool(_positive_definite(matrices))
+
+
+def roots(matrices: FloatArray) -> FloatArray:
+    """Upper triangles R with R' R the matrices, samples last, (n, n, n_samples).
+
+    Args:
+        matrices: Positive definite, (n_samples, n, n).
+    """
+    return np.ascontiguousarray(np.linalg.cholesky(matrices).transpose(2, 1, 0))
+
+
+@numba.njit(cache=True, nogil=True)
+def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Upper triangles times vectors, sample by sample.
+
+    Args:
+        triangles: As :func:`roots` gives them, (n, n, n_samples).
+        vectors: (k, n, n_samples)
+
+    Returns:
+        (k, n, n_samples)
+    """
+    result = np.zeros(vectors.shape)
+    k, n, m = vectors.shape
+    for c in range(k):
+        for i in range(n):
+            for j in range(i, n):
+                for s in range(m):
+                    result[c, i, s] += triangles[i, j, s] * vectors[c, j, s]
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def _factored(a: FloatArray) -> bool:
+    """The lower triangle by Cholesky, in place; whether there is one."""
+    n = a.shape[0]
+    for i in range(n):
+        least = _SINGULAR * a[i, i]
+        for j in range(i + 1):
+            total = a[i, j]
+            for k in range(j):
+                total -= a[i, k] * a[j, k]
+            if j < i:
+                a[i, j] = total / a[j, j]
+            elif total > least and total > 0:
+                a[i, i] = np.sqrt(total)
+            else:
+                return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _positive_definite(matrices: FloatArray) -> bool:
+    lower = np.empty(matrices.shape[1:])
+    for s in range(matrices.shape[0]):
+        lower[:] = matrices[s]
+        if not _factored(lower):
+            return False
+    return True
+
+
+@numba.njit(cache=True, nogil=True)
+def _inverses(matrices: FloatArray) -> tuple[FloatArray, bool]:
+    m, n, _ = matrices.shape
+    result = np.zeros((m, n, n))
+    lower = np.empty((n, n))
+    for s in range(m):
+        lower[:] = matrices[s]
+        if not _factored(lower):
+            return result, False
+        for i in range(n):  # the inverse of the triangle, in place
+            lower[i, i] = 1 / lower[i, i]
+            for j in range(i):
+                total = 0.0
+                for k in range(j, i):
+                    total += lower[i, k] * lower[k, j]
+                lower[i, j] = -total * lower[i, i]
+        for i in range(n):
+            for j in range(i + 1):
+                total = 0.0
+                for k in range(i, n):
+                    total += lower[k, i] * lower[k, j]
+                result[s, i, j] = result[s, j, i] = total
+    return result, True

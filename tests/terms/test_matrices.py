@@ -1,0 +1,39 @@
+"""Small symmetric matrices against numpy's."""
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.terms import matrices
+
+
+@pytest.fixture
+def spread():
+    A = np.random.default_rng(0).normal(size=(50, 4, 6))
+    return A @ np.swapaxes(A, 1, 2)
+
+
+def test_inverses(spread):
+    np.testing.assert_allclose(matrices.inverses(spread), np.linalg.inv(spread), rtol=1e-8)
+    assert matrices.positive_definite(spread)
+
+
+@pytest.mark.parametrize("wrong", [-1e-9, 0.0, 1e-16])
+def test_one_that_is_singular_or_indefinite_spoils_all(spread, wrong):
+    values, vectors = np.linalg.eigh(spread[20])
+    values[0] = wrong * values[-1]
+    spread[20] = vectors @ np.diag(values) @ vectors.T
+    assert matrices.inverses(spread) is None
+    assert not matrices.positive_definite(spread)
+
+
+def test_what_is_not_a_number_is_not_positive_definite(spread):
+    spread[3, 1, 1] = np.nan
+    assert not matrices.positive_definite(spread)
+
+
+def test_roots_times_vectors(spread):
+    vectors = np.random.default_rng(1).normal(size=(3, 4, 50))
+    found = matrices.times(matrices.roots(spread), vectors)
+    np.testing.assert_allclose(
+        np.sum(found**2, axis=1), np.einsum("kis,sij,kjs->ks", vectors, spread, vectors)
+    )
