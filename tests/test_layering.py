@@ -28,7 +28,7 @@ LAYERS = [
     {"robots"},
     {"fields"},
     {"records"},
-    {"registry", "texts", "processes"},
+    {"registry", "texts", "processes", "scratch"},
     {"errors"},
 ]
 LEVEL = {name: k for k, names in enumerate(LAYERS) for name in names}

@@ -1,16 +1,14 @@
 """Tables of numbers as CSV."""
 
-import array
 import csv
 import gzip
 import zlib
 from pathlib import Path
 
-import numpy as np
-
 from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
+from paramreduce_cli.scratch import LargeTable
 
 
 def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], FloatArray]:
@@ -24,11 +22,10 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
         DataError: It is no table of numbers under headings that differ.
         ArtifactError: The file cannot be read.
     """
-    numbers = array.array("d")
     check_is_file(path)
     try:
         opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="utf-8-sig", newline="") as file:
+        with opener(path, "rt", encoding="utf-8-sig", newline="") as file, LargeTable() as table:
             rows = csv.reader(file)
             header = [name.strip() for name in next(rows, [])]
             if len(header) == 1 and ";" in header[0]:
@@ -48,20 +45,19 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                     blank is not None
                 ):  # at the end they do no harm; inside, lines would be miscounted
                     raise DataError(f"{path}, line {blank}: is empty. Remove it.")
-                if leave_out_text and not numbers:
+                if leave_out_text and not table:
                     kept = [k for k, cell in enumerate(row) if _is_number(cell)]
                 if len(row) != len(header):
                     raise DataError(
                         f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
                         "headings."
                     )
-                numbers.extend(_number(path, rows.line_num, row[k]) for k in kept)
+                table.extend(_number(path, rows.line_num, row[k]) for k in kept)
+            return [header[k] for k in kept], table.matrix(len(kept))
     except FileNotFoundError as error:
         raise missing(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
-    names = [header[k] for k in kept]
-    return names, np.frombuffer(numbers, dtype=float).reshape(-1, len(names))
 
 
 def _is_number(cell: str) -> bool:

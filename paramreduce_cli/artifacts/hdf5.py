@@ -36,8 +36,8 @@ _SMALL = 8192
 """Bytes that a header has room for."""
 _LARGEST_HEADER = 60_000
 """Bytes that a header can be made to hold; text beyond that is an array with one entry."""
-_READ_AT_ONCE = 1 << 24
-"""Bytes."""
+_AT_ONCE = 1 << 24
+"""Bytes that are read or written of a large dataset."""
 _STRETCH = 1 << 20
 """Bytes that are read together of rows that are read one after the other."""
 _MOST_COMPRESSED = 1000
@@ -94,6 +94,9 @@ class Writer:
         """Write an array, a number, a text or a list of texts."""
         array = np.asarray(value)
         if array.dtype.kind not in "US":
+            if array.nbytes > _AT_ONCE and array.ndim:
+                self._store_in_parts(name, array)
+                return
             self._note(name, np.ascontiguousarray(array).tobytes())
             self._store(name, array)
             return
@@ -106,6 +109,19 @@ class Writer:
         """Write a small attribute of the file."""
         self._note(name, repr(value).encode())
         write_attribute(self._group, name, value)
+
+    def _store_in_parts(self, name: str, array: np.ndarray) -> None:
+        """What may be larger than memory: some rows at a time."""
+        data = self._group.create_dataset(
+            name, array.shape, array.dtype, chunks=True, fletcher32=True
+        )
+        self._hash.update(name.encode())
+        step = max(1, _AT_ONCE * len(array) // array.nbytes)
+        for start in range(0, len(array), step):
+            rows = np.ascontiguousarray(array[start : start + step])
+            self._check()
+            self._hash.update(rows.data)
+            data[start : start + step] = rows
 
     def _store(self, name: str, array: np.ndarray) -> None:
         if array.nbytes > _LARGEST_HEADER and array.shape == ():
@@ -278,7 +294,7 @@ class Reader:
             if isinstance(self.file[name], h5py.Dataset):
                 data = self._dataset(name)
                 rows = len(data) if data.shape else 1
-                step = max(1, _READ_AT_ONCE * rows // max(1, data.nbytes))
+                step = max(1, _AT_ONCE * rows // max(1, data.nbytes))
                 for start in range(0, rows, step):
                     data[slice(start, start + step) if data.shape else ()]
 

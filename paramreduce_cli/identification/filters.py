@@ -5,6 +5,8 @@ time, and one output sample needs a known number of inputs: the observation matr
 same filter block by block.
 """
 
+from collections.abc import Iterable
+
 import numpy as np
 from scipy import signal
 
@@ -96,11 +98,16 @@ def thinned_low_pass(
     return result
 
 
-def spectrum(x: FloatArray, rate: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Welch1967]."""
-    length = max(min(64, x.shape[0]), x.shape[0] // _SEGMENTS)
+def spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, FloatArray]:
+    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Welch1967].
+
+    Args:
+        columns: Signals, (n_samples,) each; one at a time, as segments overlap, and are all there at once.
+        rate: Samples per second.
+    """
     densities = []
-    for column in x.T:  # one at a time: segments overlap, and are all there at once
+    for column in columns:
+        length = max(min(64, column.size), column.size // _SEGMENTS)
         frequency, density = signal.welch(
             column, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,
             detrend="linear",

@@ -1,7 +1,5 @@
 """Single samples far from their neighbours."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy import ndimage
 
@@ -18,19 +16,16 @@ _TO_SIGMA = 1.4826
 """Median absolute deviation to standard deviation of normal noise."""
 
 
-def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
-    """Single samples far from the median of their neighbours, interpolated [Hampel1974].
+def replace_outliers(pieces: list[Signals]) -> int:
+    """Interpolate single samples far from the median of their neighbours [Hampel1974], in place.
 
     Returns:
-        The motions, and how many samples were replaced.
+        How many samples were replaced.
     """
     count = 0
-    cleaned = []
     for piece in pieces:
-        changed: dict[str, FloatArray] = {}
-        for key in ("z", "tau"):
-            values = getattr(piece, key)
-            for j, column in enumerate(values.T):
+        for values in (piece.z, piece.tau):
+            for column in values.T:
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
                 sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
@@ -38,11 +33,8 @@ def without_outliers(pieces: list[Signals]) -> tuple[list[Signals], int]:
                 if far.any():
                     count += int(far.sum())
                     good = np.flatnonzero(~far)
-                    if key not in changed:
-                        changed[key] = values.copy()
-                    changed[key][far, j] = np.interp(np.flatnonzero(far), good, column[good])
-        cleaned.append(replace(piece, **changed))
-    return cleaned, count
+                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
+    return count
 
 
 def _alone(column: FloatArray, least: float) -> np.ndarray:

@@ -38,13 +38,15 @@ def moving(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
     """Without what is cut off at the start and the end of a file, which still serves filters."""
     first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
     if wanted.standstill == "cut":
-        z = np.concatenate([piece.z for piece in pieces])
         time = np.concatenate([piece.time for piece in pieces])
-        still = _STILL * np.maximum(np.ptp(z, axis=0), 1e-12)
-        gone = np.flatnonzero((np.abs(z - z[0]) > still).any(axis=1))
-        back = np.flatnonzero((np.abs(z - z[-1]) > still).any(axis=1))
-        if gone.size:
-            first, last = max(first, time[gone[0]]), min(last, time[back[-1]])
+        gone, back = [], []
+        for j in range(pieces[0].z.shape[1]):
+            z = np.concatenate([piece.z[:, j] for piece in pieces])
+            still = _STILL * max(np.ptp(z), 1e-12)
+            gone += np.flatnonzero(np.abs(z - z[0]) > still)[:1].tolist()
+            back += np.flatnonzero(np.abs(z - z[-1]) > still)[-1:].tolist()
+        if gone:
+            first, last = max(first, time[min(gone)]), min(last, time[max(back)])
     return [Piece(piece, first, last) for piece in pieces]
 
 

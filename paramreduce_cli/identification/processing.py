@@ -1,8 +1,8 @@
 """Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
 
 import itertools
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from paramreduce_cli.config.logs import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.doubts import doubts
-from paramreduce_cli.identification.outliers import without_outliers
+from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.pieces import Piece, moving, split
 from paramreduce_cli.identification.signals import Signals, evened, signals
 from paramreduce_cli.records import (
@@ -25,6 +25,7 @@ from paramreduce_cli.records import (
     Spectra,
     Tell,
 )
+from paramreduce_cli.scratch import large_matrix, stacked
 
 UNUSED = -1
 """Fold of samples that only serve filters."""
@@ -88,7 +89,7 @@ def processed(
     raw = [piece for part in learned_from for piece in part]
     shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
     longest = raw[shown].signals
-    shown_raw = _some(longest.time, _speeds(longest, rate), longest.tau)
+    shown_raw = _shown(longest, rate)
     begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
@@ -101,8 +102,7 @@ def processed(
     steps.append(_said_of_states(longest, thin, rate / thin))
     begin(2)
     made = ready(raw)
-    s = made[shown].signals
-    shown_ready = _some(s.time, _speeds(s, rate / thin), s.tau)
+    shown_ready = _shown(made[shown].signals, rate / thin)
     learned = _motions(made, wanted.folds)
     tested = _motions(ready([piece for part in tested_on for piece in part]), 1)
     _check_enough(learned, tested)
@@ -142,8 +142,9 @@ def _read(
         source = log.source
         recorded = signals(log, wanted, names)
         del log  # the next one is read while this name would hold it
-        if wanted.delay:
-            recorded = _undelayed(recorded, wanted.delay)
+        for tau in recorded.tau.T if wanted.delay else ():
+            # Torques at the times at which they acted.
+            tau[:] = np.interp(recorded.time + wanted.delay, recorded.time, tau)
         try:
             pieces, rate, said = evened(recorded)
         except DataError as error:
@@ -152,7 +153,7 @@ def _read(
         steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         if wanted.outliers == "replace":
-            pieces, count = without_outliers(pieces)
+            count = replace_outliers(pieces)
             if count:
                 steps.append(
                     f"{count} outliers are replaced by what lies between their neighbours."
@@ -179,23 +180,17 @@ def _parts(
     return [one for one, _ in halves], [two for _, two in halves]
 
 
-def _undelayed(found: Signals, delay: float) -> Signals:
-    """Torques at the times at which they acted."""
-    tau = np.column_stack([np.interp(found.time + delay, found.time, t) for t in found.tau.T])
-    return replace(found, tau=tau)
-
-
-def _speeds(piece: Signals, rate: float) -> FloatArray:
-    """As recorded, or differences of positions."""
+def _speeds(piece: Signals, rate: float) -> Iterator[FloatArray]:
+    """As recorded, or differences of positions, joint by joint."""
     if piece.dz is not None:
-        return piece.dz
+        return iter(piece.dz.T)
     # Plain differences: noise that is white in the positions rises to the end of the spectrum.
-    return np.diff(piece.z, axis=0, append=piece.z[-1:]) * rate
+    return (np.diff(z, append=z[-1:]) * rate for z in piece.z.T)
 
 
 def _spectra(piece: Signals, rate: float) -> Spectra:
     frequency, velocity = filters.spectrum(_speeds(piece, rate), rate)
-    _, torque = filters.spectrum(piece.tau, rate)
+    _, torque = filters.spectrum(piece.tau.T, rate)
     return Spectra(frequency[1:], velocity[1:], torque[1:])
 
 
@@ -266,7 +261,7 @@ def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
     if known and thin == state.size == torque.size == 1:
         return piece
     time = s.time[::thin]
-    z, dz, ddz, tau = (np.empty((time.size, s.z.shape[1])) for _ in range(4))
+    z, dz, ddz, tau = (large_matrix(time.size, s.z.shape[1]) for _ in range(4))
     for j in range(s.z.shape[1]):
         made = _joint_ready(s.joint(j), rate, state, torque)
         for whole, values in zip((z, dz, ddz, tau), made, strict=True):
@@ -298,11 +293,12 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
         fold[piece.used] = (before + np.arange(size)) * folds // max(1, total)
         before += size
         fold_of.append(fold)
-    keys = ("time", "z", "dz", "ddz", "tau")
-    parts = {key: [getattr(p.signals, key) for p in pieces] for key in keys}
-    joined = {k: part[0] if len(part) == 1 else np.concatenate(part) for k, part in parts.items()}
+    joined = {
+        key: stacked([getattr(p.signals, key) for p in pieces]) for key in ("z", "dz", "ddz", "tau")
+    }
+    time = np.concatenate([p.signals.time for p in pieces])
     number = np.repeat(np.arange(len(pieces)), [p.signals.time.size for p in pieces])
-    return MeasuredMotions(**joined, piece=number, fold=np.concatenate(fold_of))
+    return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
 
 
 def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:
@@ -353,7 +349,8 @@ def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArr
     return np.array(noise)
 
 
-def _some(*signals: FloatArray) -> tuple[FloatArray, ...]:
-    """Samples for figures, copied so that the rest may be forgotten."""
-    every = max(1, signals[0].size // _MOST_SHOWN)
-    return tuple(values[::every].copy() for values in signals)
+def _shown(piece: Signals, rate: float) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Some times, speeds and torques for figures, copied so that the rest may be forgotten."""
+    every = max(1, piece.time.size // _MOST_SHOWN)
+    speeds = np.column_stack([speed[::every] for speed in _speeds(piece, rate)])
+    return piece.time[::every].copy(), speeds, piece.tau[::every].copy()

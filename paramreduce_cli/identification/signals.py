@@ -20,6 +20,7 @@ from paramreduce_cli.config.logs import (
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import FloatArray, RawLog
+from paramreduce_cli.scratch import large_matrix, side_by_side
 
 _EVEN = 0.005
 """Deviation of a time step from the usual one, a share, up to which time is even."""
@@ -27,6 +28,8 @@ _GAP = 5.5
 """Usual time steps that make a gap."""
 _FEWEST = 50
 """Samples of an uninterrupted motion that is used."""
+_AT_ONCE = 10_000
+"""Rows."""
 _MOST_SHOWN = 12
 """Names of columns in a message."""
 
@@ -89,7 +92,7 @@ def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
 
 
 def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
-    """From motors to joints; in place, as they may be gigabytes."""
+    """From motors to joints; in place, as there may be gigabytes."""
     sign = _each(wanted, "signs", n_dof)
     tau = found.tau
     tau *= sign * _each(wanted, "torque_signs", n_dof)
@@ -104,13 +107,21 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
     except ValueError as error:
         raise ConfigError(str(error), ("sampling", "log", "transmission")) from error
     if gears is not None:
-        inverse = np.linalg.inv(gears)
-        motion = [None if a is None else a @ inverse.T for a in motion]
-        tau = tau @ gears
+        inverse = np.asarray(np.linalg.inv(gears), dtype=np.float64)
+        for values in motion:
+            if values is not None:
+                _multiply(values, inverse.T)
+        _multiply(tau, gears)
     z, dz, ddz = motion
     assert z is not None
     z += _each(wanted, "offsets", n_dof)
     return Signals(found.time, z, dz, ddz, tau)
+
+
+def _multiply(values: FloatArray, factors: FloatArray) -> None:
+    """Values times factors, in place."""
+    for start in range(0, len(values), _AT_ONCE):
+        values[start : start + _AT_ONCE] = values[start : start + _AT_ONCE] @ factors
 
 
 def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:
@@ -150,7 +161,7 @@ def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str, times: s
                 f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; bring "
                 "signals that were recorded together."
             )
-    return np.column_stack(found).astype(float, copy=False)
+    return side_by_side(found)
 
 
 def _column(log: RawLog, name: str) -> FloatArray:
@@ -227,7 +238,9 @@ def _resampled(found: Signals, step: float) -> Signals:
     time = found.time[0] + step * np.arange(int((found.time[-1] - found.time[0]) / step) + 1)
 
     def at(values: FloatArray) -> FloatArray:
-        result: FloatArray = CubicSpline(found.time, values, axis=0)(time)
+        result = large_matrix(time.size, values.shape[1])
+        for j, column in enumerate(values.T):
+            result[:, j] = CubicSpline(found.time, column)(time)
         return result
 
     dz = None if found.dz is None else at(found.dz)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from conftest import ONE_FORMAT, TWO_LINK, config_of
 
-from paramreduce_cli.artifacts import sample_files
+from paramreduce_cli.artifacts import hdf5, sample_files
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, write
 from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
@@ -247,3 +247,22 @@ def test_digests_do_not_depend_on_the_order_of_sets(two_link_results, tmp_path):
         subprocess.run([*SAMPLE, "--results", copy], env=seeded, check=True)
         digests.add(read_stamp(copy / "samples.h5").digest)
     assert len(digests) == 1
+
+
+def test_large_arrays_are_written_some_rows_at_a_time(tmp_path, monkeypatch):
+    """The digest is that of the whole, whatever order the array has in memory."""
+    rows = np.asfortranarray(np.random.default_rng(0).normal(size=(5000, 3)))
+
+    def written(name):
+        def fill(writer):
+            writer.dataset("rows", rows)
+            writer.dataset("count", 5000)
+
+        return write(tmp_path / name, STAMP, fill).digest
+
+    whole = written("whole.h5")
+    monkeypatch.setattr(hdf5, "_AT_ONCE", 10_000)
+    assert written("parts.h5") == whole
+    with h5py.File(tmp_path / "parts.h5") as file:
+        np.testing.assert_array_equal(file["rows"], rows)
+        assert file["rows"].fletcher32

@@ -27,10 +27,18 @@ sampling:
     standstill: keep
 """
 _MEASURE = """
-import resource, subprocess, sys
-subprocess.run(sys.argv[1:], check=True)
+import resource, subprocess, sys, time
+process = subprocess.Popen(sys.argv[1:])
+peak = 0
+while process.poll() is None:
+    try:
+        lines = open(f"/proc/{process.pid}/status").read().splitlines()
+    except OSError:
+        continue
+    peak = max([peak, *(int(line.split()[1]) for line in lines if line.startswith("RssAnon"))])
+    time.sleep(0.02)
 used = resource.getrusage(resource.RUSAGE_CHILDREN)
-print(used.ru_maxrss, used.ru_utime + used.ru_stime)
+print(process.returncode, peak, used.ru_utime + used.ru_stime)
 """
 _QR = """
 import sys
@@ -44,10 +52,11 @@ for _ in range(rows // len(block)):
 
 
 def measured(*command):
-    """Largest resident memory of a process, MiB, and the CPU seconds that it took."""
+    """Largest memory of a process, MiB, without mapped files, and the CPU seconds that it took."""
     command = [sys.executable, "-c", _MEASURE, sys.executable, *command]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
-    memory, seconds = done.stdout.split()[-2:]
+    code, memory, seconds = done.stdout.split()[-3:]
+    assert code == "0", done.stderr
     return int(memory) / 1024, float(seconds)
 
 
@@ -90,7 +99,7 @@ def rows():
         grown = (peaks[stage, ROWS] - peaks[stage, SHORT]) / (ROWS - SHORT) * size[0] * 2**20
         signals = 8 * (4 * size[0] + 1)
         what = f"{stage}, memory per sample of a log / the log's own {signals} bytes"
-        yield what, grown / signals, 2
+        yield what, grown / signals, 0.5
 
 
 if __name__ == "__main__":

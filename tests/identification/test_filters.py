@@ -59,5 +59,5 @@ def test_single_samples_are_those_of_the_whole_signal():
 def test_the_band_of_a_motion_ends_where_noise_begins():
     rng = np.random.default_rng(1)
     x = sum(wave(f, f) / f for f in (0.5, 1, 2, 4)) + 1e-3 * rng.normal(size=(TIME.size, 1))
-    frequency, density = filters.spectrum(x, RATE)
+    frequency, density = filters.spectrum(x.T, RATE)
     assert 4 < filters.band_of_motion(frequency, density) < 7

@@ -1,3 +1,4 @@
+import sys
 import weakref
 
 import numpy as np
@@ -53,6 +54,24 @@ def test_nothing_is_learned_from_what_is_held_out():
     for key in ("time", "z", "dz", "ddz", "tau", "fold"):
         assert np.array_equal(getattr(a.training, key), getattr(b.training, key))
     assert not np.array_equal(a.held_out.tau, b.held_out.tau)
+
+
+def test_logs_larger_than_memory_are_the_same(monkeypatch):
+    """Signals in files are those in memory; no column of what was brought is changed."""
+    log = two_link_log()
+    log["q1"][50] += 1.0
+    keys = {"outliers": "replace", "delay": 0.01, "transmission": [[1, 0.5], [0, 2]]}
+    here = made(log, **keys)
+    before = {name: column.copy() for name, column in log.items()}
+    monkeypatch.setattr(sys.modules["paramreduce_cli.scratch"], "_LARGE", 1)
+    there = made(log, **keys)
+    for key in ("time", "z", "dz", "ddz", "tau", "piece", "fold"):
+        for part in ("training", "held_out"):
+            one, two = (getattr(getattr(found, part), key) for found in (here, there))
+            np.testing.assert_array_equal(one, two)
+    np.testing.assert_array_equal(here.spectra.torque, there.spectra.torque)
+    for name, column in before.items():
+        np.testing.assert_array_equal(log[name], column)
 
 
 def test_files_are_read_one_at_a_time():

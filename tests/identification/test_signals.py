@@ -1,10 +1,13 @@
 import gzip
+import io
+import zipfile
 
 import h5py
 import numpy as np
 import pytest
 from simulated_logs import two_link_log, write_log
 
+from paramreduce_cli.artifacts import log_files
 from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.config.log_template import guessed_columns
 from paramreduce_cli.config.logs import LogSection
@@ -209,6 +212,35 @@ def test_text_and_objects_that_nobody_asks_for(tmp_path):
     (tmp_path / "plain.npy").rename(tmp_path / "plain.npz")
     with pytest.raises(ArtifactError, match=r"plain\.npz"):
         load_log(tmp_path / "plain.npz")
+
+
+@pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
+def test_arrays_of_all_kinds_of_numbers_and_orders(tmp_path, save, monkeypatch):
+    monkeypatch.setattr(log_files, "_AT_ONCE", 7)
+    rng = np.random.default_rng(0)
+    q = rng.normal(size=(60, 3))
+    brought = {
+        "t": np.arange(60), "on": rng.random(60) < 0.5, "q": q.astype(np.float32),
+        "dq": np.asfortranarray(q).astype(">f8"), "cube": np.ones((2, 2, 2)),
+    }  # fmt: skip
+    save(tmp_path / "log.npz", **brought)
+    found = load_log(tmp_path / "log.npz").columns
+    names = [f"{name}{k + 1}" for name in ("q", "dq") for k in range(3)]
+    assert set(found) == {"t", "on", *names}
+    np.testing.assert_array_equal(found["on"], brought["on"])
+    for name in names:
+        np.testing.assert_array_equal(found[name], brought[name[:-1]][:, int(name[-1]) - 1])
+
+
+def test_an_array_that_is_cut_off_is_refused(tmp_path):
+    whole = io.BytesIO()
+    np.save(whole, np.ones(100))
+    with zipfile.ZipFile(tmp_path / "log.npz", "w") as archive:
+        archive.writestr("t.npy", whole.getvalue()[:-8])
+    with pytest.raises(
+        ArtifactError, match=r"t\.npy does not hold the \(100,\) numbers it declares"
+    ):
+        load_log(tmp_path / "log.npz")
 
 
 def test_empty_lines_inside_are_refused(tmp_path):

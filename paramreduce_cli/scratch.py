@@ -1,0 +1,105 @@
+"""Matrices that may be larger than memory: from some size on in a file that vanishes with them.
+
+The file is in the folder that ``TMPDIR`` names, else in ``/var/tmp``, which unlike ``/tmp`` is on a disk. What is in
+it is mapped, so that the system takes back the memory where it is short.
+"""
+
+import array
+import os
+import tempfile
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+_LARGE = 1 << 26
+"""Bytes from which on a matrix is in a file."""
+_WAITING = 1 << 16
+"""Numbers that are written together."""
+
+
+def large_matrix(n_rows: int, n_columns: int) -> NDArray[np.float64]:
+    """A matrix of any numbers, (n_rows, n_columns), each column without gaps."""
+    shape = (n_columns, n_rows)
+    size = 8 * n_rows * n_columns
+    if size >= _LARGE and hasattr(os, "posix_fallocate"):
+        try:
+            with tempfile.TemporaryFile(dir=_folder()) as file:
+                # A disk that is full later would end the process.
+                os.posix_fallocate(file.fileno(), 0, size)
+                mapped = np.memmap(file, dtype=np.float64, mode="r+", shape=shape)
+            return np.asarray(mapped).T
+        except OSError:
+            pass  # no room: memory may do
+    return np.empty(shape).T
+
+
+def side_by_side(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """A matrix of columns, (n_rows,) each."""
+    result = large_matrix(columns[0].size, len(columns))
+    for j, column in enumerate(columns):
+        result[:, j] = column
+    return result
+
+
+def stacked(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Matrices, (n_rows, n_columns) each, one below the other; a single one as it is."""
+    if len(parts) == 1:
+        return parts[0]
+    result = large_matrix(sum(map(len, parts)), parts[0].shape[1])
+    start = 0
+    for part in parts:
+        result[start : start + len(part)] = part
+        start += len(part)
+    return result
+
+
+class LargeTable:
+    """Numbers, row by row, of which it is not known how many come."""
+
+    def __init__(self) -> None:
+        self._size = 0
+        self._waiting = array.array("d")
+        self._file = tempfile.SpooledTemporaryFile(max_size=_LARGE, dir=_folder())  # noqa: SIM115
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._file.close()
+
+    def __bool__(self) -> bool:
+        """Whether there are any."""
+        return self._size > 0
+
+    def extend(self, numbers: Iterable[float]) -> None:
+        """More of them."""
+        before = len(self._waiting)
+        self._waiting.extend(numbers)
+        self._size += len(self._waiting) - before
+        if len(self._waiting) > _WAITING:
+            self._flush()
+
+    def _flush(self) -> None:
+        self._file.write(self._waiting.tobytes())
+        del self._waiting[:]
+
+    def matrix(self, n_columns: int) -> NDArray[np.float64]:
+        """All of them, (n_rows, n_columns)."""
+        self._flush()
+        self._file.seek(0)
+        result = large_matrix(self._size // max(1, n_columns), n_columns)
+        rows = max(1, _WAITING // max(1, n_columns))
+        for start in range(0, len(result), rows):
+            part = result[start : start + rows]
+            part[:] = np.frombuffer(self._file.read(8 * part.size)).reshape(part.shape)
+        return result
+
+
+def _folder() -> str | None:
+    usual = Path("/var/tmp")
+    if "TMPDIR" in os.environ or not os.access(usual, os.W_OK):
+        return None
+    return str(usual)
