@@ -9,7 +9,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.hints import after, after_usage, meant_command, with_arguments
+from paramreduce_cli.cli.hints import after, after_usage, meant_command, of_usage, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
 from paramreduce_cli.cli.terminal import complain, interruption, say, show_errors, show_warning
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
@@ -35,7 +35,7 @@ def main() -> None:
             complain(further)
         code = error.exit_code
     except click.ClickException as error:
-        show_errors(error.format_message())
+        show_errors(of_usage(error))
         complain(after_usage(error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):

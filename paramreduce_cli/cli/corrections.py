@@ -6,7 +6,16 @@ import shlex
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from paramreduce_cli.cli.here import config_meant, configs_in, project_above, results_meant
+from paramreduce_cli.config.examples import examples
+from paramreduce_cli.config.sections import keys_named
+from paramreduce_cli.stages import stages
+
 Words = list[str]
+_OF_CONFIGS = ("run", "export", "export-trajectory")
+"""Commands that take a config, beside the stages."""
+_LIKE = 0.8
+_OF_RESULTS = ("open", "inspect", "table")
 
 
 def corrected(message: str, words: Sequence[str]) -> str:
@@ -21,6 +30,79 @@ def corrected(message: str, words: Sequence[str]) -> str:
         if mended is not None:
             return shlex.join(["paramreduce", *mended])
     return ""
+
+
+def misplaced(message: str, words: Sequence[str]) -> str:
+    """The same for who names a robot, but not what the command takes of it, or is in another folder."""
+    if further_up := _from_above(message, list(words)):
+        return further_up
+    for rule in (_no_config, _other_kind, _example, _misspelt):
+        mended = rule(message, list(words))
+        if mended is not None and mended != list(words):
+            return shlex.join(["paramreduce", *mended])
+    return ""
+
+
+def _no_config(message: str, words: Words) -> Words | None:
+    """The first config here, where none is given."""
+    if not re.search(r"Missing argument 'CONFIG'|Give a CONFIG|without a config, say", message):
+        return None
+    if any(word.startswith("--samples") for word in words):
+        return None
+    here = configs_in(Path())
+    return [words[0], str(here[0]), *words[1:]] if here else None
+
+
+def _other_kind(_: str, words: Words) -> Words | None:
+    """A robot's config where its results are given, or the other way round, or its name alone."""
+    if len(words) == 1 and (config := config_meant(words[0])) is not None:
+        return ["run", str(config)]
+    for place, word in enumerate(words[1:], 1):
+        if word.startswith("-") or words[place - 1].startswith("--"):
+            continue
+        config, results = config_meant(word), results_meant(word)
+        if words[0] in (*stages, *_OF_CONFIGS) and config is not None:
+            return [*words[:place], str(config), *words[place + 1 :]]
+        if words[0] in _OF_RESULTS and results is not None and Path(word).suffix != ".h5":
+            return [*words[:place], str(results), *words[place + 1 :]]
+        if words[0] in _OF_RESULTS and config is not None:
+            return ["run", str(config)]
+    return None
+
+
+def _example(message: str, words: Words) -> Words | None:
+    """A robot that comes along, and is not here yet."""
+    known = examples()
+    asked = [word for word in words[1:] if not word.startswith("-")]
+    if not asked:
+        return None
+    if words[0] == "init":
+        return ["init", "--example", *asked] if words[1:] == asked and asked[0] in known else None
+    if words[0] not in (*stages, *_OF_CONFIGS, *_OF_RESULTS):
+        return None
+    name = Path(asked[0]).name.removesuffix(".yaml")
+    if name not in known or not re.search("no such file|is not there", message):
+        return None
+    return ["init", "--example", name]
+
+
+def _misspelt(message: str, words: Words) -> Words | None:
+    """A robot's name that is nearly that of one here."""
+    named = re.match(r"([\w-]+): there is no such file", message)
+    if named is None or words[0] not in (*stages, *_OF_CONFIGS):
+        return None
+    here = {path.stem: path for path in configs_in(Path())}
+    near = difflib.get_close_matches(named[1], here, n=1, cutoff=_LIKE)
+    return _exchanged(words, named[1], str(here[near[0]])) if near else None
+
+
+def _from_above(message: str, words: Words) -> str:
+    """The same call in the folder further up where the config is."""
+    above = project_above(Path())
+    named = re.match(r"(\S+): there is no such file", message)
+    if above is None or named is None or not (above / named[1]).exists():
+        return ""
+    return f"cd {above} && {shlex.join(['paramreduce', *words])}"
 
 
 def _file(message: str, words: Words) -> Words | None:
@@ -40,7 +122,7 @@ def _results(message: str, words: Words) -> Words | None:
 def _setting(message: str, words: Words) -> Words | None:
     found = re.match(r"--set (([^=\s]+)=(.*?)): .*did you mean (\S+)\?", message)
     if found is None:
-        return None
+        return _deeper(message, words)
     whole, key, value, meant = found.groups()
     if wrong := re.search(r": key '(\S+)' is not known", message):
         key = ".".join(meant if name == wrong[1] else name for name in key.split("."))
@@ -49,15 +131,29 @@ def _setting(message: str, words: Words) -> Words | None:
     return _exchanged(words, whole, f"{key}={value}")
 
 
-def _choice(message: str, words: Words) -> Words | None:
-    """One of those that there are, the likest."""
-    found = re.match(r"--\S+ (\S+): there is ([^;]+?)[;.]?(?: with .*)?$", message)
+def _deeper(message: str, words: Words) -> Words | None:
+    """A key of the one section that has it, where its name alone is given."""
+    found = re.match(r"--set ((\w+)=.*?): \2: key '\2' is not known", message)
     if found is None:
         return None
-    wanted, number = found[1], found[1].partition(":")[2]
-    offered = [_in_range(name, number) for name in found[2].split(", ")]
-    near = difflib.get_close_matches(wanted, offered, n=1, cutoff=0.0)
-    return _exchanged(words, wanted, near[0])
+    places = keys_named(found[2])
+    value = found[1].partition("=")[2]
+    return _exchanged(words, found[1], f"{places[0]}={value}") if len(places) == 1 else None
+
+
+def _choice(message: str, words: Words) -> Words | None:
+    """One of those that there are, the likest."""
+    found = re.match(r"--\S+ (\S+): there is ([^;]+?)(?:;.*|\.)?$", message)
+    if found is None:
+        return None
+    wanted, (name, _, number) = found[1], found[1].partition(":")
+    selected = re.search(r"; (\S+):(\d+) is selected", message)
+    if selected and name.isdecimal():
+        name, number = selected[1], name
+    offered = found[2].split("; ")[0].split(", ")
+    begun = [one for one in offered if one.split(":")[0].startswith(name)]
+    near = begun or difflib.get_close_matches(name, offered, n=1, cutoff=0.0)
+    return _exchanged(words, wanted, _in_range(near[0], number or (selected or ("", "", ""))[2]))
 
 
 def _in_range(name: str, number: str) -> str:

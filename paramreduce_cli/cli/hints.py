@@ -11,10 +11,11 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.places import SUMMARY
-from paramreduce_cli.cli.corrections import corrected
+from paramreduce_cli.cli.corrections import corrected, misplaced
+from paramreduce_cli.cli.here import configs_in, results_in
 from paramreduce_cli.stages import stages
 
-_LEAST_LIKE = 0.5
+_LEAST_LIKE = 0.6
 _LIKE = 0.75
 """How alike options must be: all look alike a little, by their dashes."""
 
@@ -35,18 +36,44 @@ def next_command(command: click.Command | None) -> str:
         return "paramreduce --help lists all commands; paramreduce alone says what to do next."
     example = re.search(r"Example: (paramreduce .*(?:\n.+)*)", inspect.cleandoc(command.help or ""))
     more = f"paramreduce {command.name} --help says more."
-    return f"Example: {' '.join(example[1].split())}\n{more}" if example else more
+    return f"Example: {_of_here(' '.join(example[1].split()))}\n{more}" if example else more
+
+
+def _of_here(example: str) -> str:
+    """An example with a robot that is here; where there is none, with what brings its own."""
+    configs, results = configs_in(Path()), results_in(Path())
+    named = re.findall(r"(?:configs|results)/[\w./-]+", example)
+    first = ""
+    for path in (Path(name) for name in named):
+        of_configs = path.suffix == ".yaml"
+        here = configs if of_configs else results
+        if here and not path.exists():
+            example = example.replace(str(path), shlex.quote(str(here[0])))
+        elif not of_configs and not here and configs:
+            first = f"\nFirst: paramreduce run {shlex.quote(str(configs[0]))} makes results."
+    if named and not configs and not results:
+        first = "\nFirst: paramreduce init --example puma560 writes its config."
+    return example + first
 
 
 def after(message: str, command: click.Command | None) -> str:
     """What to type next, where an error does not say it itself; empty where it does."""
+    typed = sys.argv[1:]
+    if mended := misplaced(message, typed):
+        return f"Next: {mended}"
     if re.search(r"paramreduce [a-z]|`pip install ", message):
         return ""
-    typed = sys.argv[1:]
     mended = corrected(message, typed)
     if not mended:
         return next_command(command)
     return f"{'Then again' if shlex.split(mended)[1:] == typed else 'Next'}: {mended}"
+
+
+def of_usage(error: click.ClickException) -> str:
+    """What is wrong with a call that cannot be read; click guesses options by their spelling alone."""
+    if isinstance(error, click.NoSuchOption):
+        return f"there is no option {error.option_name}."
+    return error.format_message()
 
 
 def after_usage(error: click.ClickException) -> str:
@@ -59,12 +86,17 @@ def after_usage(error: click.ClickException) -> str:
         if meant:
             mended = [_exchanged(word, error.option_name, meant) for word in typed]
             return f"Next: {shlex.join(['paramreduce', *mended])}"
-    return next_command(command)
+    mended_call = misplaced(error.format_message(), sys.argv[1:])
+    return f"Next: {mended_call}" if mended_call else next_command(command)
 
 
 def _meant_option(name: str, command: click.Command) -> str | None:
-    """The option that is spelt alike, or begins with the one letter that was typed."""
-    taken = (parameter for parameter in command.params if isinstance(parameter, click.Option))
+    """The option that takes the value, is spelt alike, or begins with the one letter that was typed."""
+    taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+    value = " ".join(sys.argv).partition(name)[2].lstrip(" =").split(" ")[0]
+    for parameter in taken:
+        if isinstance(parameter.type, click.Choice) and value in parameter.type.choices:
+            return parameter.opts[0]
     options = [option for parameter in taken for option in parameter.opts]
     if not name.startswith("--"):
         begun = [option for option in options if option.startswith(f"-{name}")]

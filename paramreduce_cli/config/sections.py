@@ -36,6 +36,17 @@ def _walk(model: type[BaseModel], path: Key) -> Iterator[tuple[type, Key]]:
                 yield from _walk(kind, (*path, name))
 
 
+def keys_named(name: str) -> list[str]:
+    """Keys inside sections that are called like that; of several those that are least deep."""
+    places = [
+        (*path, name)
+        for kind, path in _keys().items()
+        if issubclass(kind, BaseModel) and name in kind.model_fields
+    ]
+    least = min(map(len, places), default=0)
+    return [".".join(map(str, place)) for place in places if len(place) == least]
+
+
 def is_section(kind: type) -> bool:
     """Whether a type is a section of a config."""
     return kind is Robot or kind in _keys()

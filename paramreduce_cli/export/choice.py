@@ -58,9 +58,12 @@ def chosen_model(
     row = choice.row(reduction)
     if row is None:
         others = f"{FULL}, {BASE}, " if model is not None else ""
+        chosen = (
+            validation and f"; {validation.selected.heuristic}:{validation.selected.n} is selected"
+        )
         raise ConfigError(
-            f"--model {text}: there is {others}{known_choices(reduction)}; with a config and a log also "
-            f"{IDENTIFIED} and {CONSISTENT}."
+            f"--model {text}: there is {others}{known_choices(reduction)}{chosen or ''}; with a config and a "
+            f"log also {IDENTIFIED} and {CONSISTENT}."
         )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {share(error)}"

@@ -4,6 +4,7 @@ import json
 import re
 import shutil
 import sys
+from pathlib import Path
 
 import h5py
 import pytest
@@ -18,11 +19,16 @@ MOVES = [
     (["optimise-trajectories", "x.yaml"], "did you mean `paramreduce optimize-trajectories`"),
     (["help"], "see `paramreduce --help`"),
     (["-v"], "paramreduce --help lists all commands"),
-    (["run"], "Example: paramreduce run configs/puma560.yaml"),
+    (["run"], "Next: paramreduce run configs/two_link.yaml"),
     (["run", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
+    (["two_link"], "Next: paramreduce run configs/two_link.yaml"),
+    (["configs/two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
+    (["run", "two_lnik"], "Next: paramreduce run configs/two_link.yaml"),
+    (["run", "done/model.h5"], "Example: paramreduce run configs/two_link.yaml"),
+    (["run", "configs/puma560.yaml"], "Next: paramreduce init --example puma560"),
     (["run", "two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
     (["run", "configs/two_lnik.yaml"], "Did you mean configs/two_link.yaml?"),
-    (["run", "configs"], "Example: paramreduce run configs/puma560.yaml"),
+    (["run", "configs"], "Example: paramreduce run configs/two_link.yaml"),
     (["run", "notes.txt"], "`paramreduce init --dh NAME` writes one"),
     (["run", "one.urdf"], "`paramreduce init one.urdf` makes a config of it"),
     (["run", "my_arm.urdf"], "`paramreduce init --dh my_arm` writes one"),
@@ -42,8 +48,10 @@ MOVES = [
      "Next: paramreduce run configs/two_link.yaml --set selected.heuristic=swap"),
     (["run", "configs/two_link.yaml", "--set", "selectd.n=3"],
      "Next: paramreduce run configs/two_link.yaml --set selected.n=3"),
+    (["run", "configs/two_link.yaml", "--set", "n=3"],
+     "Next: paramreduce run configs/two_link.yaml --set selected.n=3"),
     (["run", "configs/two_link.yaml", "--set", "selected.n=many"], "write one such as"),
-    (["run", "configs/two_link.yaml", "--jobs", "0"], "paramreduce run --help says more"),
+    (["run", "configs/two_link.yaml", "--jobs", "0"], "Example: paramreduce run configs/two_link.yaml"),
     (["run", "configs/two_link.yaml", "--results", "notes.txt"], "Example: paramreduce run"),
     (["run", "configs/two_link.yaml", "more"], "Example: paramreduce run"),
     (["reduce", "configs/two_link.yaml", "--results", "fresh"],
@@ -54,12 +62,18 @@ MOVES = [
     (["report", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
     (["reduce-terms", "configs/two_link.yaml", "--results", "done"], "such as `terms: {torque_error: 0.01}`"),
     (["process-log", "configs/two_link.yaml", "--results", "done"], "`paramreduce init ROBOT.urdf --log FILE`"),
-    (["export"], "Next: paramreduce export --results results/my_samples"),
+    (["export"], "Next: paramreduce export configs/two_link.yaml"),
     (["export", "two_link"], "Next: paramreduce export configs/two_link.yaml"),
     (["export", "configs/two_link.yaml"], "`paramreduce build-model configs/two_link.yaml`"),
     (["export", "configs/two_link.yaml", "--format", "java"], "'c', 'casadi'"),
     (["export", "configs/two_link.yaml", "--results", "done", "--model", "swap:99"],
      "Next: paramreduce export configs/two_link.yaml --results done --model swap:7"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "3"],
+     "Next: paramreduce export configs/two_link.yaml --results done --model forward-selection:3"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "best"],
+     "Next: paramreduce export configs/two_link.yaml --results done --model best-subset:4"),
+    (["export", "configs/two_link.yaml", "--lang", "matlab"],
+     "Next: paramreduce export configs/two_link.yaml --format matlab"),
     (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "add --what idm"),
     (["export", "configs/two_link.yaml", "--results", "done", "--format", "urdf"],
      "`paramreduce init ROBOT.urdf` writes"),
@@ -76,6 +90,9 @@ MOVES = [
     (["compare", "done"], "Example: paramreduce compare"),
     (["compare", "done", "dome"], "Did you mean done?"),
     (["compare", "done", "summary.json"], "make it again with `paramreduce run CONFIG`"),
+    (["inspect", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
+    (["open", "configs/two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
+    (["validate"], "Next: paramreduce validate configs/two_link.yaml"),
     (["table"], "Example: paramreduce table"),
     (["table", "."], "`paramreduce table done`"),
     (["open"], "Example: paramreduce open"),
@@ -83,6 +100,7 @@ MOVES = [
     (["open", "results/none"], "`paramreduce run CONFIG`"),
     (["init"], "`paramreduce init robot.urdf`"),
     (["init", "nothing.urdf"], "give the path of a URDF or MJCF"),
+    (["init", "ur10"], "Next: paramreduce init --example ur10"),
     (["init", "one.urdf"], "Next: paramreduce init one.urdf --floating"),
     (["init", "--example", "pmua560"], "Next: paramreduce init --example puma560"),
     (["init", "--dh", "two_link"], "choose another with --output"),
@@ -119,9 +137,43 @@ def folder(two_link_results, tmp_path, monkeypatch):
 def test_what_does_not_work_says_what_does(invoke, folder, words, told):
     said = invoke(*words, code=2)
     assert told in said.out + said.err
-    assert re.search(r"paramreduce (--help|[a-z-]+ \S)", said.err)  # something to type as it stands
+    suggested = re.findall(r"paramreduce (?:--help|[a-z-]+(?: \S+)*)", said.err.replace("`", "\n"))
+    assert suggested  # something to type as it stands, of what is here
+    for command in suggested:
+        for path in re.findall(r"(?:configs|results)/[\w./-]+", command):
+            assert path in words or "--results" in command or Path(path.rstrip(".")).exists(), (
+                command
+            )
     assert "Traceback" not in said.err
     assert not (folder / "results").exists() or not list((folder / "results").rglob("*.h5"))
+
+
+def test_results_are_named_by_their_robot(invoke, folder):
+    shutil.copytree(folder / "done", folder / "results" / "two_link")
+    for words in (
+        ["open", "two_link"],
+        ["open", "configs/two_link.yaml"],
+        ["open", "results/two_link/report/index.html"],
+        ["inspect", "configs/two_link.yaml"],
+    ):
+        assert f"Next: paramreduce {words[0]} results/two_link\n" in invoke(*words, code=2).err
+    for words in (["run", "results/two_link"], ["validate", "results/two_link/model.h5"]):
+        assert f"Next: paramreduce {words[0]} configs/two_link.yaml\n" in invoke(*words, code=2).err
+
+
+def test_in_another_folder_it_says_where_to_go(invoke, folder, monkeypatch):
+    (folder / "configs" / "deep").mkdir()
+    monkeypatch.chdir(folder / "configs" / "deep")
+    said = invoke("run", "configs/two_link.yaml", code=2).err
+    assert "Next: cd ../.. && paramreduce run configs/two_link.yaml" in said
+    assert "cd ../.." in invoke().out
+    monkeypatch.chdir(folder / "done")
+    assert "paramreduce open ." in invoke().out
+
+
+def test_without_any_robot_an_example_says_how_to_get_one(invoke, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    assert "First: paramreduce init --example puma560" in invoke("run", code=2).err
 
 
 @pytest.mark.parametrize("words", [["inspect", "results/two_link"], ["report", "configs/two_link.yaml"], ["open", "results/two_link"]], ids=" ".join)  # fmt: skip

@@ -87,7 +87,7 @@ def export(
 
     Without a CONFIG, of samples that were brought, values alone can be written.
 
-    Example: paramreduce export configs/puma560.yaml --format c --model best-subset:18
+    Example: paramreduce export configs/puma560.yaml --format matlab --what idm
     """
     loaded = load_config(config, overrides) if config is not None else None
     store = results_store(loaded, results)

@@ -41,7 +41,7 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
 
     `inspect selected` is that of the only results here.
 
-    Example: paramreduce inspect results/puma560/reduction.h5 --model forward-selection:18
+    Example: paramreduce inspect results/puma560 --model selected
     """
     if str(file) == "selected" and not file.exists():
         file = _only_results()

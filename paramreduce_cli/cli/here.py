@@ -1,0 +1,81 @@
+"""What is in a folder: configs of robots, and their results; told without reading more than beginnings."""
+
+import re
+from pathlib import Path
+
+from paramreduce_cli.artifacts.places import SUMMARY
+
+_READ = 100_000
+"""Characters of a file in which a config must have begun."""
+_UP = 4
+"""Folders above in which configs are looked for."""
+_CONFIGS, _RESULTS = Path("configs"), Path("results")
+
+
+def configs_in(folder: Path) -> list[Path]:
+    """Configs in a folder or in its ``configs``, as seen from there; those with results first."""
+    found = [*sorted(folder.glob("*.yaml")), *sorted((folder / _CONFIGS).glob("*.yaml"))]
+    configs = [path.relative_to(folder) for path in found if _is_config(path)]
+    return sorted(configs, key=lambda path: not has_report(folder / results_of(folder / path)))
+
+
+def project_above(folder: Path) -> Path | None:
+    """The nearest folder above with configs, as seen from there; None if there is none."""
+    for k in range(1, _UP + 1):
+        above = Path("/".join([".."] * k))
+        if (folder / above / _CONFIGS).is_dir() and configs_in(folder / above):
+            return above
+    return None
+
+
+def _is_config(path: Path) -> bool:
+    """Whether it names a robot, and more than that."""
+    try:
+        with path.open(encoding="utf-8", errors="replace") as file:
+            text = file.read(_READ)
+    except OSError:
+        return False
+    keys = re.findall(r"^(\w+):", text, re.MULTILINE)
+    return "robot" in keys and len(keys) > 1
+
+
+def results_of(config: Path) -> Path:
+    """Where the results of a config go, from where commands are called."""
+    text = config.read_text(encoding="utf-8", errors="replace")
+    named = re.search(r"^robot:\s*[\"']?([\w.-]+)", text, re.MULTILINE)
+    return _RESULTS / (named[1] if named else config.stem)
+
+
+def has_report(results: Path) -> bool:
+    """Whether a run ended there."""
+    return (results / SUMMARY).exists()
+
+
+def results_in(folder: Path) -> list[Path]:
+    """Folders of finished runs in ``results`` of a folder, or in itself."""
+    return [
+        path
+        for place in (folder / _RESULTS, folder)
+        for path in sorted(place.glob("*"))
+        if has_report(path)
+    ]
+
+
+def config_meant(word: str) -> Path | None:
+    """The config of what may be the name of a robot, its results or something in these."""
+    found = _CONFIGS / f"{_robot(word)}.yaml"
+    return found if found.is_file() else None
+
+
+def results_meant(word: str) -> Path | None:
+    """Results of what may be the name of a robot, its config or something in its results."""
+    found = _RESULTS / _robot(word)
+    return found if found.is_dir() else None
+
+
+def _robot(word: str) -> str:
+    """Whose config, results or name it is."""
+    parts = Path(word).parts
+    if len(parts) > 1 and parts[0] == _RESULTS.name:
+        return parts[1]
+    return Path(word).name.removesuffix(".yaml")
