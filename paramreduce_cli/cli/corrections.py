@@ -7,8 +7,6 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from paramreduce_cli.cli.here import config_meant, configs_in, project_above, results_meant
-from paramreduce_cli.config.examples import examples
-from paramreduce_cli.config.sections import keys_named
 from paramreduce_cli.stages import stages
 
 Words = list[str]
@@ -72,6 +70,8 @@ def _other_kind(_: str, words: Words) -> Words | None:
 
 def _example(message: str, words: Words) -> Words | None:
     """A robot that comes along, and is not here yet."""
+    from paramreduce_cli.config.examples import examples  # late: it loads much
+
     known = examples()
     asked = [word for word in words[1:] if not word.startswith("-")]
     if not asked:
@@ -136,6 +136,8 @@ def _deeper(message: str, words: Words) -> Words | None:
     found = re.match(r"--set ((\w+)=.*?): \2: key '\2' is not known", message)
     if found is None:
         return None
+    from paramreduce_cli.config.sections import keys_named  # late: it loads much
+
     places = keys_named(found[2])
     value = found[1].partition("=")[2]
     return _exchanged(words, found[1], f"{places[0]}={value}") if len(places) == 1 else None
