@@ -24,3 +24,10 @@ def __getattr__(name: str) -> Any:
         if name in api.__all__:
             return getattr(api, name)
     raise AttributeError(f"module 'paramreduce_cli' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """What there is, for completion in notebooks and for ``help``."""
+    import paramreduce_cli.api as api
+
+    return sorted([*globals(), *api.__all__])

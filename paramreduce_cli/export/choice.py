@@ -116,4 +116,5 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation)"
     )
-    return ReducedModel(term.names, term.values, term.position, term.names), term, title
+    fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
+    return ReducedModel(term.names, term.values, term.position, fitted_again), term, title

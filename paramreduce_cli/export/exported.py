@@ -177,6 +177,16 @@ _C_WORDS = frozenset(
 """Words of C and C++, and names that their programs have already."""
 
 
+_MADE_OF = (
+    "Parameters, {}; each is followed by what it is made of, ordered and counted",
+    "by the values in the config; what is zero there is left out:",
+)
+_FITTED = (
+    "Parameters, {}; fitted to this function, whose terms are fewer, so",
+    "that they are no combinations of those in the config:",
+)
+
+
 def identifier(name: str) -> str:
     """A name that every language takes for an identifier, and that means nothing else there."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
@@ -212,16 +222,17 @@ def about(model: ExportedModel, first: int = 0) -> list[str]:
         lines += ["", "Dependent coordinates, in the order of the rows of R and b:"]
         lines += _listed(model, model.dependent, first)
     kind = "constants of the code" if model.constant else "in this order"
+    explained = any(p.expression for p in model.parameters)
     lines += [
         "",
         "First moments and inertias are about the origin of their body's frame, in its axes. Frames:",
         *(plain(line) for line in model.frames),
         "",
-        f"Parameters, {kind}; each is followed by what it is made of, ordered and counted",
-        "by the values in the config; what is zero there is left out:",
+        *(line.format(kind) for line in (_MADE_OF if explained else _FITTED)),
     ]
     for k, p in enumerate(model.parameters, first):
-        lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}, {plain(p.expression)}")
+        made_of = f", {plain(p.expression)}" if p.expression else ""
+        lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}{made_of}")
     return lines
 
 

@@ -32,7 +32,9 @@ def values_file(
         "from": origin,
         "paramreduce": __version__,
         "parameters": [
-            {"name": name, "value": value, **(units[k] if units else {}), "stands_for": expression}
+            {"name": name, "value": value}
+            | (units[k] if units else {})
+            | ({"stands_for": expression} if expression else {})
             for k, name, value, expression in found
         ],
         **known,

@@ -16,15 +16,15 @@ class Kind(Enum):
 
     The smaller the rank, the more a kind is wanted among the base parameters. For revolute arms
     these ranks yield Khalil's set [Khalil1987]: Izz of the first body and seven parameters of every
-    other one, with Iyy, mz and m regrouped. In formulas d is the first moment, as I is the tensor.
+    other one, with Iyy, mz and m regrouped. In formulas m with an axis is the first moment.
     Units of what belongs to a drive are those of one that turns; one that slides has N for N m and
     m for rad.
     """
 
     M = ("m", "kg", 9, "m", "")
-    MX = ("mx", "kg m", 5, "d", "x")
-    MY = ("my", "kg m", 6, "d", "y")
-    MZ = ("mz", "kg m", 8, "d", "z")
+    MX = ("mx", "kg m", 5, "m", "x")
+    MY = ("my", "kg m", 6, "m", "y")
+    MZ = ("mz", "kg m", 8, "m", "z")
     IXX = ("Ixx", "kg m^2", 1, "I", "xx")
     IXY = ("Ixy", "kg m^2", 2, "I", "xy")
     IXZ = ("Ixz", "kg m^2", 3, "I", "xz")

@@ -16,12 +16,27 @@
   // Colours of curves stand out from white; on a dark page they are lightened, but not on paper.
   const shade = (own) => (dark.matches ? `color-mix(in srgb, ${own} 60%, white)` : own);
   // A canvas as PNG, on the ground that it lies on.
-  function picture(canvas) {
-    const copy = Object.assign(document.createElement("canvas"), { width: canvas.width, height: canvas.height });
+  // One or several, one below the other, and what their colours mean.
+  function picture(canvases, names = []) {
+    const width = Math.max(...canvases.map((c) => c.width)), scale = window.devicePixelRatio || 1;
+    const drawn = canvases.reduce((sum, c) => sum + c.height, 0), line = 18 * scale;
+    const copy = element("canvas", { width, height: drawn + line * names.length + (names.length ? line / 2 : 0) });
     const context = copy.getContext("2d");
     context.fillStyle = colour("--card");
     context.fillRect(0, 0, copy.width, copy.height);
-    context.drawImage(canvas, 0, 0);
+    let at = 0;
+    for (const canvas of canvases) {
+      context.drawImage(canvas, 0, at);
+      at += canvas.height;
+    }
+    context.font = `${12 * scale}px system-ui`;
+    for (const [text, ink] of names) {
+      at += line;
+      context.fillStyle = ink;
+      context.fillRect(12 * scale, at - 5 * scale, 18 * scale, 3 * scale);
+      context.fillStyle = colour("--ink");
+      context.fillText(text, 38 * scale, at);
+    }
     return copy.toDataURL();
   }
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
@@ -152,7 +167,9 @@
       const joint = joints[+j];
       const error = curve.joints[set][row * nDof + joint.index];
       const share = joint.rms[set] > 1e-100 ? percent(error / joint.rms[set]) : "no torque";
-      cell.textContent = joint.unit ? `${share}, ${Number(error.toPrecision(2))} ${joint.unit}` : share;
+      // Where there is little room the line breaks between both, not within one.
+      const parts = joint.unit ? [`${share},`, `${Number(error.toPrecision(2))} ${joint.unit}`] : [share];
+      cell.replaceChildren(...parts.flatMap((text, k) => [...(k ? [" "] : []), element("span", { textContent: text })]));
     });
   });
 
@@ -366,7 +383,8 @@
   }
   for (const name of ["error-chart", "inverse-chart", "direct-chart"]) {
     const place = part(name);
-    if (place) savable(place, `${name}.png`, () => picture(place.querySelector("canvas")));
+    const names = () => curves.flatMap((c, k) => (state.hidden.has(k) ? [] : [[c.names.join(", "), shade(c.colour)]]));
+    if (place) savable(place, `${name}.png`, () => picture([place.querySelector("canvas")], names()));
   }
 
   // Torques along the motion with what is missed; drawn when they come into view.
@@ -380,7 +398,8 @@
     place.append(upper, lower);
     part("torques").append(place);
     const given = Float64Array.from({ length: nSamples }, (_, t) => motion.tau[t * nDof + joint.index]);
-    savable(place, `torque-${joint.name}.png`, () => picture(upper.querySelector("canvas")));
+    const names = () => [[`${joint.name}${unit}, ${first}`, colour("--blue")], [`${curves[state.curve].names[0]}:${curves[state.curve].n[state.row]}`, colour("--ink")], ["what it misses", colour("--bad")]];
+    savable(place, `torque-${joint.name}.png`, () => picture([upper, lower].map((one) => one.querySelector("canvas")), names()));
     let charts = null;
     const show = (model) => {
       const values = torque(model, joint.index);
@@ -416,11 +435,13 @@
 
   // ---- the mechanism, moving
 
+  const FAR = 3; // times its reach: where it is seen from
+
   if (figure) mechanism(part("mechanism"));
   function mechanism(place) {
     place.hidden = false;
     const canvas = place.querySelector("canvas");
-    savable(place, "mechanism.png", () => picture(canvas));
+    savable(place, "mechanism.png", () => picture([canvas]));
     const [select, button, time] = ["select", "button", "input"].map((name) => place.querySelector(name));
     const nPoints = figure.count;
     const points = new Float32Array(figure.points.length);
@@ -431,19 +452,19 @@
     select.replaceChildren(...motions.map(({ name }, k) => new Option(name, k)));
     select.hidden = motions.length < 2;
     let now = motions[0];
-    const [middle, reach] = extent();
-    const view = { azimuth: widest() + 0.35, elevation: 0.38, frame: 0, playing: false, drag: null };
+    let [middle, reach, floor] = extent();
+    const view = { azimuth: widest() + 0.35, elevation: 0.38, frame: 0, playing: false, drag: null, zoom: 1 };
     let shares = new Map();
     time.max = now.frames - 1;
     view.frame = mostSpread();
     time.value = view.frame;
     function extent() {
       const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
-      for (let k = 0; k < points.length; k++) {
+      for (let k = 3 * now.begin * nPoints; k < 3 * (now.begin + now.frames) * nPoints; k++) {
         if (points[k] < low[k % 3]) low[k % 3] = points[k];
         if (points[k] > high[k % 3]) high[k % 3] = points[k];
       }
-      return [low.map((v, k) => (v + high[k]) / 2), Math.max(...low.map((v, k) => high[k] - v), 1e-9)];
+      return [low.map((v, k) => (v + high[k]) / 2), Math.max(...low.map((v, k) => high[k] - v), 1e-9), low[2]];
     }
     function mostSpread() {
       let [best, most] = [0, -1];
@@ -473,25 +494,37 @@
       context.setTransform(scale, 0, 0, scale, 0, 0);
       context.clearRect(0, 0, width, height);
       const [ca, sa, ce, se] = [Math.cos(view.azimuth), Math.sin(view.azimuth), Math.cos(view.elevation), Math.sin(view.elevation)];
-      const zoom = (0.8 * Math.min(width, height)) / reach;
+      const zoom = (0.9 * view.zoom * Math.min(width, height)) / reach;
+      const placed = (...point) => {
+        const [x, y, z] = point.map((value, i) => value - middle[i]);
+        const across = -sa * x + ca * y, near = ca * x + sa * y;
+        const depth = ce * near + se * z;
+        const size = zoom / (1 - depth / (FAR * reach));
+        return [width / 2 + size * across, height / 2 - size * (ce * z - se * near), depth];
+      };
       const project = (k) => {
         const at = 3 * ((now.begin + view.frame) * nPoints + k);
-        const [x, y, z] = [0, 1, 2].map((i) => points[at + i] - middle[i]);
-        const across = -sa * x + ca * y, near = ca * x + sa * y;
-        return [width / 2 + zoom * across, height / 2 - zoom * (ce * z - se * near), ce * near + se * z];
+        return placed(points[at], points[at + 1], points[at + 2]);
       };
+      // The ground, as a grid under all that moves.
+      context.lineWidth = 1;
+      context.strokeStyle = colour("--line");
+      const half = 0.6 * reach;
+      const line = (from, to) => { context.beginPath(); context.moveTo(from[0], from[1]); context.lineTo(to[0], to[1]); context.stroke(); };
+      for (let i = 0; i <= 8; i++) {
+        const at = half * (i / 4 - 1), [mx, my] = middle;
+        line(placed(mx + at, my - half, floor), placed(mx + at, my + half, floor));
+        line(placed(mx - half, my + at, floor), placed(mx + half, my + at, floor));
+      }
       const pieces = figure.lines.map(([a, b, owner, kind]) => ({ from: project(a), to: project(b), owner, kind }));
       pieces.sort((p, q) => p.from[2] + p.to[2] - q.from[2] - q.to[2]);
       context.lineCap = "round";
       const [none, all, unknown] = [colour("--orange"), colour("--blue"), colour("--soft")];
       for (const piece of pieces) {
         const share = shares.get(figure.owners[piece.owner]);
-        context.strokeStyle = share === undefined ? unknown : `color-mix(in srgb, ${all} ${Math.round(100 * share)}%, ${none})`;
+        context.strokeStyle = share === undefined ? unknown : `color-mix(in oklch, ${all} ${Math.round(100 * share)}%, ${none})`;
         context.lineWidth = { link: 7, mass: 4, loop: 5, rail: 2, axis: 11 }[piece.kind];
-        context.beginPath();
-        context.moveTo(piece.from[0], piece.from[1]);
-        context.lineTo(piece.to[0], piece.to[1]);
-        context.stroke();
+        line(piece.from, piece.to);
       }
     }
     followers.push((curve, row, model) => {
@@ -507,6 +540,7 @@
     time.addEventListener("input", () => { view.frame = +time.value; draw(); });
     select.addEventListener("change", () => {
       now = motions[select.value];
+      [middle, reach, floor] = extent();
       time.max = now.frames - 1;
       time.value = view.frame = Math.min(view.frame, now.frames - 1);
       draw();
@@ -538,7 +572,18 @@
       view.elevation = Math.min(1.5, Math.max(-1.5, view.elevation + up));
       draw();
     }
+    function closer(times) {
+      view.zoom = Math.min(8, Math.max(0.3, view.zoom * times));
+      draw();
+    }
+    canvas.addEventListener("wheel", (event) => {
+      if (document.activeElement !== canvas) return; // else the page is scrolled
+      event.preventDefault();
+      closer(Math.exp(-event.deltaY / 400));
+    }, { passive: false });
     canvas.addEventListener("keydown", (event) => {
+      const times = { "+": 1.2, "=": 1.2, "-": 1 / 1.2 }[event.key];
+      if (times) closer(times);
       const way = { ArrowLeft: [-0.1, 0], ArrowRight: [0.1, 0], ArrowUp: [0, -0.1], ArrowDown: [0, 0.1] }[event.key];
       if (!way) return;
       event.preventDefault();

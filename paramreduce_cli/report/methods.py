@@ -206,7 +206,7 @@ def _terms(found: TermReduction) -> Iterator[str]:
             f"Terms of the {name} dynamics that hardly matter were left out or replaced by multiples of others, and the "
             f"{term.values.size} parameters fitted again "
             f"within a torque error of {share(found.torque_budget)}{acceleration}: {term.operations} operations instead of "
-            f"{term.operations_start}."
+            f"the {term.operations_start} of {term.heuristic} with {term.n_start} parameters, from which it began."
         )
 
 

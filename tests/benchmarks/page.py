@@ -1,9 +1,10 @@
 """Pages in a browser: `python -m tests.benchmarks.page RESULTS ...`.
 
-The size of a page, the time until it can be used, and what every step of the explorer's slider takes, layout
-included. Times are of this machine and of software rendering.
+The size of a page, the time until it can be used, what every step of the explorer's slider takes, layout
+included, and how many models it shows otherwise than the summary. Times are of this machine and of software rendering.
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -12,6 +13,7 @@ import rich.box
 import rich.console
 import rich.table
 from browser import complaints, opened
+from explored import explored
 
 _STEPS = """
 const slider = document.querySelector("[data-part=n]"), taken = [];
@@ -28,7 +30,8 @@ return taken;
 
 
 def measured(page):
-    """Seconds until the page is ready, at most; milliseconds until every step is shown; complaints of the console.
+    """Seconds until the page is ready, at most; milliseconds until every step is shown; models, those that are
+    shown wrongly, and complaints of the console.
 
     Args:
         page: Its file.
@@ -38,17 +41,29 @@ def measured(page):
         steps = driver.execute_async_script(
             f"const done = arguments[0]; (async () => {{ {_STEPS} }})().then(done);"
         )
-        return opening, np.array(steps), complaints(driver)
+        summary = json.loads((page.parent / "summary.json").read_text())
+        return opening, np.array(steps), *explored(driver, summary), complaints(driver)
 
 
 def main():
-    header = ("page", "MB", "ready, s", "steps", "median, ms", "worst, ms", "complaints")
+    header = (
+        "page",
+        "MB",
+        "ready, s",
+        "steps",
+        "median, ms",
+        "worst, ms",
+        "models",
+        "wrong",
+        "complaints",
+    )
     table = rich.table.Table(*header, box=rich.box.SIMPLE)
     for results in map(Path, sys.argv[1:]):
         page = (results / "report" / "index.html").resolve()
-        opening, steps, complained = measured(page)
+        opening, steps, models, wrong, complained = measured(page)
         size = page.stat().st_size / 1e6
-        numbers = (size, opening, steps.size, np.median(steps), steps.max(), len(complained))
+        times = (steps.size, np.median(steps), steps.max())
+        numbers = (size, opening, *times, models, len(wrong), len(complained))
         table.add_row(str(results), *(f"{number:.3g}" for number in numbers))
     rich.console.Console(width=110).print(table)
 

@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 import pytest
 from browser import MISSING, complaints, opened
+from explored import explored
 
 import paramreduce_cli as pr
 from paramreduce_cli.multibody.kinematics import body_poses
@@ -165,48 +166,13 @@ def test_every_step_of_the_slider_shows_its_model(page, summary):
         assert complaints(driver) == []
 
 
-_WALK = """
-const chosen = document.querySelector("[data-part=heuristic]"), slider = document.querySelector("[data-part=n]");
-const part = (name) => document.querySelector(`[data-part=${name}]`).textContent;
-const seen = [];
-for (const option of chosen.options) {
-  chosen.value = option.value;
-  chosen.dispatchEvent(new Event("change"));
-  for (let row = 0; row <= +slider.max; row++) {
-    slider.value = row;
-    slider.dispatchEvent(new Event("input"));
-    seen.push([option.textContent, ...["count", "torque", "acceleration", "inverse", "direct", "values"].map(part)]);
-  }
-}
-return seen;
-"""
-
-
 @in_browser
 def test_every_model_is_shown_with_the_numbers_of_the_tables(page, summary):
     with opened(page) as driver:
-        seen = driver.execute_script(_WALK)
+        count, wrong = explored(driver, summary)
         assert complaints(driver) == []
-    shown = {(name, int(n)): rest for names, n, *rest in seen for name in names.split(", ")}
-    rows = {(name, row["n"]): row for name, all in summary["validation"].items() for row in all}
-    assert shown.keys() == rows.keys()
-    for key, (torque, acceleration, inverse, direct, values) in shown.items():
-        row = rows[key]
-        for text, kind in ((torque, "torque_error"), (acceleration, "acceleration_error")):
-            assert same_numbers(text, [row[kind][s] for s in ("estimation", "validation")])
-        assert (inverse, direct) == tuple(str(row["operations"][f]) for f in ("inverse", "direct"))
-        assert values.count(" = ") == key[1]
-
-
-def same_numbers(text, errors):
-    """Whether shares are written as they are, to three digits."""
-    for told, error in zip(text.replace(" %", "").split(" / "), errors, strict=True):
-        if error is None or error >= 10:
-            if told not in ("∞", "> 1000"):
-                return False
-        elif float(told) / 100 != pytest.approx(error, rel=6e-3, abs=1e-10):
-            return False
-    return True
+    assert wrong == {}
+    assert count == sum(map(len, summary["validation"].values())) > 40
 
 
 @in_browser

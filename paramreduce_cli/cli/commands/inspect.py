@@ -95,7 +95,7 @@ def _say_contents(file: Path, as_json: bool) -> None:
         return
     _say_all({key: _briefly(value) for key, value in attributes.items()}, False)
     table = rich.table.Table(box=None, pad_edge=False)
-    table.add_column("dataset", overflow="fold")
+    table.add_column("dataset", no_wrap=True, overflow="ignore")
     table.add_column("shape", no_wrap=True)
     table.add_column("content", overflow="fold")
     for row in _folded(datasets):

@@ -8,10 +8,12 @@ from paramreduce_cli.texts.table import Table
 def latex(model: ExportedModel) -> dict[str, bytes]:
     """A table of the parameters: symbol, value, unit and what it is made of."""
     heading = "".join(f"% {plain(line)}".rstrip() + "\n" for line in model.heading)
+    columns: tuple[str, ...] = ("parameter", "value", "unit", "made of")
+    if not any(p.expression for p in model.parameters):
+        columns = columns[:-1]
     rows = tuple(
-        (p.name, f"{p.value:.6g}", p.unit.replace("^2", "²"), p.expression)
+        (p.name, f"{p.value:.6g}", p.unit.replace("^2", "²"), p.expression)[: len(columns)]
         for p in model.parameters
     )
-    title = f"{model.robot}: {len(rows)} parameters"
-    table = Table(title, ("parameter", "value", "unit", "made of"), rows)
+    table = Table(f"{model.robot}: {len(rows)} parameters", columns, rows)
     return {f"{model.name}_parameters.tex": (heading + latex_table(table, model.symbols)).encode()}

@@ -11,10 +11,10 @@ def approximate_base_parameters(data: ReportData) -> Table:
     selected = data.validation.selected
     model = selected.model
     rows = [
-        (str(k + 1), name, f"{value:.6g}", expression)
-        for k, (name, value, expression) in enumerate(
-            zip(model.names, model.values, model.expressions, strict=True)
+        (str(k + 1), name, f"{value:.6g}", data.unit(parameter).replace("^2", "²"), expression)
+        for k, (parameter, name, value, expression) in enumerate(
+            zip(model.first, model.names, model.values, model.expressions, strict=True)
         )
     ]
     title = f"Approximate base parameters: {selected.heuristic}, n = {selected.n}"
-    return Table(title, ("no.", "parameter", "φ' value", "made of"), tuple(rows))
+    return Table(title, ("no.", "parameter", "φ' value", "unit", "made of"), tuple(rows))
