@@ -50,7 +50,7 @@ def config_page() -> str:
             needed = key in section.get("required", ())
             default = "**must be given**" if needed else _code(entry.get("default"))
             text = _text(entry.get("description", ""))
-            cells = (f"`{key}`", _kind(entry, schema), _unit(text), default, _cell(text), _cell(examples.get(full, "")))  # fmt: skip
+            cells = (f"`{key}`", _kind(entry, schema), _unit(text), default, _cell(text), _cell(examples.get(full, "see below" if "section" in _kind(entry, schema) else "")))  # fmt: skip
             lines.append("| " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
@@ -190,9 +190,8 @@ def _kind(entry: Schema, schema: Schema) -> str:
         return f"`{entry['const']}`"
     if "anyOf" in entry:
         kinds = [_kind(one, schema) for one in entry["anyOf"] if one.get("type") != "null"]
-        if {"a number", "text"} <= set(kinds) and not any(
-            "pattern" in one for one in entry["anyOf"]
-        ):
+        numeric = {"a number", "a whole number"} & set(kinds)
+        if numeric and "text" in kinds and not any("pattern" in one for one in entry["anyOf"]):
             kinds.remove("text")  # arithmetic is written as text
         return " or ".join(dict.fromkeys(kinds))
     if entry.get("type") == "array":

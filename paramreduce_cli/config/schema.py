@@ -209,7 +209,7 @@ class Stop(Section):
     """Where a heuristic stops; if both are left out it orders all parameters."""
 
     torque_error: Positive | None = None
-    """Smallest subset whose torque error is at most this."""
+    """Smallest subset whose torque error is at most this, a share."""
     parameters: Count | None = None
     """Number of parameters."""
 
@@ -247,7 +247,7 @@ class OperationsCriterion(Section):
     """The criterion `operations`."""
 
     torque_error: Positive = 0.01
-    """Torque error on the estimation set up to which operations are minimised; higher ones are penalised."""
+    """Torque error on the estimation set up to which operations are minimised, a share; higher ones are penalised."""
 
 
 class ReductionSection(Section):

@@ -129,5 +129,9 @@ Number = Annotated[float, BeforeValidator(_ordinary), _TEXT_OR_NUMBER]
 """A finite float that may be written as arithmetic, such as ``pi/2``."""
 Limit = Annotated[float, BeforeValidator(_limit), _TEXT_OR_NUMBER]
 """The same, or ``inf`` for no limit."""
-Whole = Annotated[int, BeforeValidator(_whole), _TEXT_OR_NUMBER]
+Whole = Annotated[
+    int,
+    BeforeValidator(_whole),
+    WithJsonSchema({"anyOf": [{"type": "integer"}, {"type": "string"}]}),
+]
 """A whole number that may be written as arithmetic, such as ``1e3``."""
