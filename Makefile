@@ -10,7 +10,7 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster regression reference benchmark robots identification controllers pages torture graph clean
+.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression reference benchmark robots identification controllers pages torture graph clean
 .DEFAULT_GOAL := help
 
 help:
@@ -32,6 +32,7 @@ help:
 	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
 	@echo "make docs        build the site, and run what it tells to type"
 	@echo "make serve       the site, to read in a browser"
+	@echo "make test-pythons  the small case with every other Python from 3.11 to 3.13"
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
@@ -147,6 +148,10 @@ $(VENV)/.installed-docs: $(VENV)/.installed
 docs: $(VENV)/.installed-docs
 	NO_MKDOCS_2_WARNING=1 DISABLE_MKDOCS_2_WARNING=true $(BIN)/mkdocs build --quiet
 	PYTHONPATH=tests $(BIN)/python -m tests.docs $(DOCS)
+
+# From a wheel, against the committed reference; those that are not here are not tried.
+test-pythons: $(VENV)/.installed
+	$(BIN)/python -m tests.pythons
 
 # The site at http://localhost:8000.
 serve: $(VENV)/.installed-docs

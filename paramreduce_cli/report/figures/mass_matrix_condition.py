@@ -1,5 +1,6 @@
 """Health of the mass matrix."""
 
+import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.curves import curves
@@ -24,11 +25,12 @@ def mass_matrix_condition(data: ReportData) -> Figure:
                 markersize=4, markerfacecolor=fill, color=colour,
             )  # fmt: skip
     full = data.validation.full["mass_matrix_condition"]
-    axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
-    name = "full model" if data.identification is None else "values of the config"
-    axes.annotate(name, (1.0, full), xycoords=("axes fraction", "data"), ha="right",
-                  va="bottom", fontsize="small", color="#57606a")  # fmt: skip
-    axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
+    if np.isfinite(full):  # not where a last link has no inertia
+        axes.axhline(full, color="#57606a", linewidth=0.8, linestyle=":")
+        name = "full model" if data.identification is None else "values of the config"
+        axes.annotate(name, (1.0, full), xycoords=("axes fraction", "data"), ha="right",
+                      va="bottom", fontsize="small", color="#57606a")  # fmt: skip
+        axes.set_ylim(top=min(axes.get_ylim()[1], full * 1e6))
     mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel("largest κ(M) over the samples")
