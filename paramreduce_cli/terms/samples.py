@@ -40,24 +40,18 @@ class TermSamples:
     @cached_property
     def seeds(self) -> FloatArray:
         """Torques by outputs of the program, (n_outputs, n_dof, n_samples)."""
-        n = len(self.ddq)
-        return self._seeds(np.arange(n * (n + 3) // 2 if self.direct else n))
-
-    def _seeds(self, outputs: IntArray) -> FloatArray:
-        """The same of some outputs, by their numbers in order; whole sets are judged without keeping all."""
         n, count = self.ddq.shape
         tangent = (
             np.broadcast_to(np.eye(n), (count, n, n)) if self.tangent is None else self.tangent
         )
         across = np.moveaxis(tangent, 0, 2)
         if not self.direct:
-            return np.ascontiguousarray(across[outputs])
-        rows, columns = np.tril_indices(n)
-        i, j = (which[outputs[outputs < rows.size]] for which in (rows, columns))
+            return np.ascontiguousarray(across)
+        i, j = np.tril_indices(n)
         mirrored = np.where(i == j, 0.0, 1.0)[:, None, None]
         lower = across[i] * self.ddq[j][:, None]
         lower = lower + mirrored * across[j] * self.ddq[i][:, None]
-        return np.concatenate([lower, across[outputs[outputs >= rows.size] - rows.size]])
+        return np.concatenate([lower, across])
 
     def differences(self, outputs: FloatArray) -> FloatArray:
         """Torques to be met less those of a program, (n_dof, n_samples).
@@ -65,8 +59,18 @@ class TermSamples:
         Args:
             outputs: Of the program, (n_outputs, n_samples).
         """
-        live = np.flatnonzero(outputs.any(axis=1))
-        torques = np.einsum("oim,om->im", self._seeds(live), outputs[live])
+        torques = outputs
+        if self.direct:
+            n = len(self.ddq)
+            torques = outputs[-n:].copy()
+            rows, columns = np.tril_indices(n)
+            for entry in np.flatnonzero(outputs[:-n].any(axis=1)):
+                i, j = rows[entry], columns[entry]
+                torques[i] += outputs[entry] * self.ddq[j]
+                if i != j:
+                    torques[j] += outputs[entry] * self.ddq[i]
+        if self.tangent is not None:
+            torques = np.einsum("mij,im->jm", self.tangent, torques)
         result: FloatArray = self.tau - torques
         return result
 
