@@ -14,6 +14,8 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from paramreduce_cli.errors import DataError
+
 _LARGE = 1 << 26
 """Bytes from which on a matrix is in a file."""
 _WAITING = 1 << 16
@@ -83,7 +85,13 @@ class LargeTable:
             self._flush()
 
     def _flush(self) -> None:
-        self._file.write(self._waiting.tobytes())
+        try:
+            self._file.write(self._waiting.tobytes())
+        except OSError as error:
+            raise DataError(
+                f"{_folder() or tempfile.gettempdir()}: no room for a table that memory does not hold "
+                f"({error.strerror}). TMPDIR names another folder."
+            ) from error
         del self._waiting[:]
 
     def matrix(self, n_columns: int) -> NDArray[np.float64]:

@@ -29,7 +29,7 @@ def explored(driver, summary):
         driver: Of a window with the page.
         summary: Of the run.
     """
-    rows = {(name, row["n"]): row for name, all in summary["validation"].items() for row in all}
+    rows = {(name, row["n"]): row for name, found in summary["validation"].items() for row in found}
     wrong = dict.fromkeys(rows, "missing")
     for names, fits, n, *shown in driver.execute_script(_WALK):
         for name in names.split(", "):

@@ -70,10 +70,17 @@ def main():
     failed = False
     with tempfile.TemporaryDirectory() as name:
         wheels = Path(name)
-        words = ("pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir", name, str(ROOT))  # fmt: skip
+        source = wheels / "source"
+        for file in subprocess.check_output(("git", "ls-files"), cwd=ROOT, text=True).splitlines():
+            (source / file).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / file, source / file)
+        words = ("pip", "wheel", "--quiet", "--disable-pip-version-check", "--no-deps", "--wheel-dir", name, str(source))  # fmt: skip
         subprocess.run((sys.executable, "-m", *words), check=True)
         (wheel,) = wheels.glob("*.whl")
-        for minor, interpreter in interpreters().items():
+        others = interpreters()
+        if not others:
+            print(f"No other Python from 3.{OLDEST} to 3.{NEWEST} is here: nothing was tried.")
+        for minor, interpreter in others.items():
             folder = wheels / f"3.{minor}"
             folder.mkdir()
             started = time.perf_counter()

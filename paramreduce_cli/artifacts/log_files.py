@@ -1,6 +1,8 @@
 """Logs as people have them: CSV, HDF5, NPZ and ROS 2 bags, all as columns by name."""
 
 import array
+import lzma
+import tokenize
 import zipfile
 import zlib
 from collections.abc import Iterator
@@ -20,6 +22,11 @@ _BAGS = (".db3", ".mcap")
 _HDF5 = (".h5", ".hdf5")
 _AT_ONCE = 1 << 16
 """Rows."""
+_UNREADABLE = (
+    OSError, EOFError, ValueError, TypeError, RuntimeError, MemoryError,
+    zipfile.BadZipFile, zlib.error, lzma.LZMAError, tokenize.TokenError,
+)  # fmt: skip
+"""What damage, encryption and odd headers raise."""
 _HEADERS = {
     (1, 0): np.lib.format.read_array_header_1_0,
     (2, 0): np.lib.format.read_array_header_2_0,
@@ -80,7 +87,7 @@ def _npz(path: Path) -> RawLog:
             return _from_arrays(path, _members(archive))
     except FileNotFoundError as error:
         raise missing(path) from error
-    except (OSError, EOFError, ValueError, TypeError, zipfile.BadZipFile, zlib.error) as error:
+    except _UNREADABLE as error:
         raise ArtifactError(f"{path}: cannot be read as NPZ ({error}).") from error
 
 
@@ -95,6 +102,8 @@ def _members(archive: zipfile.ZipFile) -> Iterator[tuple[str, FloatArray]]:
             if kind.kind not in "fiub" or len(shape) not in (1, 2):
                 continue
             n_rows, n_columns = (*shape, 1)[:2]
+            if n_rows == 0:
+                continue
             if n_rows * n_columns * kind.itemsize != info.file_size - file.tell():
                 raise ValueError(f"{info.filename} does not hold the {shape} numbers it declares")
             result = large_matrix(n_rows, n_columns)
@@ -146,7 +155,7 @@ def _bag(path: Path) -> RawLog:
         raise DataError(f"{path}: holds no messages with numbers.")
     start = min(min(values) for name, values in found.items() if name.endswith("/time"))
     columns = {
-        name: np.frombuffer(values) - (start if name.endswith("/time") else 0.0)
+        name: np.frombuffer(values) - start if name.endswith("/time") else np.frombuffer(values)
         for name, values in found.items()
     }
     return RawLog(str(path), columns, first_line=None)

@@ -3,6 +3,7 @@
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -29,14 +30,14 @@ def main() -> None:
     try:
         code = _called()
     except ParamreduceError as error:
-        message = with_arguments(str(error))
+        message = _hint(with_arguments, str(error)) or str(error)
         show_errors(message)
-        if further := after(message, _command()):
+        if further := _hint(after, message, _command()):
             complain(further)
         code = error.exit_code
     except click.ClickException as error:
         show_errors(of_usage(error))
-        complain(after_usage(error))
+        complain(_hint(after_usage, error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(
@@ -58,6 +59,14 @@ def main() -> None:
         )
         code = INTERNAL
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _hint(made: Callable[..., str], *arguments: object) -> str:
+    """What is made, or nothing: what cannot be looked at here must not hide the error itself."""
+    try:
+        return made(*arguments)
+    except Exception:
+        return ""
 
 
 def _command() -> click.Command | None:

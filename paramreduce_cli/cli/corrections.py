@@ -12,8 +12,10 @@ from paramreduce_cli.stages import stages
 Words = list[str]
 _OF_CONFIGS = ("run", "export", "export-trajectory")
 """Commands that take a config, beside the stages."""
-_LIKE = 0.8
 _OF_RESULTS = ("open", "inspect", "table")
+"""Commands that take results."""
+_LIKE = 0.8
+"""How alike a robot's name must be to one here."""
 
 
 def corrected(message: str, words: Sequence[str]) -> str:
@@ -51,39 +53,52 @@ def _no_config(message: str, words: Words) -> Words | None:
     return [words[0], str(here[0]), *words[1:]] if here else None
 
 
-def _other_kind(_: str, words: Words) -> Words | None:
+_NOT_THAT = re.compile(
+    r"(?:Invalid value for '\w+': (?:File|Path) '(?P<folder>.+)' is a directory"
+    r"|there is no command '(?P<command>.+?)'"
+    r"|(?P<file>.+?)(?:/report)?: (?:there is no such file|is not there|is not a readable HDF5|cannot be read as text"
+    r"|holds no results itself))"
+)
+"""Messages on a word that names what is not there, or not of the kind that the command takes."""
+
+
+def _named(message: str, words: Words) -> str | None:
+    """The typed word that an error complains of, if nothing is known to be meant by it."""
+    found = _NOT_THAT.match(message)
+    if found is None or "Did you mean" in message:
+        return None
+    word = found["folder"] or found["command"] or found["file"]
+    return next((w for w in words if w == word or w.rstrip("/") == word), None)
+
+
+def _other_kind(message: str, words: Words) -> Words | None:
     """A robot's config where its results are given, or the other way round, or its name alone."""
-    if len(words) == 1 and (config := config_meant(words[0])) is not None:
-        return ["run", str(config)]
-    for place, word in enumerate(words[1:], 1):
-        if word.startswith("-") or words[place - 1].startswith("--"):
-            continue
-        config, results = config_meant(word), results_meant(word)
-        if words[0] in (*stages, *_OF_CONFIGS) and config is not None:
-            return [*words[:place], str(config), *words[place + 1 :]]
-        if words[0] in _OF_RESULTS and results is not None and Path(word).suffix != ".h5":
-            return [*words[:place], str(results), *words[place + 1 :]]
-        if words[0] in _OF_RESULTS and config is not None:
-            return ["run", str(config)]
-    return None
+    word = _named(message, words)
+    if word is None:
+        return None
+    config, results = config_meant(word), results_meant(word)
+    if word == words[0]:
+        return None if config is None or len(words) > 1 else ["run", str(config)]
+    if words[0] in (*stages, *_OF_CONFIGS):
+        return None if config is None else _exchanged(words, word, str(config))
+    if words[0] not in _OF_RESULTS:
+        return None
+    if results is not None and results.resolve() != Path(word).resolve():
+        return _exchanged(words, word, str(results))
+    return None if config is None else ["run", str(config)]
 
 
 def _example(message: str, words: Words) -> Words | None:
     """A robot that comes along, and is not here yet."""
+    asked = [word for word in words[1:] if not word.startswith("-")]
+    plain_init = words[0] == "init" and asked == words[1:2] == words[1:]
+    word = asked[0] if plain_init else _named(message, words[1:])
+    if word is None or (not plain_init and config_meant(word) is not None):
+        return None
     from paramreduce_cli.config.examples import examples  # late: it loads much
 
-    known = examples()
-    asked = [word for word in words[1:] if not word.startswith("-")]
-    if not asked:
-        return None
-    if words[0] == "init":
-        return ["init", "--example", *asked] if words[1:] == asked and asked[0] in known else None
-    if words[0] not in (*stages, *_OF_CONFIGS, *_OF_RESULTS):
-        return None
-    name = Path(asked[0]).name.removesuffix(".yaml")
-    if name not in known or not re.search("no such file|is not there", message):
-        return None
-    return ["init", "--example", name]
+    name = Path(word).name.removesuffix(".yaml")
+    return ["init", "--example", name] if name in examples() else None
 
 
 def _misspelt(message: str, words: Words) -> Words | None:
@@ -97,10 +112,10 @@ def _misspelt(message: str, words: Words) -> Words | None:
 
 
 def _from_above(message: str, words: Words) -> str:
-    """The same call in the folder further up where the config is."""
+    """The same call in the folder further up where that is."""
     above = project_above(Path())
-    named = re.match(r"(\S+): there is no such file", message)
-    if above is None or named is None or not (above / named[1]).exists():
+    word = _named(message.partition(" configs holds ")[0], words)
+    if above is None or word is None or Path(word).exists() or not (above / word).exists():
         return ""
     return f"cd {above} && {shlex.join(['paramreduce', *words])}"
 
@@ -150,9 +165,10 @@ def _choice(message: str, words: Words) -> Words | None:
         return None
     wanted, (name, _, number) = found[1], found[1].partition(":")
     selected = re.search(r"; (\S+):(\d+) is selected", message)
-    if selected and name.isdecimal():
-        name, number = selected[1], name
-    offered = found[2].split("; ")[0].split(", ")
+    offered = found[2].split(", ")
+    if digits := re.fullmatch(r":?(\d+)\w*", wanted):
+        numbered = [one.partition(":")[0] for one in offered if ":" in one]
+        name, number = selected[1] if selected else numbered[0], digits[1]
     begun = [one for one in offered if one.split(":")[0].startswith(name)]
     near = begun or difflib.get_close_matches(name, offered, n=1, cutoff=0.0)
     return _exchanged(words, wanted, _in_range(near[0], number or (selected or ("", "", ""))[2]))
@@ -189,6 +205,7 @@ _RULES: tuple[Callable[[str, Words], Words | None], ...] = (
 
 
 def _exchanged(words: Words, one: str, other: str) -> Words | None:
-    if one not in words:
-        return None
-    return [other if word == one else word for word in words]
+    """With another word, or another value after ``--option=``."""
+    joined = [f"{word.partition('=')[0]}={other}" if word.startswith("--") and word.partition("=")[2] == one else word for word in words]  # fmt: skip
+    mended = [other if word == one else word for word in joined]
+    return mended if mended != words else None

@@ -1,6 +1,7 @@
 """What is in a folder: configs of robots, and their results; told without reading more than beginnings."""
 
 import re
+from collections.abc import Callable
 from pathlib import Path
 
 from paramreduce_cli.artifacts.places import SUMMARY
@@ -47,8 +48,15 @@ def results_of(config: Path) -> Path:
 
 
 def has_report(results: Path) -> bool:
-    """Whether a run ended there."""
-    return (results / SUMMARY).exists()
+    """Whether a run ended there, as far as one may look."""
+    return _is(results / SUMMARY, Path.is_file)
+
+
+def _is(path: Path, kind: Callable[[Path], bool]) -> bool:
+    try:
+        return kind(path)
+    except OSError:  # no access, or too long a name
+        return False
 
 
 def results_in(folder: Path) -> list[Path]:
@@ -64,13 +72,14 @@ def results_in(folder: Path) -> list[Path]:
 def config_meant(word: str) -> Path | None:
     """The config of what may be the name of a robot, its results or something in these."""
     found = _CONFIGS / f"{_robot(word)}.yaml"
-    return found if found.is_file() else None
+    return found if _is(found, Path.is_file) else None
 
 
 def results_meant(word: str) -> Path | None:
     """Results of what may be the name of a robot, its config or something in its results."""
     found = _RESULTS / _robot(word)
-    return found if found.is_dir() else None
+    made = _is(found, Path.is_dir) and found != _RESULTS and any(found.glob("*.h5"))
+    return found if made else None
 
 
 def _robot(word: str) -> str:
@@ -78,4 +87,4 @@ def _robot(word: str) -> str:
     parts = Path(word).parts
     if len(parts) > 1 and parts[0] == _RESULTS.name:
         return parts[1]
-    return Path(word).name.removesuffix(".yaml")
+    return Path(word).name.removesuffix(".yaml").replace("..", "")

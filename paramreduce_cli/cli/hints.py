@@ -36,20 +36,28 @@ def next_command(command: click.Command | None) -> str:
         return "paramreduce --help lists all commands; paramreduce alone says what to do next."
     example = re.search(r"Example: (paramreduce .*(?:\n.+)*)", inspect.cleandoc(command.help or ""))
     more = f"paramreduce {command.name} --help says more."
-    return f"Example: {_of_here(' '.join(example[1].split()))}\n{more}" if example else more
+    shown = _of_here(" ".join(example[1].split())) if example else ""
+    return f"Example: {shown}\n{more}" if shown else more
 
 
 def _of_here(example: str) -> str:
-    """An example with a robot that is here; where there is none, with what brings its own."""
+    """An example with robots that are here; where there is none, with what brings its own.
+
+    Empty where there are some, but too few for it.
+    """
     configs, results = configs_in(Path()), results_in(Path())
     named = re.findall(r"(?:configs|results)/[\w./-]+", example)
     first = ""
-    for path in (Path(name) for name in named):
+    here = {True: configs, False: results}
+    unused = {kind: iter(found) for kind, found in here.items()}
+    for path in (Path(name) for name in named if not Path(name).exists()):
         of_configs = path.suffix == ".yaml"
-        here = configs if of_configs else results
-        if here and not path.exists():
-            example = example.replace(str(path), shlex.quote(str(here[0])))
-        elif not of_configs and not here and configs:
+        other = next(unused[of_configs], None)
+        if other is not None:
+            example = example.replace(str(path), shlex.quote(str(other)))
+        elif here[of_configs]:
+            return ""
+        elif configs:
             first = f"\nFirst: paramreduce run {shlex.quote(str(configs[0]))} makes results."
     if named and not configs and not results:
         first = "\nFirst: paramreduce init --example puma560 writes its config."
@@ -71,7 +79,7 @@ def after(message: str, command: click.Command | None) -> str:
 
 def of_usage(error: click.ClickException) -> str:
     """What is wrong with a call that cannot be read; click guesses options by their spelling alone."""
-    if isinstance(error, click.NoSuchOption):
+    if isinstance(error, click.NoSuchOption) and error.ctx and error.ctx.parent:
         return f"there is no option {error.option_name}."
     return error.format_message()
 
@@ -84,7 +92,7 @@ def after_usage(error: click.ClickException) -> str:
         meant = _meant_option(error.option_name, command)
         typed = sys.argv[1:]
         if meant:
-            mended = [_exchanged(word, error.option_name, meant) for word in typed]
+            mended = [_with_option(word, error.option_name, meant) for word in typed]
             return f"Next: {shlex.join(['paramreduce', *mended])}"
     mended_call = misplaced(error.format_message(), sys.argv[1:])
     return f"Next: {mended_call}" if mended_call else next_command(command)
@@ -93,7 +101,7 @@ def after_usage(error: click.ClickException) -> str:
 def _meant_option(name: str, command: click.Command) -> str | None:
     """The option that takes the value, is spelt alike, or begins with the one letter that was typed."""
     taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
-    value = " ".join(sys.argv).partition(name)[2].lstrip(" =").split(" ")[0]
+    value = " ".join(sys.argv[1:]).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
     for parameter in taken:
         if isinstance(parameter.type, click.Choice) and value in parameter.type.choices:
             return parameter.opts[0]
@@ -105,7 +113,7 @@ def _meant_option(name: str, command: click.Command) -> str | None:
     return near[0] if near else None
 
 
-def _exchanged(word: str, name: str, meant: str) -> str:
+def _with_option(word: str, name: str, meant: str) -> str:
     """The option in a word, which may be joined to its value, by another one."""
     option, equals, value = word.partition("=")
     return f"{meant}{equals}{value}" if option == name else word

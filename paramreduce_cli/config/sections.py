@@ -37,14 +37,12 @@ def _walk(model: type[BaseModel], path: Key) -> Iterator[tuple[type, Key]]:
 
 
 def keys_named(name: str) -> list[str]:
-    """Keys inside sections that are called like that; of several those that are least deep."""
-    places = [
-        (*path, name)
+    """Keys of sections at the top that are called like that."""
+    return [
+        f"{path[0]}.{name}"
         for kind, path in _keys().items()
-        if issubclass(kind, BaseModel) and name in kind.model_fields
+        if len(path) == 1 and issubclass(kind, BaseModel) and name in kind.model_fields
     ]
-    least = min(map(len, places), default=0)
-    return [".".join(map(str, place)) for place in places if len(place) == least]
 
 
 def is_section(kind: type) -> bool:

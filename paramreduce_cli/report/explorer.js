@@ -561,7 +561,7 @@
       requestAnimationFrame(step);
     });
     canvas.addEventListener("pointerdown", (event) => { view.drag = [event.clientX, event.clientY]; canvas.setPointerCapture(event.pointerId); });
-    canvas.addEventListener("pointerup", () => { view.drag = null; });
+    for (const end of ["pointerup", "pointercancel"]) canvas.addEventListener(end, () => { view.drag = null; });
     canvas.addEventListener("pointermove", (event) => {
       if (!view.drag) return;
       turn((event.clientX - view.drag[0]) * 0.01, (event.clientY - view.drag[1]) * 0.01);

@@ -214,9 +214,7 @@ class Fitting:
         if inverse is None or np.isinf(self.budget.acceleration):
             return None
         caused = inverse * (self._acceleration_scale / self.budget.acceleration)[:, None]
-        torque = np.diag((self._torque_scale / self.budget.torque) ** 2)
-        forms = np.swapaxes(caused, 1, 2) @ caused + torque
-        return roots(forms)
+        return roots(caused, self._torque_scale / self.budget.torque)
 
     def _weighed(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
         """Torques as they enter the cost, (k, n_rows)."""

@@ -26,13 +26,20 @@ def positive_definite(matrices: FloatArray) -> bool:
     return bool(_positive_definite(matrices))
 
 
-def roots(matrices: FloatArray) -> FloatArray:
-    """Upper triangles R with R' R the matrices, samples last, (n, n, n_samples).
+def roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
+    """Upper triangles R with R' R = F' F + diag(w^2), samples last, (n, n, n_samples).
 
     Args:
-        matrices: Positive definite, (n_samples, n, n).
+        factors: F, (n_samples, n, n).
+        weights: w, (n,).
     """
-    return np.ascontiguousarray(np.linalg.cholesky(matrices).transpose(2, 1, 0))
+    try:
+        forms = np.swapaxes(factors, 1, 2) @ factors + np.diag(weights**2)
+        return np.ascontiguousarray(np.linalg.cholesky(forms).transpose(2, 1, 0))
+    except np.linalg.LinAlgError:  # squares of large factors leave nothing of the weights
+        below = np.broadcast_to(np.diag(weights), factors.shape)
+        R = np.asarray(np.linalg.qr(np.concatenate([factors, below], axis=1), mode="r"))
+        return np.ascontiguousarray(R.transpose(1, 2, 0))
 
 
 @numba.njit(cache=True, nogil=True)

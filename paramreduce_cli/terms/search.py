@@ -201,7 +201,10 @@ class Search:
         for _ in range(_BACK[1]):
             if fit.within:
                 break
-            fit = self._one_back(fit, back, 0.0)
+            mended = self._one_back(fit, back, 0.0)
+            if mended is fit:
+                break
+            fit = mended
         return self._step(fit), np.array(back[1:], dtype=np.int64)
 
     def _one_back(self, fit: Fit, back: list[int], spread: float) -> Fit:

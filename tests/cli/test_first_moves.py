@@ -87,7 +87,7 @@ MOVES = [
     (["inspect", "samples.h5"], "is not a readable HDF5 file"),
     (["inspect", "done/reduction.h5", "--model", "best:3"],
      "Next: paramreduce inspect done/reduction.h5 --model best-subset:3"),
-    (["compare", "done"], "Example: paramreduce compare"),
+    (["compare", "done"], "paramreduce compare --help says more"),
     (["compare", "done", "dome"], "Did you mean done?"),
     (["compare", "done", "summary.json"], "make it again with `paramreduce run CONFIG`"),
     (["inspect", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
@@ -159,6 +159,33 @@ def test_results_are_named_by_their_robot(invoke, folder):
         assert f"Next: paramreduce {words[0]} results/two_link\n" in invoke(*words, code=2).err
     for words in (["run", "results/two_link"], ["validate", "results/two_link/model.h5"]):
         assert f"Next: paramreduce {words[0]} configs/two_link.yaml\n" in invoke(*words, code=2).err
+
+
+@pytest.mark.parametrize(
+    ("words", "next_one"),
+    [
+        (["report", "configs/two_link.yaml"], None),  # the message has the command
+        (["run", "./configs/two_link.yaml", "--set", "selected.n=many"], None),
+        (["run", "configs/two_link.yaml", "--set", "trajectories.file=none.json"], None),
+        (["inspect", "done/reduction.h5", "--model=swap:99"], "inspect done/reduction.h5 --model=swap:7"),
+        (["inspect", "done", "--model", "3"], "inspect done --model qr:3"),
+        (["open", ".."], None),
+        (["run", 300 * "a"], None),
+    ],
+    ids=lambda v: " ".join(v)[:60] if isinstance(v, list) else "",
+)  # fmt: skip
+def test_what_is_not_known_is_not_guessed(invoke, folder, words, next_one):
+    said = re.findall(r"Next: paramreduce (.*)", invoke(*words, code=2).err)
+    assert said == ([] if next_one is None else [next_one])
+
+
+def test_a_hint_that_fails_hides_no_error(invoke, folder, monkeypatch):
+    def broken(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr("paramreduce_cli.cli.hints.misplaced", broken)
+    assert "there is no such file" in invoke("run", "configs/two_lnik.yaml", code=2).err
+    assert "there is no option" in invoke("run", "--nothing", code=2).err
 
 
 def test_in_another_folder_it_says_where_to_go(invoke, folder, monkeypatch):

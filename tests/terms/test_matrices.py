@@ -33,7 +33,17 @@ def test_what_is_not_a_number_is_not_positive_definite(spread):
 
 def test_roots_times_vectors(spread):
     vectors = np.random.default_rng(1).normal(size=(3, 4, 50))
-    found = matrices.times(matrices.roots(spread), vectors)
+    weights = np.array([0.1, 2.0, 1.0, 0.5])
+    found = matrices.times(matrices.roots(spread, weights), vectors)
+    forms = np.swapaxes(spread, 1, 2) @ spread + np.diag(weights**2)
     np.testing.assert_allclose(
-        np.sum(found**2, axis=1), np.einsum("kis,sij,kjs->ks", vectors, spread, vectors)
+        np.sum(found**2, axis=1), np.einsum("kis,sij,kjs->ks", vectors, forms, vectors)
     )
+
+
+def test_roots_of_large_factors_keep_the_weights():
+    """Of what rounding takes from their squares, Cholesky would find no root."""
+    factors = 1e9 * np.ones((2, 3, 3))
+    R = matrices.roots(factors, np.ones(3)).transpose(2, 0, 1)
+    across = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
+    np.testing.assert_allclose(np.linalg.norm(R @ across, axis=1), 1.0, rtol=1e-6)
