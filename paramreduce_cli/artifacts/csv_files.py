@@ -52,7 +52,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                         f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
                         "headings."
                     )
-                table.extend(_number(path, rows.line_num, row[k]) for k in kept)
+                table.extend(_number(path, rows.line_num, header[k], row[k]) for k in kept)
             return [header[k] for k in kept], table.matrix(len(kept))
     except FileNotFoundError as error:
         raise missing(path) from error
@@ -68,8 +68,10 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _number(path: Path, line: int, cell: str) -> float:
+def _number(path: Path, line: int, heading: str, cell: str) -> float:
     try:
         return float(cell)
     except ValueError as error:
-        raise DataError(f"{path}, line {line}: {cell!r} is not a number.") from error
+        raise DataError(
+            f"{path}, line {line}, column {heading}: {cell!r} is not a number."
+        ) from error

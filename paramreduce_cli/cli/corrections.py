@@ -125,6 +125,15 @@ def _file(message: str, words: Words) -> Words | None:
     return None if found is None else _exchanged(words, found[1], found[2])
 
 
+def _results(message: str, words: Words) -> Words | None:
+    """Results that are not there yet, of a config that is."""
+    found = re.match(
+        r"results/([\w.-]+?)(?:/\S*)?: (?:there is no such file|is not there)", message
+    )
+    config = Path("configs") / f"{found[1]}.yaml" if found else None
+    return ["run", str(config)] if config is not None and config.is_file() else None
+
+
 def _setting(message: str, words: Words) -> Words | None:
     found = re.match(r"--set (([^=\s]+)=(.*?)): .*did you mean (\S+)\?", message)
     if found is None:
@@ -186,6 +195,7 @@ def _after_mending(message: str, words: Words) -> Words | None:
 
 
 _RULES: tuple[Callable[[str, Words], Words | None], ...] = (
+    _results,
     _file,
     _setting,
     _choice,

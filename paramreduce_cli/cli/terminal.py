@@ -138,7 +138,7 @@ def show_errors(text: str) -> None:
 
 def remark(message: str) -> None:
     """Tell the user something that does not stop the work."""
-    complain(f"Warning: {message}.")
+    complain(f"Warning: {message}{'' if message.endswith('?') else '.'}")
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:

@@ -46,7 +46,8 @@ def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, st
     if missing:
         raise ConfigError(
             f"no columns for {' and '.join(missing)} of {len(joints)} joints by any usual name among "
-            f"{', '.join(names[:30])}. Write sampling.log.columns by hand."
+            f"{', '.join(names[:30])}. Write sampling.log.columns by hand; joints that the log "
+            "does not have are locked by init's --lock JOINT=VALUE."
         )
     return {"time": _time_of(times, found["position"]), **found}
 

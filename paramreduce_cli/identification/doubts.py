@@ -41,6 +41,8 @@ def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
                 f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees? Then say so "
                 "under units."
             )
+        elif piece.dz is not None and np.ptp(piece.dz[:, j]) == 0:
+            yield f"{name} moves, but its recorded speed is constant: is it recorded?"
         if np.ptp(tau) == 0:
             yield f"the torque of {name} is constant: is it recorded?"
         elif _longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:

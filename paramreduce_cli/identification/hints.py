@@ -6,7 +6,7 @@ what noise as coloured as theirs explains, the strongest first, each judged with
 accounted for.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -58,6 +58,7 @@ def hints(
     gravity: float = 9.81,
     delay: float = 0.0,
     sliding: Sequence[bool] = (),
+    modelled: Collection[str] = (),
 ) -> list[str]:
     """Sentences on what the residuals suggest, the strongest first.
 
@@ -69,6 +70,7 @@ def hints(
         gravity: m/s^2
         delay: That was taken back already, s.
         sliding: Whether coordinates are lengths; none if left out.
+        modelled: Keys of drives that are in the model, such as ``drives.q1.coulomb``.
     """
     mistaken = list(_mistaken_columns(fitted, names))
     if mistaken:
@@ -76,7 +78,7 @@ def hints(
     found: list[str] = []
     tried: set[int] = set()
     slides = list(sliding) or [False] * len(names)
-    suspects = list(_suspects(fitted, names, tilts, gravity, delay, slides))
+    suspects = list(_suspects(fitted, names, tilts, gravity, delay, slides, modelled))
     while len(found) < _MOST:
         judged = [
             (*_judged(fitted, suspect), k) for k, suspect in enumerate(suspects) if k not in tried
@@ -145,7 +147,11 @@ def _suspects(
     gravity: float,
     delay: float,
     sliding: Sequence[bool],
+    modelled: Collection[str],
 ) -> Iterator[_Suspect]:
+    def _missing(name: str, what: str, unit: str, key: str) -> Callable[[float, float], str]:
+        return _follows(what, unit, name, f"drives.{name}.{key}", modelled)
+
     rows = fitted.rows
     fastest = np.max([np.abs(v).max(axis=0) for v in rows.dz], axis=0)
     fastest = np.where(fastest > 0, fastest, 1.0)
@@ -181,11 +187,13 @@ def _suspects(
         yield _Suspect(None, signal, _tilted(axis, gravity))
 
 
-def _missing(name: str, what: str, unit: str, key: str) -> Callable[[float, float], str | None]:
+def _follows(
+    what: str, unit: str, name: str, key: str, modelled: Collection[str]
+) -> Callable[[float, float], str]:
     def said(coefficient: float, share: float) -> str:
         return (
             f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * share:.0f} % of them): "
-            f"drives.{name}.{key} is missing or of another form."
+            f"{key} is {'of another form' if key in modelled else 'missing'}."
         )
 
     return said
@@ -237,6 +245,33 @@ def _tilted(axis: str, gravity: float) -> Callable[[float, float], str | None]:
         )
 
     return said
+
+
+def negative_friction(
+    names: Sequence[str], owners: Sequence[str], values: FloatArray, deviations: FloatArray
+) -> list[str]:
+    """A sentence where friction surely drives the machine, as with the wrong sign of torques or speeds.
+
+    Args:
+        names: Of friction parameters, (n,).
+        owners: Joints that they are of, (n,).
+        values: (n,)
+        deviations: Standard deviations, (n,).
+    """
+    wrong: list[int] = np.flatnonzero(values < -_SURE * deviations).tolist()
+    joints = list(dict.fromkeys(owners[k] for k in wrong))
+    if not joints:
+        return []
+    listed = ", ".join(f"{names[k]} = {values[k]:.3g}" for k in wrong[:_MOST])
+    if len(joints) > len(set(owners)) / 2:
+        return [
+            f"Friction comes out negative at most joints ({listed}): is the sign of all torques wrong? See "
+            "sampling.log.torque_signs."
+        ]
+    return [
+        f"Friction of {' and '.join(joints)} comes out negative ({listed}): is the sign of its torques or speeds "
+        "wrong, or friction of another form? See sampling.log.torque_signs."
+    ]
 
 
 def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:

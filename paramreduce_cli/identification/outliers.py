@@ -16,25 +16,25 @@ _TO_SIGMA = 1.4826
 """Median absolute deviation to standard deviation of normal noise."""
 
 
-def replace_outliers(pieces: list[Signals]) -> int:
+def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]]:
     """Interpolate single samples far from the median of their neighbours [Hampel1974], in place.
 
     Returns:
-        How many samples were replaced.
+        Times of the samples that were replaced, s, by signal and joint; only of those that had any.
     """
-    count = 0
+    found: dict[tuple[str, int], list[float]] = {}
     for piece in pieces:
-        for values in (piece.z, piece.tau):
-            for column in values.T:
+        for signal, values in (("position", piece.z), ("torque", piece.tau)):
+            for j, column in enumerate(values.T):
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
                 sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
                 far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
                 if far.any():
-                    count += int(far.sum())
+                    found.setdefault((signal, j), []).extend(piece.time[far].tolist())
                     good = np.flatnonzero(~far)
                     column[far] = np.interp(np.flatnonzero(far), good, column[good])
-    return count
+    return found
 
 
 def _alone(column: FloatArray, least: float) -> np.ndarray:

@@ -1,7 +1,7 @@
 """Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -153,11 +153,7 @@ def _read(
         steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         if wanted.outliers == "replace":
-            count = replace_outliers(pieces)
-            if count:
-                steps.append(
-                    f"{count} outliers are replaced by what lies between their neighbours."
-                )
+            steps += _said_of_outliers(replace_outliers(pieces), names)
         if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
             raise DataError(
                 f"{source}: is recorded at {rate:.6g} Hz, {sources[0]} at {rates[0]:.6g} Hz. Bring "
@@ -299,6 +295,19 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
     time = np.concatenate([p.signals.time for p in pieces])
     number = np.repeat(np.arange(len(pieces)), [p.signals.time.size for p in pieces])
     return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
+
+
+def _said_of_outliers(
+    found: Mapping[tuple[str, int], Sequence[float]], names: Sequence[str]
+) -> Iterator[str]:
+    if not found:
+        return
+    listed = ", ".join(
+        f"{len(times)} in the {signal} of {names[j]} (the first at {times[0]:.6g} s)"
+        for (signal, j), times in found.items()
+    )
+    count = sum(map(len, found.values()))
+    yield f"{count} outliers are replaced by what lies between their neighbours: {listed}."
 
 
 def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:

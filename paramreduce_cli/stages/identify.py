@@ -10,7 +10,7 @@ from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.comparison import compared
 from paramreduce_cli.identification.estimation import LinearFit, robust_fit, rows_of
-from paramreduce_cli.identification.hints import hints
+from paramreduce_cli.identification.hints import hints, negative_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.orthogonal import least_squares
@@ -20,6 +20,7 @@ from paramreduce_cli.records import (
     Estimate,
     FloatArray,
     Identification,
+    Kind,
     MeasuredLog,
     Model,
     Progress,
@@ -38,6 +39,15 @@ _MOST_SHOWN = 1500
 """Samples in figures."""
 _HARDLY = 0.3
 """Share of the torques that is left where hardly anything was understood."""
+_FARTHER = 2.5
+"""Times the error of what was learned from, from which on what was held out is said to be missed."""
+_NOTABLE = 0.1
+"""Share of the torques from which on that is worth a word."""
+_FRICTION = (Kind.COULOMB, Kind.VISCOUS)
+_DRIVES = {
+    Kind.COULOMB: "coulomb", Kind.VISCOUS: "viscous", Kind.ROTOR: "inertia", Kind.OFFSET: "offset",
+}  # fmt: skip
+"""Keys of drives by the kinds of their parameters."""
 _ACROSS = 1e-6
 """Share of gravity below which an axis counts as level."""
 
@@ -74,7 +84,17 @@ def identify(
         gravity=float(np.linalg.norm(mechanism.gravity)),
         delay=0.0 if log is None else log.delay,
         sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
+        modelled=[
+            f"drives.{p.owner}.{_DRIVES[p.kind]}" for p in mechanism.parameters if p.kind in _DRIVES
+        ],
     )
+    suspected += _friction_doubts(model, full)
+    if full.held_out > _FARTHER * full.train and full.held_out > _NOTABLE:
+        suspected.insert(
+            0,
+            f"Torques that were held out are missed by {share(full.held_out)}, those that were learned from by "
+            f"{share(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?",
+        )
     if full.train > _HARDLY:
         suspected.insert(
             0,
@@ -100,6 +120,19 @@ def identify(
         shown_measured=np.concatenate([block.tau for block in shown]),
         shown_full=_predicted(shown, full.standard),
         shown_reduced=_predicted(shown, reduced.standard),
+    )
+
+
+def _friction_doubts(model: Model, full: Estimate) -> list[str]:
+    """Of the base parameters those of friction that stand for themselves."""
+    kinds = {p.name: p for p in model.mechanism.parameters if p.kind in _FRICTION}
+    places = [k for k, name in enumerate(full.names) if name in kinds]
+    found = [kinds[full.names[k]] for k in places]
+    return negative_friction(
+        [p.name for p in found],
+        [p.owner for p in found],
+        full.values[places],
+        full.deviations[places],
     )
 
 

@@ -21,8 +21,6 @@ from tests.oracles import capsules, pinocchio_model
 
 ROOT = Path(__file__).resolve().parents[2]
 _FINER = 10
-_EVERY = 10
-"""Samples of the fine grid between those at which distances are measured."""
 _ROUNDING = 1e-9
 
 
@@ -38,7 +36,7 @@ def worst(config, model, task, trajectory):
     pairs = [c.bodies for c in task.constraints if c.kind == "clearance"]
     planes = [c.bodies[0] for c in task.constraints if c.kind == "above-plane"]
     apart = []
-    for q in z[::_EVERY]:
+    for q in z:
         apart += capsules.clearances(model.mechanism, q, clearance.radius, pairs)
         where = capsules.points(model.mechanism, q)
         apart += [where[body][:, 2].min() - clearance.radius for body in planes]

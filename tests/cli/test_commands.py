@@ -3,6 +3,7 @@ import re
 import shutil
 import sys
 import types
+from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -10,6 +11,7 @@ from conftest import ONE_FORMAT, TWO_LINK, summary_of
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import DataError
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Identification, Model, Reduction
 from paramreduce_cli.reduction.models import reduced_model
@@ -270,3 +272,18 @@ def test_run_says_what_settings_replace_in_the_default_folder(
     err = " ".join(invoke("run", TWO_LINK, "--quiet", settings=changed).err.split())
     assert "which --set replaces from report on" in err
     assert "--set" not in invoke("run", TWO_LINK, "--quiet", "--results", "x", settings=changed).err
+
+
+def test_the_first_trajectory_with_a_way_is_exported():
+    from paramreduce_cli.cli.commands.export_trajectory import _first
+
+    trajectories = SimpleNamespace(estimation=(1, 2, 3))
+
+    def timed(which):
+        if which == "estimation:1":
+            raise DataError("no way to the first")
+        return which
+
+    assert _first(trajectories, timed) == ("estimation:2", "estimation:2")
+    with pytest.raises(DataError, match="no way to the first"):
+        _first(SimpleNamespace(estimation=(1,)), timed)

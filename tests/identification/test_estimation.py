@@ -5,7 +5,7 @@ import pytest
 from simulated_logs import RATE, coloured, simulated
 
 from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit, weighted_fit
-from paramreduce_cli.identification.hints import hints
+from paramreduce_cli.identification.hints import hints, negative_friction
 from paramreduce_cli.identification.uncertainty import ColouredNoise, score_covariance
 
 
@@ -148,6 +148,20 @@ def test_no_hints_where_nothing_is_wrong(pole, seed):
     assert hints(fitted(log, tau), log.names) == []
 
 
+@pytest.mark.parametrize(
+    ("values", "said"),
+    [
+        ([1.0, 2.0, 0.5, 0.1], None),
+        ([1.0, -0.04, 0.5, 0.1], None),  # not surely
+        ([1.0, 2.0, -0.5, 0.1], "Friction of b comes out negative (fv_b = -0.5)"),
+        ([-1.0, 2.0, -0.5, 0.1], "the sign of all torques"),
+    ],
+)
+def test_friction_that_drives(values, said):
+    found = negative_friction(["fc_a", "fv_a", "fv_b", "fc_c"], list("aabc"), np.array(values), np.full(4, 0.01))  # fmt: skip
+    assert found == [] if said is None else said in found[0]
+
+
 def test_gravity_that_is_tilted_is_suspected():
     log = simulated(2)
     from simulated_logs import tilt_torques
@@ -156,3 +170,11 @@ def test_gravity_that_is_tilted_is_suspected():
     tau = log.tau + 0.5 * tilts[0] + coloured(log.tau.shape, 0.02 * np.std(log.tau, axis=0), 0.5, 2)
     found = hints(fitted(log, tau), log.names, [(t,) for t in tilts])
     assert any("Gravity seems to have 0.5" in text and "along x" in text for text in found)
+
+
+def test_what_is_modelled_is_of_another_form_if_anything():
+    log = simulated(0)
+    X = log.X[:, :, [kind != "fc" for kind in log.kinds]]
+    found = hints(fitted(log, log.tau, X), log.names, modelled=[f"drives.{n}.coulomb" for n in log.names])  # fmt: skip
+    assert any("coulomb is of another form" in text for text in found)
+    assert not any("missing" in text for text in found)

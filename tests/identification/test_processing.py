@@ -1,3 +1,4 @@
+import re
 import sys
 import weakref
 
@@ -141,7 +142,8 @@ def test_single_outliers_are_replaced():
     log["tau1"] = log["tau1"].copy()
     log["tau1"][[300, 700, 1500]] += 40
     found, usual = made(log, torque_cutoff="none"), made(clean, torque_cutoff="none")
-    assert any("3 outliers" in step for step in found.steps)
+    (step,) = [step for step in found.steps if "3 outliers" in step]
+    assert re.search(r"in the (position|torque) of (upper|fore) \(the first at [\d.]+ s\)", step)
     assert np.abs(found.training.tau - usual.training.tau).max() < 1.5
     kept = made(log, torque_cutoff="none", outliers="keep")
     assert np.abs(kept.training.tau - usual.training.tau).max() > 30
@@ -182,6 +184,7 @@ def test_noise_is_what_lies_above_the_band():
         (lambda log: log | {"dq2": -log["dq2"]}, "fore has the other sign"),
         (lambda log: log | {"dq1": log["dq2"], "dq2": log["dq1"]}, "columns swapped"),
         (lambda log: log | {"dq1": np.degrees(log["dq1"])}, "is it in degrees"),
+        (lambda log: log | {"dq1": np.full_like(log["t"], 0.2)}, "its recorded speed is constant"),
         (lambda log: log | {"tau1": np.clip(log["tau1"], -5, 5)}, "at a limit"),
         (lambda log: log | {"tau2": np.zeros_like(log["t"])}, "is constant"),
         (

@@ -1,5 +1,6 @@
 """The command that writes an exciting trajectory for a controller."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import click
@@ -10,8 +11,8 @@ from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import LOG, say
 from paramreduce_cli.config import load_config
-from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.export.timed_motion import timed_motion
+from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.export.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Model, Trajectories, Trajectory
@@ -26,8 +27,8 @@ from paramreduce_cli.records import Model, Trajectories, Trajectory
     help="ros: a JointTrajectory message as YAML; urscript: for Universal Robots.",
 )  # fmt: skip
 @click.option(
-    "--which", default="estimation:1", show_default=True, metavar="SET:K",
-    help="Number K of the estimation or of the validation set.",
+    "--which", metavar="SET:K",
+    help="Number K of the estimation or of the validation set.  [default: the first of the former with a way there and back]",
 )  # fmt: skip
 @click.option("--rate", type=click.FloatRange(1, 1e5), default=125.0, show_default=True,
               help="Samples per second.")  # fmt: skip
@@ -41,7 +42,7 @@ def export_trajectory(
     results: Path | None,
     overrides: tuple[str, ...],
     kind: str,
-    which: str,
+    which: str | None,
     rate: float,
     output: Path | None,
 ) -> None:
@@ -56,19 +57,37 @@ def export_trajectory(
     store = Store(results or Path("results") / loaded.robot)
     model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
-    motion = timed_motion(
-        model.mechanism,
-        trajectories,
-        _chosen(trajectories, which),
-        rate=rate,
-        start_pose=None if pose is None else per_joint(pose, loaded.n_dof),
-        title=f"{loaded.robot} {which}",
-    )
+    start = None if pose is None else per_joint(pose, loaded.n_dof)
+
+    def timed(which: str) -> TimedMotion:
+        chosen, title = _chosen(trajectories, which), f"{loaded.robot} {which}"
+        return timed_motion(
+            model.mechanism, trajectories, chosen, rate=rate, start_pose=start, title=title
+        )
+
+    which, motion = (which, timed(which)) if which else _first(trajectories, timed)
     files = trajectory_formats[kind](motion)
     folder = output or store.folder / "export" / f"trajectory-{kind}"
     save_files(folder, {name: text.encode() for name, text in files.items()})
     rests = "" if trajectories.rest_to_rest or pose is not None else ", which begins in motion"
     say(f"{which}{rests}, {motion.time[-1]:.4g} s: {', '.join(files)} in {folder}")
+
+
+def _first(
+    trajectories: Trajectories, timed: Callable[[str], TimedMotion]
+) -> tuple[str, TimedMotion]:
+    """The first trajectory of the estimation set that there is a way to and back from.
+
+    Raises:
+        DataError: There is none; of the first one it is said why.
+    """
+    refused: list[DataError] = []
+    for k in range(1, len(trajectories.estimation) + 1):
+        try:
+            return f"estimation:{k}", timed(f"estimation:{k}")
+        except DataError as error:
+            refused.append(error)
+    raise refused[0]
 
 
 def _chosen(trajectories: Trajectories, which: str) -> Trajectory:

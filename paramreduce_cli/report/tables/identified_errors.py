@@ -12,10 +12,10 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 3)
 def identified_errors(data: ReportData) -> Table:
-    """Held-out errors joint by joint, root mean squares in N m (N), as shares of the torques and of the nominal torque, which may be the limit; correlation of a residual with the one before, and white samples that would tell as much of a constant."""
+    """Held-out errors joint by joint, root mean squares in N m (N), as shares of the torques and of the nominal torque, which may be the limit; correlation of a residual with the one before, the probability of such residuals if they were white (Ljung-Box), and white samples that would tell as much of a constant."""
     found = data.identification
     header = (
-        "joint", "noise", "all, N m", "reduced, N m", "of torques", "of nominal", "lag-1", "eff. samples",
+        "joint", "noise", "all, N m", "reduced, N m", "of torques", "of nominal", "lag-1", "white, p", "eff. samples",
     )  # fmt: skip
     rows = []
     if found is not None:
@@ -33,12 +33,13 @@ def identified_errors(data: ReportData) -> Table:
                     share(error / float(found.torque_size[j])),
                     "-" if nominal is None else share(error / float(nominal[j])),
                     f"{found.residuals.lag_one[j]:.2f}",
+                    f"{found.residuals.white[j]:.2g}",
                     f"{found.residuals.effective_samples[j]:.0f}",
                 )
             )
         worst = f"{np.nanmax(found.reduced.joint_held_out):.3g}"
         rows.append(
             ("all", "", share(found.full.held_out), share(found.reduced.held_out), f"worst {worst}",
-             "", "", "")
+             "", "", "", "")
         )  # fmt: skip
     return Table("Errors on measured torques", header, tuple(rows))
