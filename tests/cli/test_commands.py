@@ -3,7 +3,6 @@ import re
 import shutil
 import sys
 import types
-from types import SimpleNamespace
 
 import h5py
 import pytest
@@ -277,7 +276,7 @@ def test_run_says_what_settings_replace_in_the_default_folder(
 def test_the_first_trajectory_with_a_way_is_exported():
     from paramreduce_cli.cli.commands.export_trajectory import _first
 
-    trajectories = SimpleNamespace(estimation=(1, 2, 3))
+    trajectories = types.SimpleNamespace(estimation=(1, 2, 3))
 
     def timed(which):
         if which == "estimation:1":
@@ -286,4 +285,4 @@ def test_the_first_trajectory_with_a_way_is_exported():
 
     assert _first(trajectories, timed) == ("estimation:2", "estimation:2")
     with pytest.raises(DataError, match="no way to the first"):
-        _first(SimpleNamespace(estimation=(1,)), timed)
+        _first(types.SimpleNamespace(estimation=(1,)), timed)
