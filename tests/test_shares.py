@@ -206,7 +206,7 @@ def test_what_is_no_part(invoke, tmp_path, text, says):
 
 def test_what_cannot_be_done_in_parts(invoke, tmp_path, measured_copy):
     call = ("--results", tmp_path / "r", "--part", "1/2")
-    assert "No such option" in invoke("build-model", TWO_LINK, *call, code=2).err
+    assert "there is no option --part" in invoke("build-model", TWO_LINK, *call, code=2).err
     log = (next(measured_copy.glob("*.yaml")), "--results", measured_copy / "results")
     assert "sampled as a whole" in invoke("sample", *log, "--part", "1/2", "--force", code=2).err
 
