@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
+from paramreduce_cli.terms.kernels import WHOLE
 from paramreduce_cli.terms.likeness import Ways, alike
 from paramreduce_cli.terms.matrices import positive_definite, roots, times
 from paramreduce_cli.terms.samples import TermSamples, signed_outputs
-from paramreduce_cli.terms.tape import WHOLE, Remains, Tape
+from paramreduce_cli.terms.tape import Remains, Tape
 
 _LARGEST = 1e100
 """Share of an allowed error from which on it does not matter how large it is."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.fitting import Fit, Fitting
-from paramreduce_cli.terms.tape import ITSELF
+from paramreduce_cli.terms.kernels import ITSELF
 
 _TRIED = 8
 """Most promising terms that are tried: by the error with parameters fitted again, and without."""

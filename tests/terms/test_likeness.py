@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from paramreduce_cli.terms.kernels import NUMBER
 from paramreduce_cli.terms.likeness import alike
-from paramreduce_cli.terms.tape import NUMBER
 
 N, DOF, SAMPLES = 9, 2, 30
 

@@ -5,7 +5,8 @@ import pytest
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.terms.tape import ITSELF, NUMBER, WHOLE, Tape
+from paramreduce_cli.terms.kernels import ITSELF, NUMBER, WHOLE
+from paramreduce_cli.terms.tape import Tape
 
 
 @pytest.fixture

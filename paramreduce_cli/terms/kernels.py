@@ -1,0 +1,349 @@
+"""What a :class:`paramreduce_cli.terms.tape.Tape` computes again and again, compiled by Numba.
+
+Of a program in arrays: codes of the operations, signed operands, which of them are kept, and what nodes stand for.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+
+CONSTANT, INPUT, SUM, PRODUCT, SIN, COS, TANH, SIGN = range(8)
+CODES = {
+    "constant": CONSTANT, "input": INPUT, "+": SUM, "*": PRODUCT,
+    "sin": SIN, "cos": COS, "tanh": TANH, "sign": SIGN,
+}  # fmt: skip
+NONE = -1
+FIRST, SECOND, WHOLE, ITSELF = range(4)
+"""What of a node can be otherwise: its operands in a sum, whether it is zero, what it stands for."""
+NUMBER = -1
+"""What a node stands for that is a number."""
+
+
+@numba.njit(cache=True, nogil=True)
+def needed(
+    codes: IntArray, operands: IntArray, outputs: IntArray, kept: BoolArray, source: IntArray
+) -> BoolArray:
+    """Nodes that outputs are made of, (n_nodes,)."""
+    used = np.zeros(codes.size, dtype=np.bool_)
+    for value in outputs:
+        used[value >> 1] = True
+    for k in range(codes.size - 1, -1, -1):
+        code = codes[k]
+        if not used[k] or code <= INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
+            continue
+        if source[k] != k:
+            used[source[k]] = True
+            continue
+        if code != SUM or kept[k, FIRST]:
+            used[operands[k, 0] >> 1] = True
+        if code == PRODUCT or (code == SUM and kept[k, SECOND]):
+            used[operands[k, 1] >> 1] = True
+    return used
+
+
+@numba.njit(cache=True, nogil=True)
+def _made(
+    k: int,
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    inputs: FloatArray,
+    v: FloatArray,
+    result: FloatArray,
+) -> None:
+    """What node k makes of its operands."""
+    code, m = codes[k], inputs.shape[1]
+    a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
+    s = -1.0 if operands[k, 0] & 1 else 1.0
+    t = -1.0 if operands[k, 1] & 1 else 1.0
+    if code == CONSTANT:
+        result[:] = numbers[k]
+    elif code == INPUT:
+        result[:] = inputs[int(numbers[k])]
+    elif code == SUM:
+        if not kept[k, FIRST]:
+            s = 0.0
+        if not kept[k, SECOND]:
+            t = 0.0
+        for i in range(m):
+            result[i] = s * v[a, i] + t * v[b, i]
+    elif code == PRODUCT:
+        for i in range(m):
+            result[i] = s * t * v[a, i] * v[b, i]
+    else:
+        for i in range(m):
+            x = s * v[a, i]
+            if code == SIN:
+                result[i] = np.sin(x)
+            elif code == COS:
+                result[i] = np.cos(x)
+            elif code == TANH:
+                result[i] = np.tanh(x)
+            else:
+                result[i] = np.sign(x)
+
+
+@numba.njit(cache=True, nogil=True)
+def values(
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    inputs: FloatArray,
+    which: BoolArray,
+) -> FloatArray:
+    """Of the nodes that are asked for, zero for others, (n_nodes, n_samples)."""
+    v = np.zeros((codes.size, inputs.shape[1]))
+    for k in range(codes.size):
+        if not which[k] or not kept[k, WHOLE]:
+            continue
+        if source[k] == k:
+            _made(k, codes, operands, numbers, kept, inputs, v, v[k])
+        elif source[k] == NUMBER:
+            v[k] = factor[k]
+        else:
+            for i in range(v.shape[1]):
+                v[k, i] = factor[k] * v[source[k], i]
+    return v
+
+
+@numba.njit(cache=True, nogil=True)
+def own_values(
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    inputs: FloatArray,
+    v: FloatArray,
+) -> FloatArray:
+    """What nodes would be if they were kept as they are, (n_nodes, n_samples)."""
+    own = np.empty(v.shape)
+    for k in range(codes.size):
+        _made(k, codes, operands, numbers, kept, inputs, v, own[k])
+    return own
+
+
+@numba.njit(cache=True, nogil=True)
+def adjoints(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    v: FloatArray,
+    seeds: FloatArray,
+    which: BoolArray,
+) -> FloatArray:
+    """Derivatives by the nodes that are asked for, zero for others, (n_nodes, n_quantities, n_samples)."""
+    n, quantities, m = codes.size, seeds.shape[1], v.shape[1]
+    found = np.zeros((n, quantities, m))
+    reached = np.zeros((n, quantities), dtype=np.bool_)
+    for o in range(outputs.size):
+        k = outputs[o] >> 1
+        if not which[k]:
+            continue
+        s = -1.0 if outputs[o] & 1 else 1.0
+        for q in range(quantities):
+            if np.any(seeds[o, q]):
+                reached[k, q] = True
+                for i in range(m):
+                    found[k, q, i] += s * seeds[o, q, i]
+    for k in range(n - 1, -1, -1):
+        code = codes[k]
+        if not which[k] or code <= INPUT or not kept[k, WHOLE] or source[k] == NUMBER:
+            continue
+        a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
+        s = -1.0 if operands[k, 0] & 1 else 1.0
+        t = -1.0 if operands[k, 1] & 1 else 1.0
+        for q in range(quantities):
+            if not reached[k, q]:
+                continue
+            if source[k] != k:
+                reached[source[k], q] = True
+                for i in range(m):
+                    found[source[k], q, i] += factor[k] * found[k, q, i]
+            elif code == SUM:
+                if kept[k, FIRST] and which[a]:
+                    reached[a, q] = True
+                    for i in range(m):
+                        found[a, q, i] += s * found[k, q, i]
+                if kept[k, SECOND] and which[b]:
+                    reached[b, q] = True
+                    for i in range(m):
+                        found[b, q, i] += t * found[k, q, i]
+            elif code == PRODUCT:
+                if which[a]:
+                    reached[a, q] = True
+                    for i in range(m):
+                        found[a, q, i] += s * t * found[k, q, i] * v[b, i]
+                if which[b]:
+                    reached[b, q] = True
+                    for i in range(m):
+                        found[b, q, i] += s * t * found[k, q, i] * v[a, i]
+            elif code != SIGN and which[a]:
+                reached[a, q] = True
+                for i in range(m):
+                    x = s * v[a, i]
+                    if code == SIN:
+                        slope = np.cos(x)
+                    elif code == COS:
+                        slope = -np.sin(x)
+                    else:
+                        slope = 1.0 - v[k, i] ** 2
+                    found[a, q, i] += s * slope * found[k, q, i]
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def effects(
+    operands: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    candidates: IntArray,
+    v: FloatArray,
+    own: FloatArray,
+    adjoints: FloatArray,
+) -> FloatArray:
+    """What terms give to quantities, (n_candidates, n_quantities n_samples)."""
+    _, quantities, m = adjoints.shape
+    result = np.empty((candidates.shape[0], quantities * m))
+    given = np.empty(m)
+    for c in range(candidates.shape[0]):
+        k, what = candidates[c]
+        # Terms of nodes that are left out, or stand for others, give nothing.
+        given[:] = 0.0
+        if what == WHOLE:
+            if source[k] == k:
+                given[:] = own[k]
+            elif source[k] == NUMBER:
+                given[:] = factor[k]
+            else:
+                given[:] = factor[k] * v[source[k]]
+        elif what == ITSELF:
+            if kept[k, WHOLE]:
+                given[:] = own[k] - v[k]
+        elif kept[k, WHOLE] and source[k] == k:
+            given[:] = v[operands[k, what] >> 1]
+            if operands[k, what] & 1:
+                given *= -1.0
+        for q in range(quantities):
+            for i in range(m):
+                result[c, q * m + i] = adjoints[k, q, i] * given[i]
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def count(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+) -> int:
+    """Operations that are left."""
+    n = codes.size
+    stands_for = np.arange(n)
+    for k in range(n):
+        code = codes[k]
+        if not kept[k, WHOLE]:
+            stands_for[k] = NONE
+        elif source[k] == NUMBER:
+            continue
+        elif source[k] != k:
+            j = stands_for[source[k]]
+            if j == NONE or np.abs(factor[k]) == 1.0:
+                stands_for[k] = j
+        elif code > INPUT:
+            a, b = stands_for[operands[k, 0] >> 1], stands_for[operands[k, 1] >> 1]
+            if code == SUM:
+                if not kept[k, FIRST]:
+                    a = NONE
+                if not kept[k, SECOND]:
+                    b = NONE
+                if a == NONE:
+                    stands_for[k] = b
+                elif b == NONE:
+                    stands_for[k] = a
+            elif code == PRODUCT:
+                if a == NONE or b == NONE:
+                    stands_for[k] = NONE
+            elif a == NONE and code != COS:
+                stands_for[k] = NONE
+    used = np.zeros(n, dtype=np.bool_)
+    for value in outputs:
+        node = stands_for[value >> 1]
+        if node != NONE:
+            used[node] = True
+    found = 0
+    for k in range(n - 1, -1, -1):
+        if not used[k] or codes[k] <= INPUT or source[k] == NUMBER:
+            continue
+        found += 1
+        if source[k] != k:
+            used[stands_for[source[k]]] = True
+            continue
+        sides = 2 if codes[k] <= PRODUCT else 1
+        for side in range(sides):
+            node = stands_for[operands[k, side] >> 1]
+            if node != NONE:
+                used[node] = True
+    return found
+
+
+@numba.njit(cache=True, nogil=True)
+def counts(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    candidates: IntArray,
+) -> IntArray:
+    """The same with one more term the other way round, (n_candidates,)."""
+    result = np.empty(candidates.shape[0], dtype=np.int64)
+    changed, sources = kept.copy(), source.copy()
+    for c in range(candidates.shape[0]):
+        k, what = candidates[c]
+        if what == ITSELF:
+            sources[k] = k
+        else:
+            changed[k, what] = not changed[k, what]
+        result[c] = count(codes, operands, outputs, changed, sources, factor)
+        if what == ITSELF:
+            sources[k] = source[k]
+        else:
+            changed[k, what] = not changed[k, what]
+    return result
+
+
+@numba.njit(cache=True, nogil=True)
+def counts_standing(
+    codes: IntArray,
+    operands: IntArray,
+    outputs: IntArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    nodes: IntArray,
+    standing_for: IntArray,
+    times: FloatArray,
+) -> IntArray:
+    """The same with one more node standing for another one, (n_ways,)."""
+    result = np.empty(nodes.size, dtype=np.int64)
+    sources, factors = source.copy(), factor.copy()
+    for c in range(nodes.size):
+        k = nodes[c]
+        sources[k], factors[k] = standing_for[c], times[c]
+        result[c] = count(codes, operands, outputs, kept, sources, factors)
+        sources[k], factors[k] = source[k], factor[k]
+    return result
