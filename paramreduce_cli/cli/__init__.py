@@ -66,6 +66,8 @@ def _hint(made: Callable[..., str], *arguments: object) -> str:
     try:
         return made(*arguments)
     except Exception:
+        if os.environ.get("PARAMREDUCE_DEBUG"):
+            raise
         return ""
 
 

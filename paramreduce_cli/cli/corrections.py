@@ -127,11 +127,9 @@ def _file(message: str, words: Words) -> Words | None:
 
 def _results(message: str, words: Words) -> Words | None:
     """Results that are not there yet, of a config that is."""
-    found = re.match(
-        r"results/([\w.-]+?)(?:/\S*)?: (?:there is no such file|is not there)", message
-    )
-    config = Path("configs") / f"{found[1]}.yaml" if found else None
-    return ["run", str(config)] if config is not None and config.is_file() else None
+    found = re.match(r"(results/\S+): (?:there is no such file|is not there)", message)
+    config = config_meant(found[1]) if found else None
+    return None if config is None else ["run", str(config)]
 
 
 def _setting(message: str, words: Words) -> Words | None:

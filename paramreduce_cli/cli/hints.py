@@ -12,7 +12,7 @@ import click
 
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.cli.corrections import corrected, misplaced
-from paramreduce_cli.cli.here import configs_in, results_in
+from paramreduce_cli.cli.here import config_meant, configs_in, results_in
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.6
@@ -136,8 +136,8 @@ def with_arguments(text: str) -> str:
 def _usual_config(text: str) -> str:
     """Of the results folder whose file a message begins with; empty if there is none."""
     found = re.match(r"(\S+?)(?:/report)?/[\w-]+\.(?:h5|json|html): ", text)
-    path = Path("configs") / f"{Path(found[1]).name}.yaml" if found else None
-    return shlex.quote(str(path)) if path is not None and path.is_file() else ""
+    config = config_meant(found[1]) if found else None
+    return "" if config is None else shlex.quote(str(config))
 
 
 def _own_arguments(words: Sequence[str]) -> str:

@@ -263,7 +263,7 @@ def negative_friction(
     if not joints:
         return []
     listed = ", ".join(f"{names[k]} = {values[k]:.3g}" for k in wrong[:_MOST])
-    if len(joints) > len(set(owners)) / 2:
+    if len(joints) > max(1, len(set(owners)) / 2):
         return [
             f"Friction comes out negative at most joints ({listed}): is the sign of all torques wrong? See "
             "sampling.log.torque_signs."

@@ -14,7 +14,7 @@ class PageSection(Enum):
     Some tell of a mechanism, and stand on the page only where there is one.
     """
 
-    ANSWER = ("All heuristics", "")
+    HEURISTICS = ("All heuristics", "")
     IDENTIFICATION = (
         "What the measurements say",
         "Measured torques of the part that was held out: nothing was learned from it, nor the number of "

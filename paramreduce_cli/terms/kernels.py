@@ -166,9 +166,10 @@ def adjoints(
             if not reached[k, q]:
                 continue
             if source[k] != k:
-                reached[source[k], q] = True
-                for i in range(m):
-                    found[source[k], q, i] += factor[k] * found[k, q, i]
+                if which[source[k]]:
+                    reached[source[k], q] = True
+                    for i in range(m):
+                        found[source[k], q, i] += factor[k] * found[k, q, i]
             elif code == SUM:
                 if kept[k, FIRST] and which[a]:
                     reached[a, q] = True

@@ -73,7 +73,9 @@ def test_the_page_needs_nothing_else(folder):
 
         def handle_starttag(self, tag, attrs):
             self.found += [v for k, v in attrs if k in ("src", "href") and v]
-            self.anchors |= {f"#{v}" for k, v in attrs if k == "id"}
+            own = {f"#{v}" for k, v in attrs if k == "id"}
+            assert not own & self.anchors  # two of one name: links would go to the first
+            self.anchors |= own
 
     page = (folder / "index.html").read_text()
     links = Links()

@@ -8,7 +8,7 @@ from paramreduce_cli.texts import share
 from paramreduce_cli.texts.table import Table
 
 
-@placed(PageSection.ANSWER, 3)
+@placed(PageSection.HEURISTICS, 3)
 def joint_errors(data: ReportData) -> Table:
     """Root mean squares of what the selected model misses of each joint's torque, and as a share of that torque."""
     selected = data.validation.selected

@@ -6,7 +6,7 @@ from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
 
-@placed(PageSection.ANSWER, 1)
+@placed(PageSection.HEURISTICS, 1)
 def summary(data: ReportData) -> Table:
     """Every heuristic at the selected number of parameters, both functions."""
     n = data.validation.selected.n
