@@ -37,7 +37,8 @@ class Simulated:
 
 
 @cache
-def _arm():
+def arm():
+    """Mechanism, dynamics, base parameters and values in puma560_friction.yaml."""
     config = load_config(CONFIG)
     mechanism = config.mechanism()
     dynamics = Dynamics(mechanism)
@@ -48,7 +49,7 @@ def _arm():
 
 def simulated(seed):
     """A motion of the arm with friction in puma560_friction.yaml."""
-    mechanism, dynamics, base, values = _arm()
+    mechanism, dynamics, base, values = arm()
     rng = np.random.default_rng(seed)
     harmonics = 5
     time = np.arange(0, SECONDS, 1 / RATE)
@@ -131,7 +132,7 @@ def tilt_torques(seed):
     """Torques of gravity of one m/s^2 along x and y of the arm's base in the motion of a seed."""
     from dataclasses import replace
 
-    mechanism, _, _, values = _arm()
+    mechanism, _, _, values = arm()
     log = simulated(seed)
     still = np.zeros_like(log.z)
     return [

@@ -22,7 +22,7 @@ import numpy as np
 from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file, missing
 from paramreduce_cli.errors import ArtifactError
 
-SCHEMA = 13
+SCHEMA = 14
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
 _CHUNK = 16384

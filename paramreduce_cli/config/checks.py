@@ -202,6 +202,7 @@ def _per_joint(config: Config) -> Iterator[Problem]:
         ),
         (("trajectories", "torque_limits"), trajectories.torque_limits, "N m (N)"),
         (("trajectories", "power_limits"), trajectories.power_limits, "W"),
+        (("trajectories", "torque_noise"), trajectories.torque_noise, "N m (N)"),
         (("trajectories", "start_pose"), trajectories.start_pose, "rad (m)"),
         (
             ("sampling", "nominal_acceleration"),

@@ -72,6 +72,8 @@ class TrajectoriesSection(Section):
     """Largest torque of the model with the values in the config, one for all joints or a list; N m (N if prismatic)."""
     power_limits: LimitPerJoint | None = None
     """Largest product of torque and speed, one for all joints or a list; W."""
+    torque_noise: PositivePerJoint | None = None
+    """Standard deviation of measured torques, which weights the rows of each joint: a joint that is measured better counts more; the nominal torques if left out; one for all joints or a list, N m (N if prismatic)."""
     rest_to_rest: bool = False
     """Whether trajectories begin and end at rest, without acceleration."""
     start_pose: PerJoint | None = None

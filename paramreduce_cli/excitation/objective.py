@@ -61,21 +61,21 @@ class Excitation:
     """Quantities of the mechanism that are bounded."""
     beta: FloatArray
     """The other columns in the base columns, (r, n - r)."""
-    nominal_torque: FloatArray
-    """(n_dof,), N m or N."""
+    torque_scale: FloatArray
+    """What rows of each joint are divided by, (n_dof,), N m or N."""
     criterion: Criterion
     scaling: Scaling
     loads: Loads
     """Limits of torque and power."""
 
     def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """W with every row divided by its joint's nominal torque; smooth."""
+        """W with every row divided by its joint's scale of torque; smooth."""
         W = self.observation.forward(q, dz, ddz)
         W *= self._row_weights(q.shape[0])
         return W
 
     def _row_weights(self, points: int) -> FloatArray:
-        return np.tile(1 / self.nominal_torque, points)[:, None]
+        return np.tile(1 / self.torque_scale, points)[:, None]
 
     def condition_numbers(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> dict[str, float]:
         """The condition number in every scaling, by singular values.

@@ -46,7 +46,8 @@ class ExcitationTask:
     base: BaseParameters
     base_values: FloatArray
     """Of the base parameters, (r,)."""
-    nominal_torque: FloatArray
+    torque_scale: FloatArray
+    """What rows of each joint are divided by, (n_dof,), N m or N."""
     criterion: str
     constraints: tuple[Constraint, ...]
     settings: Settings
@@ -73,11 +74,11 @@ def excitation_of(task: ExcitationTask) -> Excitation:
         coordinates=coordinates,
         quantities=Quantities(mechanism, task.constraints),
         beta=task.base.beta,
-        nominal_torque=task.nominal_torque,
+        torque_scale=task.torque_scale,
         criterion=criteria[task.criterion],
         scaling=scalings[task.settings.scaling],
         loads=Loads(
-            task.base_values, settings.limits.torque, settings.limits.power, task.nominal_torque
+            task.base_values, settings.limits.torque, settings.limits.power, task.torque_scale
         ),
     )
 

@@ -1,8 +1,8 @@
 """Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -12,6 +12,13 @@ from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.doubts import doubts
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.pieces import Piece, moving, split
+from paramreduce_cli.identification.shown import (
+    Outliers,
+    place_to_show,
+    recorded_to_show,
+    shown,
+    speeds,
+)
 from paramreduce_cli.identification.signals import Signals, evened, signals
 from paramreduce_cli.records import (
     FloatArray,
@@ -21,7 +28,6 @@ from paramreduce_cli.records import (
     Progress,
     RawLog,
     RawLogs,
-    ShownSignals,
     Spectra,
     Tell,
 )
@@ -38,8 +44,6 @@ _USED_PER_CUTOFF = 10
 _ANTI_ALIAS = 0.4
 """Cut-off of the low-pass before thinning, a share of the rate after it."""
 _FEWEST_USED = 20
-_MOST_SHOWN = 1500
-"""Samples in figures."""
 _SAME_RATE = 0.01
 _WORK = ("clean", "spectra", "low-pass and differentiate", "look at them")
 """What is told of."""
@@ -75,21 +79,23 @@ def processed(
 
     steps: list[str] = []
     begin(0)
-    training, sources, rate = _read(logs.training, wanted, names, steps)
-    held_out, other_sources, other_rate = _read(logs.held_out, wanted, names, steps)
-    if held_out and abs(other_rate - rate) > _SAME_RATE * rate:
+    files = _read(logs.training, wanted, names, steps)
+    others = _read(logs.held_out, wanted, names, steps)
+    training, held_out, rate = files.motions, others.motions, files.rate
+    if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
         raise DataError(
-            f"{other_sources[0]}: is recorded at {other_rate:.6g} Hz, {sources[0]} at "
+            f"{others.sources[0]}: is recorded at {others.rate:.6g} Hz, {files.sources[0]} at "
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
     suspected = dict.fromkeys(text for piece in recorded for text in doubts(piece, rate, names))
     learned_from, tested_on = _parts(training, held_out, wanted)
-    _check_left(learned_from, sources, wanted)
+    _check_left(learned_from, files.sources, wanted)
     raw = [piece for part in learned_from for piece in part]
-    shown = max(range(len(raw)), key=lambda k: raw[k].signals.time.size)
-    longest = raw[shown].signals
-    shown_raw = _shown(longest, rate)
+    tested_raw = [piece for part in tested_on for piece in part]
+    place = place_to_show(learned_from, [] if held_out else tested_on, rate)
+    longest = raw[place.learned].signals
+    before = recorded_to_show(place.of(raw, tested_raw), rate)
     begin(1)
     spectra = _spectra(longest, rate)
     cutoffs = _cutoffs(wanted, spectra, rate, steps)
@@ -102,9 +108,8 @@ def processed(
     steps.append(_said_of_states(longest, thin, rate / thin))
     begin(2)
     made = ready(raw)
-    shown_ready = _shown(made[shown].signals, rate / thin)
-    learned = _motions(made, wanted.folds)
-    tested = _motions(ready([piece for part in tested_on for piece in part]), 1)
+    made_tested = ready(tested_raw)
+    learned, tested = _motions(made, wanted.folds), _motions(made_tested, 1)
     _check_enough(learned, tested)
     steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
     begin(3)
@@ -122,7 +127,13 @@ def processed(
         delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / power)),
-        shown=ShownSignals(*shown_raw, *shown_ready),
+        shown=shown(
+            before,
+            place.of(made, made_tested),
+            cutoffs.torque,
+            rate / thin,
+            files.outliers[place.file],
+        ),
         spectra=spectra,
         steps=tuple(steps),
         doubts=tuple(suspected),
@@ -131,13 +142,21 @@ def processed(
     return found
 
 
+@dataclass
+class _Files:
+    """What was read, file by file."""
+
+    motions: list[list[Signals]] = field(default_factory=list)
+    sources: list[str] = field(default_factory=list)
+    outliers: list[Outliers] = field(default_factory=list)
+    rate: float = 0.0
+    """Samples per second of them all."""
+
+
 def _read(
     logs: Iterable[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
-) -> tuple[list[list[Signals]], list[str], float]:
-    """Motions of each file, where they are from, and samples per second."""
-    found = []
-    sources: list[str] = []
-    rates: list[float] = []
+) -> _Files:
+    files = _Files()
     for log in logs:
         source = log.source
         recorded = signals(log, wanted, names)
@@ -152,17 +171,18 @@ def _read(
         duration = recorded.time[-1] - recorded.time[0]
         steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
-        if wanted.outliers == "replace":
-            steps += _said_of_outliers(replace_outliers(pieces), names)
-        if rates and abs(rate - rates[0]) > _SAME_RATE * rates[0]:
+        outliers = replace_outliers(pieces) if wanted.outliers == "replace" else {}
+        steps += _said_of_outliers(outliers, names)
+        if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
             raise DataError(
-                f"{source}: is recorded at {rate:.6g} Hz, {sources[0]} at {rates[0]:.6g} Hz. Bring "
+                f"{source}: is recorded at {rate:.6g} Hz, {files.sources[0]} at {files.rate:.6g} Hz. Bring "
                 "logs of one rate."
             )
-        sources.append(source)
-        rates.append(rate)
-        found.append(pieces)
-    return found, sources, rates[0] if rates else 0.0
+        files.rate = files.rate or rate
+        files.sources.append(source)
+        files.outliers.append(outliers)
+        files.motions.append(pieces)
+    return files
 
 
 def _parts(
@@ -176,16 +196,8 @@ def _parts(
     return [one for one, _ in halves], [two for _, two in halves]
 
 
-def _speeds(piece: Signals, rate: float) -> Iterator[FloatArray]:
-    """As recorded, or differences of positions, joint by joint."""
-    if piece.dz is not None:
-        return iter(piece.dz.T)
-    # Plain differences: noise that is white in the positions rises to the end of the spectrum.
-    return (np.diff(z, append=z[-1:]) * rate for z in piece.z.T)
-
-
 def _spectra(piece: Signals, rate: float) -> Spectra:
-    frequency, velocity = filters.spectrum(_speeds(piece, rate), rate)
+    frequency, velocity = filters.spectrum(speeds(piece, rate), rate)
     _, torque = filters.spectrum(piece.tau.T, rate)
     return Spectra(frequency[1:], velocity[1:], torque[1:])
 
@@ -297,9 +309,7 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
     return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
 
 
-def _said_of_outliers(
-    found: Mapping[tuple[str, int], Sequence[float]], names: Sequence[str]
-) -> Iterator[str]:
+def _said_of_outliers(found: Outliers, names: Sequence[str]) -> Iterator[str]:
     if not found:
         return
     listed = ", ".join(
@@ -356,10 +366,3 @@ def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArr
         )
         noise.append(np.std(above[used]))
     return np.array(noise)
-
-
-def _shown(piece: Signals, rate: float) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Some times, speeds and torques for figures, copied so that the rest may be forgotten."""
-    every = max(1, piece.time.size // _MOST_SHOWN)
-    speeds = np.column_stack([speed[::every] for speed in _speeds(piece, rate)])
-    return piece.time[::every].copy(), speeds, piece.tau[::every].copy()

@@ -64,15 +64,31 @@ class MeasuredMotions:
 
 @dataclass(frozen=True)
 class ShownSignals:
-    """Signals before and after, thinned for figures; of the first motion of a set."""
+    """Signals before and after, thinned for figures; of the longest motion that is learned from, and of what is
+    held out of the same.
+    """
 
     raw_time: FloatArray
+    """s"""
+    raw_z: FloatArray
+    """As recorded, but for outliers, (n_raw, n_dof)."""
     raw_dz: FloatArray
     """Speeds as recorded, or differences of the positions as recorded."""
     raw_tau: FloatArray
     time: FloatArray
+    """s"""
+    z: FloatArray
+    """As they are used, (n_shown, n_dof)."""
     dz: FloatArray
+    ddz: FloatArray
     tau: FloatArray
+    """Through the low-pass that the observation matrix passes too."""
+    learned: FloatArray
+    """First and last time of what is learned from, (2,), s."""
+    held_out: FloatArray
+    """The same of what is held out; not numbers where that is in other motions."""
+    outliers: FloatArray
+    """Replaced samples in a row each, (n_outliers, 3): 0 of a position, 1 of a torque; joint from 0; time, s."""
 
 
 @dataclass(frozen=True)

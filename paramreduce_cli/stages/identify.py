@@ -1,7 +1,6 @@
 """identify: values from measured torques, how sure they are, and what looks wrong."""
 
 import warnings
-from dataclasses import replace
 
 import numpy as np
 
@@ -10,8 +9,7 @@ from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.comparison import compared
 from paramreduce_cli.identification.estimation import LinearFit, robust_fit, rows_of
-from paramreduce_cli.identification.hints import hints, negative_friction
-from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.identification.suspicions import suspicions
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import (
@@ -20,7 +18,6 @@ from paramreduce_cli.records import (
     Estimate,
     FloatArray,
     Identification,
-    Kind,
     MeasuredLog,
     Model,
     Progress,
@@ -32,24 +29,10 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.reduction.noise import joint_noise
-from paramreduce_cli.texts import share
 
 _STEPS = 3
 _MOST_SHOWN = 1500
 """Samples in figures."""
-_HARDLY = 0.3
-"""Share of the torques that is left where hardly anything was understood."""
-_FARTHER = 2.5
-"""Times the error of what was learned from, from which on what was held out is said to be missed."""
-_NOTABLE = 0.1
-"""Share of the torques from which on that is worth a word."""
-_FRICTION = (Kind.COULOMB, Kind.VISCOUS)
-_DRIVES = {
-    Kind.COULOMB: "coulomb", Kind.VISCOUS: "viscous", Kind.ROTOR: "inertia", Kind.OFFSET: "offset",
-}  # fmt: skip
-"""Keys of drives by the kinds of their parameters."""
-_ACROSS = 1e-6
-"""Share of gravity below which an axis counts as level."""
 
 
 def identify(
@@ -76,31 +59,7 @@ def identify(
     tell(Progress("identification", 1, _STEPS, "base parameters"))
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
     tell(Progress("identification", 2, _STEPS, "selected parameters"))
-    mechanism = model.mechanism
-    suspected = hints(
-        full_fit,
-        mechanism.coordinate_names,
-        _tilts(model, training, full_fit),
-        gravity=float(np.linalg.norm(mechanism.gravity)),
-        delay=0.0 if log is None else log.delay,
-        sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
-        modelled=[
-            f"drives.{p.owner}.{_DRIVES[p.kind]}" for p in mechanism.parameters if p.kind in _DRIVES
-        ],
-    )
-    suspected += _friction_doubts(model, full)
-    if full.held_out > _FARTHER * full.train and full.held_out > _NOTABLE:
-        suspected.insert(
-            0,
-            f"Torques that were held out are missed by {share(full.held_out)}, those that were learned from by "
-            f"{share(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?",
-        )
-    if full.train > _HARDLY:
-        suspected.insert(
-            0,
-            f"All base parameters together leave {share(full.train)} of the torques unexplained: is the log of this "
-            "robot, are its columns in this order, is friction modelled?",
-        )
+    suspected = suspicions(model, training, full, full_fit, delay=0.0 if log is None else log.delay)
     for text in suspected:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _shown(held_out)
@@ -120,19 +79,6 @@ def identify(
         shown_measured=np.concatenate([block.tau for block in shown]),
         shown_full=_predicted(shown, full.standard),
         shown_reduced=_predicted(shown, reduced.standard),
-    )
-
-
-def _friction_doubts(model: Model, full: Estimate) -> list[str]:
-    """Of the base parameters those of friction that stand for themselves."""
-    kinds = {p.name: p for p in model.mechanism.parameters if p.kind in _FRICTION}
-    places = [k for k, name in enumerate(full.names) if name in kinds]
-    found = [kinds[full.names[k]] for k in places]
-    return negative_friction(
-        [p.name for p in found],
-        [p.owner for p in found],
-        full.values[places],
-        full.deviations[places],
     )
 
 
@@ -209,30 +155,6 @@ def _sizes(part: SampleSet) -> FloatArray:
     """Root mean squares of the torques, (n_dof,)."""
     total = np.sum([np.sum(block.tau**2, axis=0) for block in part.blocks()], axis=0)
     return np.where(total > 0, np.sqrt(total / part.n_samples), 1.0)
-
-
-def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[FloatArray, ...]]:
-    """Torques of gravity along the base's level axes, of the known masses, where there are any."""
-    mechanism = model.mechanism
-    level = np.abs(mechanism.gravity) <= _ACROSS * np.linalg.norm(mechanism.gravity)
-    if (
-        not level[:2].all()
-        or not np.any(model.values)
-        or len(fitted.rows.X) != len({block.trajectory for block in training.blocks()})
-    ):
-        return []
-    found = []
-    without = Dynamics(replace(mechanism, gravity=np.zeros(3)))
-    for axis in np.eye(3)[:2]:
-        tilted = Dynamics(replace(mechanism, gravity=axis))
-        parts: dict[int, list[FloatArray]] = {}
-        for block in training.blocks():
-            still = np.zeros_like(block.q)
-            K = tilted.regressor(block.q, still, still)
-            weightless = without.regressor(block.q, still, still)
-            parts.setdefault(block.trajectory, []).append((K - weightless) @ model.values)
-        found.append(tuple(np.concatenate(part) for part in parts.values()))
-    return found
 
 
 def _consistency(

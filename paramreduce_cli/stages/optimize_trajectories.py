@@ -68,12 +68,20 @@ def excitation_task(
         mechanism=model.mechanism,
         base=model.base,
         base_values=model.base_values,
-        nominal_torque=model.nominal_torque,
+        torque_scale=_torque_scale(wanted, model.nominal_torque),
         criterion=wanted.criterion,
         constraints=_constraints(wanted, model.mechanism),
         settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
+
+
+def _torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> FloatArray:
+    """Noise of the torques where it is given; what is not measured stays without weight."""
+    if wanted.torque_noise is None:
+        return nominal_torque
+    noise = per_joint(wanted.torque_noise, nominal_torque.size)
+    return np.where(np.isfinite(nominal_torque), noise, np.inf)
 
 
 def _constraints(wanted: TrajectoriesSection, mechanism: Mechanism) -> tuple[Constraint, ...]:

@@ -19,6 +19,7 @@ from paramreduce_cli.excitation.optimiser import optimise_trajectory
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.export.timed_motion import timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import Run
@@ -99,6 +100,31 @@ def test_gradients_of_loads_and_rest(seed):
     for direction in rng.normal(size=(4, x.size)):
         found = slope(lambda x: objective(x)[0], [x], direction, step=1e-6)
         assert found == pytest.approx(gradient @ direction, rel=1e-4, abs=1e-6)
+
+
+def test_noise_of_torques_weights_the_rows():
+    """D-optimality and condition number by definition, and peaks of torque without weights."""
+    noise = np.array([0.4, 0.02])
+    config, model = config_and_model("two_link", *ASKED, "trajectories.torque_noise=[0.4, 0.02]")
+    plain, _ = config_and_model("two_link", *ASKED)
+    weighted, usual = (
+        excitation_of(excitation_task(c.trajectories, model)) for c in (config, plain)
+    )
+    rng = np.random.default_rng(0)
+    z, dz, ddz = rng.normal(size=(3, 40, 2))
+    dynamics = Dynamics(model.mechanism)
+    W = dynamics.regressor(z, dz, ddz)[..., model.base.columns] / noise[:, None]
+    W = W.reshape(80, -1)
+    unit = W / np.linalg.norm(W, axis=0)
+    found = weighted.condition_numbers(z, dz, ddz)
+    assert found["column-normalised"] == pytest.approx(np.linalg.cond(unit), rel=1e-9)
+    assert found != pytest.approx(usual.condition_numbers(z, dz, ddz), rel=0.05)
+    np.testing.assert_allclose(weighted.peak_torques(z, dz, ddz), usual.peak_torques(z, dz, ddz))
+    assert weighted.load_share(z, dz, ddz) == pytest.approx(usual.load_share(z, dz, ddz), rel=1e-9)
+    made = optimize_trajectories(config.trajectories, model, None, Run())
+    for trajectory in made.estimation:
+        own = weighted.condition_numbers(*states(made, trajectory, finer=1))
+        assert own["column-normalised"] == pytest.approx(trajectory.kappa, rel=1e-6)
 
 
 def test_limits_that_no_motion_keeps_are_said():

@@ -8,7 +8,10 @@ from simulated_logs import two_link_log
 
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.identification.pieces import Piece
 from paramreduce_cli.identification.processing import UNUSED, processed
+from paramreduce_cli.identification.shown import Place, place_to_show
+from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import RawLog, RawLogs
 
 NAMES = ("upper", "fore")
@@ -147,6 +150,48 @@ def test_single_outliers_are_replaced():
     assert np.abs(found.training.tau - usual.training.tau).max() < 1.5
     kept = made(log, torque_cutoff="none", outliers="keep")
     assert np.abs(kept.training.tau - usual.training.tau).max() > 30
+
+
+def test_what_is_shown_is_what_was_done():
+    log = two_link_log()
+    log["tau1"] = log["tau1"].copy()
+    log["tau1"][[300, 700, 2300]] += 40
+    found = made(log, torque_cutoff=5, trim=[0.5, 0])
+    shown = found.shown
+    learned, tested = used(found.training), used(found.held_out)
+    assert shown.learned.tolist() == [learned[0], learned[-1]]
+    assert shown.held_out.tolist() == [tested[0], tested[-1]]
+    assert shown.raw_time[[0, -1]] == pytest.approx(log["t"][[0, -1]], abs=0.01)
+    assert [row.tolist() for row in shown.outliers if row[1] == 0] == [
+        [1, 0, log["t"][k]] for k in (300, 700, 2300)
+    ]
+    clean = two_link_log(noise=0)
+    truth = np.column_stack(
+        [np.interp(shown.time, clean["t"], clean[f"tau{j + 1}"]) for j in range(2)]
+    )
+    raw = np.column_stack([np.interp(shown.time, shown.raw_time, r) for r in shown.raw_tau.T])
+    rough, smooth = (np.median(np.abs(np.diff(t - truth, axis=0))) for t in (raw, shown.tau))
+    assert smooth < rough / 5
+
+
+def test_held_out_files_are_not_shown_after_what_is_learned_from():
+    shown = made(two_link_log(seconds=6), RawLog("b.csv", two_link_log(seed=1), 2), held_out_files=["b.csv"]).shown  # fmt: skip
+    assert np.isnan(shown.held_out).all()
+    assert shown.raw_time[-1] == pytest.approx(6, abs=0.01)
+
+
+def test_the_longest_motion_is_shown_with_what_goes_on_from_it():
+    def motion(first, size):
+        time = first + np.arange(size) / 10
+        z = np.zeros((size, 1))
+        return Piece(Signals(time, z, z, z, z), time[0], time[-1])
+
+    learned = [[motion(0, 30)], [motion(0, 20), motion(5, 50)]]
+    held_out = [[motion(3, 40)], [motion(10, 25), motion(20, 60)]]
+    assert place_to_show(learned, held_out, 10.0) == Place(file=1, learned=2, held_out=1)
+    assert place_to_show(learned, [[], [motion(11, 25)]], 10.0).held_out is None
+    assert place_to_show(learned, [], 10.0).held_out is None
+    assert place_to_show([[motion(0, 60), motion(9, 5)]], [[motion(6, 5)]], 10.0).held_out is None
 
 
 def test_steps_of_friction_are_no_outliers():

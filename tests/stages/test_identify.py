@@ -1,6 +1,7 @@
 """The stages on a log of the two-link arm with friction, whose truth is known."""
 
 import json
+import re
 
 import h5py
 import numpy as np
@@ -79,7 +80,13 @@ def test_summary_and_page(measured_results):
     page = (report / "index.html").read_text().split("<script")[0]
     assert "What the measurements say" in page
     assert "full model" not in page.lower().replace("beats the full one", "")
-    for name in ("log-signals", "log-spectra", "measured-torques", "cross-validation"):
+    for name in (
+        "log-motion",
+        "log-torques",
+        "log-spectra",
+        "measured-torques",
+        "cross-validation",
+    ):
         assert (report / "figures" / f"{name}.svg").exists()
 
 
@@ -174,6 +181,18 @@ def test_torques_of_another_machine_are_suspected(tmp_path, invoke):
     settings = ["report.formats=[svg]", "identification.consistency=none"]
     error = invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings).err
     assert "of the torques unexplained: is the log of this robot" in error.replace("\n", " ")
+
+
+def test_torques_in_another_unit_are_suspected(tmp_path, invoke):
+    log = two_link_log()
+    for j in (1, 2):
+        log[f"tau{j}"] = 1000 * log[f"tau{j}"]
+    write_log(tmp_path / "log.csv", log)
+    settings = ["report.formats=[svg]", "identification.consistency=none"]
+    error = invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings).err
+    assert re.search(
+        r"Torques are (9\d\d|1[.\d]*e\+03) times what the parameters", error.replace("\n", " ")
+    )
 
 
 def test_another_heuristic_is_cross_validated_anew(measured_copy, invoke):

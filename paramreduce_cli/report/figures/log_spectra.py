@@ -8,7 +8,7 @@ from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import joint_style, legend_beside, pair_of_plots
 
 
-@placed(PageSection.LOG, 3)
+@placed(PageSection.LOG, 4)
 def log_spectra(data: ReportData) -> Figure | None:
     """Power spectral densities of speeds and torques as recorded, with the cut-offs of the low-passes."""
     if data.log is None:

@@ -1,0 +1,159 @@
+"""What is suspected of a log and its model, the most important first: all there is to say after a fit."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from paramreduce_cli.identification.estimation import LinearFit
+from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
+from paramreduce_cli.identification.hints import hints, negative_friction
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import INERTIAL, Estimate, FloatArray, Kind, Model, SampleSet
+from paramreduce_cli.texts import share
+
+_HARDLY = 0.3
+"""Share of the torques that is left where hardly anything was understood."""
+_FARTHER = 2.5
+"""Times the error of what was learned from, from which on what was held out is said to be missed."""
+_NOTABLE = 0.1
+"""Share of the torques from which on that is worth a word."""
+_FRICTION = (Kind.COULOMB, Kind.VISCOUS)
+_DRIVES = {
+    Kind.COULOMB: "coulomb", Kind.VISCOUS: "viscous", Kind.ROTOR: "inertia", Kind.OFFSET: "offset",
+}  # fmt: skip
+"""Keys of drives by the kinds of their parameters."""
+_ACROSS = 1e-6
+"""Share of gravity below which an axis counts as level."""
+_ENOUGH = 6000
+"""Torques that are looked at where not all are needed."""
+
+
+def suspicions(
+    model: Model, training: SampleSet, full: Estimate, fitted: LinearFit, delay: float
+) -> list[str]:
+    """Sentences on what looks wrong.
+
+    Args:
+        model: Of the machine.
+        training: What was learned from.
+        full: All base parameters.
+        fitted: Their fit, with its residuals.
+        delay: Of the torques, that was taken back already, s.
+    """
+    looked_at = _some(model, training)
+    gravity = doubted_gravity(
+        looked_at.W, looked_at.pulls, looked_at.tau, fitted.deviation, model.mechanism.gravity
+    )
+    if gravity:  # what else is seen follows from that
+        return gravity
+    mechanism = model.mechanism
+    return [
+        *_missed(full),
+        *_doubted_bodies(model, looked_at, full),
+        *hints(
+            fitted,
+            mechanism.coordinate_names,
+            _tilts(model, training, fitted),
+            gravity=float(np.linalg.norm(mechanism.gravity)),
+            delay=delay,
+            sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
+            modelled=[
+                f"drives.{p.owner}.{_DRIVES[p.kind]}"
+                for p in mechanism.parameters
+                if p.kind in _DRIVES
+            ],
+        ),
+        *_friction_doubts(model, full),
+    ]
+
+
+def _missed(full: Estimate) -> Iterator[str]:
+    """What errors say as they are."""
+    if full.train > _HARDLY:
+        yield (
+            f"All base parameters together leave {share(full.train)} of the torques unexplained: is the log of this "
+            "robot, are its columns in this order, is friction modelled?"
+        )
+    if full.held_out > _FARTHER * full.train and full.held_out > _NOTABLE:
+        yield (
+            f"Torques that were held out are missed by {share(full.held_out)}, those that were learned from by "
+            f"{share(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?"
+        )
+
+
+@dataclass(frozen=True)
+class _Looked:
+    """Some samples, evenly from all."""
+
+    W: FloatArray
+    """(n_samples, n_dof, n_standard)"""
+    pulls: FloatArray
+    """What gravity of one unit along each axis of the base adds to W, (3, n_samples, n_dof, n_standard)."""
+    tau: FloatArray
+    """(n_samples, n_dof), N m or N."""
+
+
+def _some(model: Model, training: SampleSet) -> _Looked:
+    """Of what is learned from."""
+    mechanism = model.mechanism
+    every = max(1, training.n_samples * mechanism.n_dof // _ENOUGH)
+    still = Dynamics(replace(mechanism, gravity=np.zeros(3)))
+    along = [Dynamics(replace(mechanism, gravity=axis)) for axis in np.eye(3)]
+    W, pulls, tau, seen = [], [], [], 0
+    for block in training.blocks():
+        picked = slice(-seen % every, None, every)
+        seen += len(block.tau)
+        q = block.q[picked]
+        if len(q):
+            W.append(block.W.reshape(*block.tau.shape, -1)[picked])
+            tau.append(block.tau[picked])
+            weightless = still.regressor(q, np.zeros_like(q), np.zeros_like(q))
+            pulls.append(
+                [d.regressor(q, np.zeros_like(q), np.zeros_like(q)) - weightless for d in along]
+            )
+    return _Looked(np.concatenate(W), np.concatenate(pulls, axis=1), np.concatenate(tau))
+
+
+def _doubted_bodies(model: Model, looked_at: _Looked, full: Estimate) -> list[str]:
+    """What is said where the config has values of the bodies."""
+    bodies = [k for k, p in enumerate(model.mechanism.parameters) if p.kind in INERTIAL]
+    W = looked_at.W[:, :, bodies]
+    return doubted_unit(W @ model.values[bodies], W @ full.standard[bodies])
+
+
+def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[FloatArray, ...]]:
+    """Torques of gravity along the base's level axes, of the known masses, where there are any."""
+    mechanism = model.mechanism
+    level = np.abs(mechanism.gravity) <= _ACROSS * np.linalg.norm(mechanism.gravity)
+    if (
+        not level[:2].all()
+        or not np.any(model.values)
+        or len(fitted.rows.X) != len({block.trajectory for block in training.blocks()})
+    ):
+        return []
+    found = []
+    without = Dynamics(replace(mechanism, gravity=np.zeros(3)))
+    for axis in np.eye(3)[:2]:
+        tilted = Dynamics(replace(mechanism, gravity=axis))
+        parts: dict[int, list[FloatArray]] = {}
+        for block in training.blocks():
+            still = np.zeros_like(block.q)
+            K = tilted.regressor(block.q, still, still)
+            weightless = without.regressor(block.q, still, still)
+            parts.setdefault(block.trajectory, []).append((K - weightless) @ model.values)
+        found.append(tuple(np.concatenate(part) for part in parts.values()))
+    return found
+
+
+def _friction_doubts(model: Model, full: Estimate) -> list[str]:
+    """Of the base parameters those of friction that stand for themselves."""
+    kinds = {p.name: p for p in model.mechanism.parameters if p.kind in _FRICTION}
+    places = [k for k, name in enumerate(full.names) if name in kinds]
+    found = [kinds[full.names[k]] for k in places]
+    return negative_friction(
+        [p.name for p in found],
+        [p.owner for p in found],
+        full.values[places],
+        full.deviations[places],
+    )

@@ -1,0 +1,16 @@
+"""Recorded torques before and after they were made ready."""
+
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.recorded import signals_figure
+from paramreduce_cli.report.sections import PageSection, placed
+
+
+@placed(PageSection.LOG, 3)
+def log_torques(data: ReportData) -> Figure | None:
+    """Torques of the same motion as recorded (grey) and as they are used, through the low-pass that the model passes too; ticks above where outliers were replaced."""
+    if data.log is None:
+        return None
+    shown = data.log.shown
+    return signals_figure(data, shown, (("τ  (N m, N)", shown.raw_tau, shown.tau, 1),))
