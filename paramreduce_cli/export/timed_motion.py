@@ -1,25 +1,16 @@
 """An exciting trajectory as a controller runs it: there, along it, and back, at its own rate."""
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.errors import DataError
-from paramreduce_cli.excitation.fourier import fourier_basis
-from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.records import FloatArray, Mechanism, Trajectories, Trajectory
+from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.export.ways import State, Ways, at_rest
+from paramreduce_cli.records import FloatArray, Kind, Mechanism, Trajectories, Trajectory
 
-_CHECKED = 100
-"""Points of a way on which its limits are looked at."""
-_LONGER = 1.1
-_SHORTEST = 0.1
-"""s"""
-_LONGEST = 600.0
-"""s"""
-_GENTLE = 0.5
-"""Share of the limits that ways there and back use."""
-_ROUNDING = 1e-6
+_FINER = 4
+"""Points between those of the optimisation's grid, to see where a trajectory goes."""
 
 
 @dataclass(frozen=True)
@@ -48,124 +39,87 @@ def timed_motion(
     trajectory: Trajectory,
     *,
     rate: float,
-    start_pose: FloatArray | None,
     title: str,
+    start_pose: FloatArray | None = None,
+    ways: Ways | None = None,
 ) -> TimedMotion:
     """A trajectory at some rate, from where the machine stands and back to there.
 
     Args:
         mechanism: Of the robot.
-        trajectories: With the limits, which ways there and back keep by half.
-        trajectory: One of them.
+        trajectories: With the period.
+        trajectory: One of them; joints of it may be whole turns away, where that is nearer to the pose.
         rate: Samples per second.
-        start_pose: Where the machine stands, (n_dof,); None to begin with the trajectory itself.
         title: For people.
+        start_pose: Where the machine stands, (n_dof,); None to begin with the trajectory itself.
+        ways: Finds ways there and back, where there is a pose.
 
     Raises:
-        DataError: No way there and back keeps to the limits and bounds.
+        DataError: No way there and back was found that keeps to limits and bounds.
     """
-    period = trajectories.period
+    period, names = trajectories.period, mechanism.coordinate_names
     harmonics = (trajectory.coefficients.shape[1] - 1) // 2
+    turns = np.zeros(mechanism.n_dof)
 
-    def along(time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        return fourier_basis(period, harmonics, time).states(trajectory.coefficients)
+    def along(time: FloatArray) -> State:
+        z, dz, ddz = fourier_basis(period, harmonics, time).states(trajectory.coefficients)
+        return z + 2 * np.pi * turns, dz, ddz
 
-    if start_pose is None:
+    if start_pose is None or ways is None:
         time = np.arange(int(np.floor(period * rate + 1e-9)) + 1) / rate
-        states = along(time)
-        return TimedMotion(title, mechanism.coordinate_names, rate, time, *states, 0.0, period)
+        z, dz, ddz = along(time)
+        return TimedMotion(title, names, rate, time, z, dz, ddz, 0.0, period)
+    turns = _turns(mechanism, trajectories, along, start_pose)
     border = tuple(state[0] for state in along(np.zeros(1)))
-    still = (start_pose, np.zeros_like(start_pose), np.zeros_like(start_pose))
     there, back = (
-        _Way.between(still, border, trajectories),
-        _Way.between(border, still, trajectories),
+        ways.between(at_rest(start_pose), border),
+        ways.between(border, at_rest(start_pose)),
     )
-    for way in (there, back):
-        _check_bounds(mechanism, trajectories, way)
-    ends = np.cumsum([there.duration, period, back.duration])
-    time = np.arange(int(np.ceil(ends[2] * rate - 1e-9)) + 1) / rate
-    parts = (time < ends[0], (time >= ends[0]) & (time < ends[1]), time >= ends[1])
-    pieces = [
-        there.states(time[parts[0]]),
-        along(time[parts[1]] - ends[0]),
-        back.states(np.minimum(time[parts[2]] - ends[1], back.duration)),
+    lead = sum(way.duration for way in there)
+    parts: list[tuple[float, Callable[[FloatArray], State]]] = [
+        *((way.duration, way.states) for way in there),
+        (period, along),
+        *((way.duration, way.states) for way in back),
     ]
-    z, dz, ddz = (np.concatenate(states) for states in zip(*pieces, strict=True))
-    return TimedMotion(
-        title, mechanism.coordinate_names, rate, time, z, dz, ddz, float(ends[0]), period
-    )
+    time, (z, dz, ddz) = _sampled(parts, rate)
+    return TimedMotion(title, names, rate, time, z, dz, ddz, lead, period)
 
 
-State = tuple[FloatArray, ...]
+def _turns(
+    mechanism: Mechanism,
+    trajectories: Trajectories,
+    along: Callable[[FloatArray], State],
+    pose: FloatArray,
+) -> FloatArray:
+    """Whole turns of joints by which a trajectory begins nearest to a pose, within their limits, (n_dof,).
+
+    After a turn a joint of an open tree is where it was, but the way there may be another one, or none.
+    """
+    drives = [p.kind for p in mechanism.parameters]
+    if mechanism.loops is not None or Kind.STIFFNESS in drives:
+        return np.zeros(mechanism.n_dof)
+    z = along(sample_times(trajectories.period, _FINER * trajectories.points))[0]
+    limits = trajectories.limits
+    revolute = [mechanism.bodies[k].joint == "revolute" for k in mechanism.independent]
+    turns = np.where(revolute, np.round((pose - z[0]) / (2 * np.pi)), 0.0)
+    while True:
+        moved = z + 2 * np.pi * turns
+        outside = (moved.min(axis=0) < limits.lower) | (moved.max(axis=0) > limits.upper)
+        wrong = outside & (turns != 0)
+        if not wrong.any():
+            return turns
+        turns[wrong] -= np.sign(turns[wrong])
 
 
-@dataclass(frozen=True)
-class _Way:
-    """Quintic polynomials between two states of all joints."""
-
-    duration: float
-    coefficients: FloatArray
-    """Of powers of time over the duration, (6, n_dof)."""
-
-    @classmethod
-    def between(cls, start: State, end: State, trajectories: Trajectories) -> "_Way":
-        """The shortest of a row of durations that keeps to half of the limits.
-
-        Raises:
-            DataError: None does.
-        """
-        limits = trajectories.limits
-        duration = _SHORTEST
-        while duration < _LONGEST:
-            way = cls(duration, _quintic(start, end, duration))
-            z, dz, ddz = way.states(np.linspace(0, duration, _CHECKED))
-            fast = np.maximum(_GENTLE * limits.velocity, np.abs([start[1], end[1]]).max(axis=0))
-            hard = np.maximum(_GENTLE * limits.acceleration, np.abs([start[2], end[2]]).max(axis=0))
-            inside = (z >= limits.lower - _ROUNDING) & (z <= limits.upper + _ROUNDING)
-            slow = (np.abs(dz) <= fast * (1 + _ROUNDING)) & (np.abs(ddz) <= hard * (1 + _ROUNDING))
-            if inside.all() and slow.all():
-                return way
-            duration *= _LONGER
-        raise DataError(
-            "no way between trajectories.start_pose and the trajectory keeps to the limits; choose another "
-            "pose within the position limits, or trajectories.rest_to_rest."
-        )
-
-    def states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Positions, speeds and accelerations, (n_samples, n_dof) each."""
-        s = time / self.duration
-        powers = np.arange(6)
-        z = s[:, None] ** powers
-        dz, ddz = np.zeros_like(z), np.zeros_like(z)
-        dz[:, 1:] = powers[1:] * z[:, :-1] / self.duration
-        ddz[:, 2:] = powers[2:] * powers[1:-1] * z[:, :-2] / self.duration**2
-        return z @ self.coefficients, dz @ self.coefficients, ddz @ self.coefficients
-
-
-def _quintic(start: State, end: State, duration: float) -> FloatArray:
-    scale = np.array([1.0, duration, duration**2])
-    rows = np.array(
-        [
-            [1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0], [0, 0, 2, 0, 0, 0],
-            [1, 1, 1, 1, 1, 1], [0, 1, 2, 3, 4, 5], [0, 0, 2, 6, 12, 20],
-        ],
-        dtype=float,
-    )  # fmt: skip
-    right = np.vstack(
-        [state * k for ends in (start, end) for state, k in zip(ends, scale, strict=True)]
-    )
-    return np.linalg.solve(rows, right)
-
-
-def _check_bounds(mechanism: Mechanism, trajectories: Trajectories, way: _Way) -> None:
-    if not trajectories.constraints:
-        return
-    z = way.states(np.linspace(0, way.duration, _CHECKED))[0]
-    quantities = Quantities(mechanism, trajectories.constraints)
-    rows = quantities.rows(Coordinates(mechanism).positions(z, None))
-    if rows.max() > 0:
-        name = trajectories.constraints[quantities.owners[int(np.argmax(rows.max(axis=0)))]].name
-        raise DataError(
-            f"the way between trajectories.start_pose and the trajectory misses the bounds of {name}; "
-            "choose another pose."
-        )
+def _sampled(
+    parts: Sequence[tuple[float, Callable[[FloatArray], State]]], rate: float
+) -> tuple[FloatArray, list[FloatArray]]:
+    """Times, and states of motions that follow each other, each with its duration; the last sample is the end."""
+    ends = np.cumsum([duration for duration, _ in parts])
+    time = np.arange(int(np.ceil(ends[-1] * rate - 1e-9)) + 1) / rate
+    owner = np.minimum(np.searchsorted(ends, time, side="right"), len(parts) - 1)
+    pieces = []
+    for k, (duration, motion) in enumerate(parts):
+        begin = ends[k] - duration
+        pieces.append(motion(np.minimum(time[owner == k] - begin, duration)))
+    return time, [np.concatenate(state) for state in zip(*pieces, strict=True)]

@@ -1,7 +1,9 @@
 """Trajectories that a real controller can run: at rest at both ends, within torques and distances."""
 
 import dataclasses
+import itertools
 import json
+import types
 
 import numpy as np
 import pytest
@@ -19,6 +21,7 @@ from paramreduce_cli.excitation.optimiser import optimise_trajectory
 from paramreduce_cli.excitation.workers import excitation_of
 from paramreduce_cli.export.timed_motion import timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
+from paramreduce_cli.export.ways import Ways, at_rest
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
@@ -35,6 +38,9 @@ ASKED = [
     "trajectories.position_limits=[[-2.6, -0.5], [-pi/2, pi/2]]",
     "trajectories.start_pose=[-pi/2, 0]",
 ]
+
+CEILING = 1.1
+"""m"""
 
 
 @pytest.fixture(scope="module")
@@ -197,8 +203,8 @@ def test_bodies_of_a_clearance_must_be_there(ur10):
 def motion(made):
     _, model, trajectories = made
     return timed_motion(
-        model.mechanism, trajectories, trajectories.estimation[0], rate=500.0,
-        start_pose=np.array([-np.pi / 2, 0.0]), title="two_link",
+        model.mechanism, trajectories, trajectories.estimation[0], rate=500.0, title="two_link",
+        start_pose=np.array([-np.pi / 2, 0.0]), ways=Ways(model, trajectories),
     )  # fmt: skip
 
 
@@ -216,15 +222,94 @@ def test_a_motion_begins_and_ends_where_the_machine_stands(motion, made):
     assert np.abs(np.diff(motion.ddz, axis=0)).max() < 0.1 * np.abs(motion.ddz).max()
 
 
+def test_ways_keep_to_torques_and_powers(motion, made):
+    """By Pinocchio, on both ways; without limits of torque they are faster."""
+    _, model, trajectories = made
+    limits = trajectories.limits
+    on_way = (motion.time < motion.lead) | (motion.time > motion.lead + motion.period)
+    states = (motion.z[on_way], motion.dz[on_way], motion.ddz[on_way])
+    tau = pinocchio_model.inverse_dynamics(model.mechanism, model.values, *states)
+    assert np.all(np.abs(tau) <= limits.torque * 1.02)
+    assert np.all(np.abs(tau * states[1]) <= limits.power * 1.02)
+    hanging, away = (
+        at_rest(np.array(pose)) for pose in ([-np.pi / 2, 0], [-np.pi / 2 + 0.7, -0.5])
+    )
+    (fast,) = Ways(model, trajectories).between(hanging, away)
+    z, dz, ddz = fast.states(np.linspace(0, fast.duration, 200))
+    still = np.zeros_like(z)
+    peak, holding = (
+        np.abs(pinocchio_model.inverse_dynamics(model.mechanism, model.values, *s)).max(axis=0)
+        for s in ((z, dz, ddz), (z, still, still))
+    )
+    slow = dataclasses.replace(
+        trajectories, limits=dataclasses.replace(limits, torque=(peak + holding) / 2)
+    )
+    (slower,) = Ways(model, slow).between(hanging, away)
+    assert slower.duration > 1.05 * fast.duration
+    weakest = dataclasses.replace(
+        trajectories, limits=dataclasses.replace(limits, torque=np.full(2, 0.1))
+    )
+    with pytest.raises(DataError, match="keeps to the limits"):
+        Ways(model, weakest).between(hanging, away)
+
+
+@pytest.mark.parametrize(("upper", "turned"), [(7.0, True), (2.0, False)])
+def test_a_joint_is_turned_to_where_the_machine_stands(made, upper, turned):
+    """A pose one turn away is the same pose, if the limits let the trajectory be there."""
+    _, model, trajectories = made
+    limits = dataclasses.replace(trajectories.limits, upper=np.array([upper, np.pi / 2]))
+    wide = dataclasses.replace(trajectories, limits=limits)
+    pose = np.array([-np.pi / 2 + 2 * np.pi if turned else 1.9, 0.0])
+    found, usual = (
+        timed_motion(
+            model.mechanism, wide, trajectories.estimation[0], rate=100.0, title="x", **where
+        )
+        for where in ({"start_pose": pose, "ways": Ways(model, wide)}, {})
+    )
+    first = int(np.searchsorted(found.time, found.lead - 1e-9))
+    moved = found.z[first] - usual.z[0]
+    assert moved == pytest.approx([2 * np.pi * turned, 0], abs=0.05)
+
+
+def test_a_way_around_what_is_in_the_way(ur10):
+    """Under a ceiling an arm cannot swing over the top: it passes a third pose, clear by brute force all along."""
+    ceiling = {"name": "ceiling", "point": [0, 0, CEILING], "normal": [0, 0, -1]}
+    section = ClearanceSection(radius=0.05, planes=[{"name": "table"}, ceiling])
+    config, model = config_and_model("ur10")
+    constraints = tuple(section.constraints(model.mechanism))
+    trajectories = types.SimpleNamespace(
+        limits=config.trajectories.limits(6), constraints=constraints, period=1.0
+    )
+    start, end = np.array([0, -0.6, 0.5, 0, 0, 0.0]), np.array([0, -np.pi + 0.6, -0.5, 0, 0, 0.0])
+    pairs = [c.bodies for c in constraints if c.kind == "clearance"]
+    bodies = {c.bodies[0] for c in constraints if c.kind == "above-plane"}
+
+    def clear(z):
+        found = []
+        for q in z:
+            where = capsules.points(model.mechanism, q)
+            found += capsules.clearances(model.mechanism, q, 0.05, pairs)
+            for body in bodies:
+                height = where[body][:, 2]
+                found += [height.min() - 0.05, CEILING - height.max() - 0.05]
+        return min(found)
+
+    blocked = np.linspace(start, end, 60)
+    assert clear(blocked[[0, -1]]) > 0
+    assert clear(blocked) < 0
+    ways = Ways(model, trajectories).between(at_rest(start), at_rest(end))
+    assert len(ways) > 1
+    states = [way.states(np.linspace(0, way.duration, 80)) for way in ways]
+    assert min(clear(z) for z, _, _ in states) > 0
+    for (z, dz, _), (z_after, dz_after, _) in itertools.pairwise(states):
+        assert z[-1] == pytest.approx(z_after[0])
+        assert dz[-1] == pytest.approx(dz_after[0], abs=1e-9)
+
+
 def test_without_a_pose_it_is_the_trajectory_alone(made):
     _, model, trajectories = made
     found = timed_motion(
-        model.mechanism,
-        trajectories,
-        trajectories.estimation[0],
-        rate=100.0,
-        start_pose=None,
-        title="x",
+        model.mechanism, trajectories, trajectories.estimation[0], rate=100.0, title="x"
     )
     assert found.time[-1] == pytest.approx(trajectories.period, abs=0.01)
     assert found.dz[0] == pytest.approx(0, abs=1e-12)
@@ -233,10 +318,7 @@ def test_without_a_pose_it_is_the_trajectory_alone(made):
 def test_a_pose_that_cannot_be_reached_is_said(made):
     _, model, trajectories = made
     with pytest.raises(DataError, match="start_pose"):
-        timed_motion(
-            model.mechanism, trajectories, trajectories.estimation[0], rate=100.0,
-            start_pose=np.array([2.0, 0.0]), title="x",
-        )  # fmt: skip
+        Ways(model, trajectories).between(at_rest(np.array([2.0, 0.0])), at_rest(np.zeros(2)))
 
 
 def test_formats_hold_the_same(motion):

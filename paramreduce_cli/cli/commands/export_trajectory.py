@@ -14,6 +14,7 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.export.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
+from paramreduce_cli.export.ways import Ways
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Model, Trajectories, Trajectory
 
@@ -49,7 +50,7 @@ def export_trajectory(
     """Write an exciting trajectory as a controller runs it.
 
     With trajectories.start_pose in the config it begins and ends there, on ways that keep to half of the
-    limits.
+    limits of speed and acceleration and to those of torque and distance.
 
     Example: paramreduce export-trajectory configs/ur10.yaml --format urscript --rate 500
     """
@@ -58,12 +59,13 @@ def export_trajectory(
     model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
     start = None if pose is None else per_joint(pose, loaded.n_dof)
+    ways = Ways(model, trajectories)
 
     def timed(which: str) -> TimedMotion:
         chosen, title = _chosen(trajectories, which), f"{loaded.robot} {which}"
         return timed_motion(
-            model.mechanism, trajectories, chosen, rate=rate, start_pose=start, title=title
-        )
+            model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, ways=ways
+        )  # fmt: skip
 
     which, motion = (which, timed(which)) if which else _first(trajectories, timed)
     files = trajectory_formats[kind](motion)
