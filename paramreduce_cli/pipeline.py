@@ -3,7 +3,7 @@
 import inspect
 import types
 import typing
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -135,6 +135,23 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
         files = {f"training {k}": path for k, path in enumerate(log.files)}
         files |= {f"held out {k}": path for k, path in enumerate(log.held_out_files)}
     return {name: path for name, path in files.items() if path is not None}
+
+
+_NAMED_BY = {
+    Coefficients: "trajectories.file",
+    Recordings: "sampling.estimation_file and validation_file",
+    RawLogs: "sampling.log.files and held_out_files",
+}
+"""Keys of files that users bring."""
+
+
+def absent_files(config: Config) -> Iterator[tuple[Path, str]]:
+    """Files that stages of a full run need and that are not there, with the key that names them."""
+    needed = {entry.type for stage in stages_to_run(config) for entry in stage.inputs}
+    for kind in (kind for kind in _NAMED_BY if kind in needed):
+        for path in brought_files(config, kind).values():
+            if not path.exists():
+                yield path, _NAMED_BY[kind]
 
 
 def measured_torques(config: Config) -> bool:

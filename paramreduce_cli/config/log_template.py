@@ -21,6 +21,8 @@ _TIMES = ("t", "time", "timestamp", "stamp", "time_s", "seconds")
 _WANTED_ONLY = ("command", "desired", "target", "ref", "setpoint")
 """Parts of names of what was asked of the machine, not measured."""
 _NEEDED = ("position", "torque")
+_MOST_JOINTS = 12
+"""Joints that a message names."""
 
 
 def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
@@ -45,11 +47,20 @@ def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, st
     missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
     if missing:
         raise ConfigError(
-            f"no columns for {' and '.join(missing)} of {len(joints)} joints by any usual name among "
-            f"{', '.join(names[:30])}. Write sampling.log.columns by hand; joints that the log "
-            "does not have are locked by init's --lock JOINT=VALUE."
+            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by "
+            f"any usual name among {', '.join(names[:30])}. {_remedy(names, joints)}"
         )
     return {"time": _time_of(times, found["position"]), **found}
+
+
+def _remedy(names: Sequence[str], joints: Sequence[str]) -> str:
+    """What to do about joints without columns: to lock those after the ones that the log has, if it has any."""
+    by_hand = "Write sampling.log.columns by hand"
+    for n in range(len(joints) - 1, 0, -1):
+        if all(_numbered(names, _WORDS[key], n) is not None for key in _NEEDED):
+            locks = " ".join(f"--lock {joint}=0" for joint in joints[n:][:_MOST_JOINTS])
+            return f"The log has {n} joints: if the others stood still, try {locks}. Or: {by_hand[0].lower()}{by_hand[1:]}."
+    return f"{by_hand}; joints that the log does not have are locked by init's --lock JOINT=VALUE."
 
 
 def _time_of(times: Sequence[str], positions: str | list[str]) -> str:

@@ -6,6 +6,7 @@ import re
 import h5py
 import numpy as np
 import pytest
+from conftest import ROOT
 from simulated_logs import FRICTION, log_config, two_link_log, write_log
 
 from paramreduce_cli.artifacts.store import Store, load_file
@@ -170,6 +171,21 @@ def test_columns_are_guessed(tmp_path, invoke):
     assert "torque: tau{}" in out
     log = load_config(path).sampling.log
     assert (log.columns.position, log.columns.velocity) == ("q{}", "dq{}")
+
+
+def test_joints_that_a_log_does_not_have_are_named(tmp_path, invoke):
+    folder = ROOT / "configs/logs"
+    log = ("init", folder / "panda.urdf", "--log", folder / "panda.csv.gz")
+    error = " ".join(invoke(*log, "--output", tmp_path / "p.yaml", code=2).err.split())
+    (lock,) = re.findall(r"The log has 7 joints: .* try (--lock \S+)\.", error)
+    invoke(*log, *lock.split(), "--output", tmp_path / "p.yaml")
+
+
+def test_a_log_that_is_absent_is_said_before_anything_is_done(tmp_path, invoke):
+    config = log_config(tmp_path)
+    error = " ".join(invoke("run", config, "--results", tmp_path / "r", code=2).err.split())
+    assert "log.csv: there is no such file. It is named under sampling.log.files" in error
+    assert not list((tmp_path / "r").glob("*.h5"))
 
 
 def test_torques_of_another_machine_are_suspected(tmp_path, invoke):

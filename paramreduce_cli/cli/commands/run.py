@@ -8,6 +8,7 @@ import click
 import rich.box
 import rich.table
 
+from paramreduce_cli.artifacts.atomic import missing
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.options import (
     CONFIG,
@@ -32,7 +33,7 @@ from paramreduce_cli.cli.terminal import (
     say_table,
 )
 from paramreduce_cli.config import load_config, placed_errors
-from paramreduce_cli.pipeline import stages_to_run
+from paramreduce_cli.pipeline import absent_files, stages_to_run
 from paramreduce_cli.records import Report
 from paramreduce_cli.runner import Runner, asked
 from paramreduce_cli.texts import share
@@ -71,6 +72,8 @@ def run(
     quiet = quiet or as_json
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
+    for path, key in absent_files(loaded):
+        raise missing(path, f"It is named under {key}.")
     with placed_errors(config, overrides), store.locked():
         if overrides and results is None:
             _say_what_is_replaced(Runner(loaded, store))
