@@ -366,5 +366,9 @@ class Results:
 
 def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
     stage = next(stage for stage in pipeline() if stage.output is kind)
+    if not isinstance(config, Config | Settings):
+        raise TypeError(
+            f"{stage.function.__name__} takes a config, not {config!r:.80}; load_config(path) reads one"
+        )
     given = {type(record): record for record in records if record is not None}
     return made_in_memory(stage, config, given, Run(jobs))

@@ -6,7 +6,7 @@ from typing import Any
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import is_section, section
-from paramreduce_cli.pipeline import Stage
+from paramreduce_cli.pipeline import Stage, maker_of
 from paramreduce_cli.records import UNSHARED, WHOLE, Run, Share, Shares, Tell
 from paramreduce_cli.taken import OUTSIDE, Inputs, called
 
@@ -37,5 +37,7 @@ def made_in_memory(
         elif lent.get(entry.type) is not None or entry.optional:
             arguments[entry.name] = lent.get(entry.type)
         else:
-            raise TypeError(f"{stage.name} needs a {entry.type.__name__}")
+            name = entry.type.__name__
+            maker = maker_of(entry.type).replace("-", "_")
+            raise TypeError(f"{stage.function.__name__} needs a {name}, which {maker} makes")
     return called(stage, arguments)

@@ -1,6 +1,6 @@
 """Logs of a machine whose truth is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 
@@ -64,6 +64,14 @@ def simulated(seed):
         values[base.columns] + base.beta @ values[others],
         tuple(mechanism.parameters[k].kind.symbol for k in base.columns),
     )  # fmt: skip
+
+
+def along_axes(z, dz, ddz):
+    """Observation matrices (n_samples, n_dof, n) of the arm, and what gravity of one unit along each axis adds, (3, ...)."""
+    mechanism, dynamics, _, _ = arm()
+    none = Dynamics(replace(mechanism, gravity=np.zeros(3))).regressor(z, dz, ddz)
+    axes = [Dynamics(replace(mechanism, gravity=axis)).regressor(z, dz, ddz) for axis in np.eye(3)]
+    return dynamics.regressor(z, dz, ddz), np.array(axes) - none
 
 
 def coloured(shape, size, pole, seed):
@@ -130,8 +138,6 @@ def log_config(folder, extra=""):
 
 def tilt_torques(seed):
     """Torques of gravity of one m/s^2 along x and y of the arm's base in the motion of a seed."""
-    from dataclasses import replace
-
     mechanism, _, _, values = arm()
     log = simulated(seed)
     still = np.zeros_like(log.z)

@@ -9,13 +9,19 @@ import warnings
 import numpy as np
 
 from paramreduce_cli.identification.estimation import Rows, weighted_fit
+from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
 from paramreduce_cli.identification.hints import hints
-from tests.simulated_logs import RATE, coloured, simulated
+from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.records import INERTIAL
+from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
 
 _NOISE = 0.03
 """Standard deviation of the noise, a share of each joint's torques."""
 _LEFT_OUT = {"coulomb": "fc", "viscous": "fv", "inertia": "Ia"}
 _SAID = {
+    "unit": "in another unit",
+    "all signs": "the wrong sign",
+    "gravity": "is description.gravity right",
     "delay": "ms later than positions",
     "sign": "torque_signs",
     "gain": "times what those of the other joints let expect",
@@ -23,6 +29,8 @@ _SAID = {
     "viscous": "viscous is missing",
     "inertia": "inertia is missing",
 }
+_EVERY = 10
+"""Samples of which one is looked at for what is of all torques together."""
 _SHARED = 3
 """Joints whose torques share parameters with others, so that their scale can be told."""
 
@@ -61,9 +69,33 @@ def changed(case, log, seed):
         tau[:, rng.integers(tau.shape[1])] *= -1
     elif case == "gain":
         tau[:, rng.integers(_SHARED)] *= rng.choice([0.8, 1.2, 1.5])
+    elif case == "all signs":
+        tau *= -1
+    elif case == "unit":
+        tau *= rng.choice([1000, 1 / 9.81, 0.05])
+    elif case == "gravity":
+        _, pulls = along_axes(log.z, log.dz, log.ddz)
+        mechanism, _, _, values = arm()
+        axis = np.array([[0, 0, 1], [1, 0, 0], [0, -1, 0]])[rng.integers(3)]
+        size = np.linalg.norm(mechanism.gravity)
+        tau += np.tensordot(size * axis - mechanism.gravity, pulls, axes=1) @ values
     elif case in _LEFT_OUT:
         X = X[:, :, [kind != _LEFT_OUT[case] for kind in log.kinds]]
     return tau, X
+
+
+def doubted(case, log, tau, deviation):
+    """What is said of all torques together: by all standard columns, and by the bodies' known values."""
+    mechanism, _, _, values = arm()
+    some = slice(None, None, _EVERY)
+    W, pulls = along_axes(log.z[some], log.dz[some], log.ddz[some])
+    kept = [p.kind.symbol != _LEFT_OUT.get(case) for p in mechanism.parameters]
+    W, pulls = W * kept, pulls * kept
+    bodies = [k for k, p in enumerate(mechanism.parameters) if p.kind in INERTIAL]
+    rows = (W / deviation[:, None]).reshape(-1, W.shape[2])
+    standard = least_squares(np.column_stack([rows, (tau[some] / deviation).ravel()]))
+    yield from doubted_gravity(W, pulls, tau[some], deviation, mechanism.gravity)
+    yield from doubted_unit(W[:, :, bodies] @ values[bodies], W[:, :, bodies] @ standard[bodies])
 
 
 def right(case, pole, count):
@@ -72,7 +104,9 @@ def right(case, pole, count):
     for seed in range(count):
         log = simulated(seed)
         tau, X = changed(case, log, seed)
-        found = hints(fitted(log, noisy(log, tau, pole, seed), X), log.names)
+        tau = noisy(log, tau, pole, seed)
+        fit = fitted(log, tau, X)
+        found = [*doubted(case, log, tau, fit.deviation), *hints(fit, log.names)]
         good += (
             _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
         )

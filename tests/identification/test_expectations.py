@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from simulated_logs import arm, coloured, simulated
+from simulated_logs import along_axes, arm, coloured, simulated
 
 from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -16,18 +16,14 @@ EVERY = 10
 
 def torques(gravity, seed):
     """With gravity along some direction, by columns of the arm as it stands, and what gravity adds to these."""
-    mechanism, dynamics, _, values = arm()
+    mechanism, _, _, values = arm()
     log = simulated(seed)
     states = [s[::EVERY] for s in (log.z, log.dz, log.ddz)]
-    W = dynamics.regressor(*states)
-    along = [
-        Dynamics(replace(mechanism, gravity=axis)).regressor(*states) for axis in (*np.eye(3),)
-    ]
-    none = Dynamics(replace(mechanism, gravity=np.zeros(3))).regressor(*states)
+    W, pulls = along_axes(*states)
     true = Dynamics(replace(mechanism, gravity=np.array(gravity))).regressor(*states) @ values
     noise = 0.03 * np.std(true, axis=0)
     tau = true + coloured(true.shape, noise, 0.9, seed)
-    return W, np.array([K - none for K in along]), tau, noise
+    return W, pulls, tau, noise
 
 
 @pytest.mark.parametrize("seed", SEEDS)
