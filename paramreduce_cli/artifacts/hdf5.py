@@ -1,7 +1,7 @@
 """HDF5 files with where they came from: written whole, checked as they are read.
 
-Every byte that means something has a checksum that HDF5 compares whenever it is read: numbers in
-chunks a Fletcher-32 each, and what is small stands with names, shapes and attributes in headers,
+Every byte that means something has a checksum that is compared whenever it is read: large arrays one for
+each block of rows, and what is small stands with names, shapes and attributes in headers,
 which HDF5 checks by itself from version 1.10 of its format on. Text is of fixed length, as HDF5
 does not check the heap where other text goes.
 """
@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file, missing
+from paramreduce_cli.artifacts.checked import CheckedRows, RowChecks, write_checks
 from paramreduce_cli.errors import ArtifactError
 
 SCHEMA = 14
@@ -79,7 +80,7 @@ class Writer:
         self._group = group
         self._check = check
         self._hash = hashlib.sha256()
-        self._flushes: list[Callable[[], None]] = []
+        self._ends: list[Callable[[], None]] = []
 
     @property
     def digest(self) -> str:
@@ -112,23 +113,23 @@ class Writer:
 
     def _store_in_parts(self, name: str, array: np.ndarray) -> None:
         """What may be larger than memory: some rows at a time."""
-        data = self._group.create_dataset(
-            name, array.shape, array.dtype, chunks=True, fletcher32=True
-        )
+        data = self._group.create_dataset(name, array.shape, array.dtype)
+        checks = RowChecks(array.nbytes // max(1, len(array)))
         self._hash.update(name.encode())
         step = max(1, _AT_ONCE * len(array) // array.nbytes)
         for start in range(0, len(array), step):
             rows = np.ascontiguousarray(array[start : start + step])
             self._check()
             self._hash.update(rows.data)
+            checks.add(rows)
             data[start : start + step] = rows
+        checks.write(data)
 
     def _store(self, name: str, array: np.ndarray) -> None:
         if array.nbytes > _LARGEST_HEADER and array.shape == ():
             array = array[None]
         if array.nbytes > (_SMALL if array.shape else _LARGEST_HEADER):
-            whole = array.shape if array.nbytes <= _CHUNK_CACHE else True
-            self._group.create_dataset(name, data=array, chunks=whole, fletcher32=True)
+            write_checks(self._group.create_dataset(name, data=array), array)
             return
         # By hand, as h5py never asks HDF5 to put a scalar into a header.
         layout = h5py.h5p.create(h5py.h5p.DATASET_CREATE)
@@ -156,9 +157,9 @@ class Writer:
         tail = () if columns is None else (columns,)
         chunk = max(1, _CHUNK // max(1, columns or 1))
         data = self._group.create_dataset(
-            name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8",
-            fletcher32=True,
-        )  # fmt: skip
+            name, shape=(0, *tail), maxshape=(None, *tail), chunks=(chunk, *tail), dtype="f8"
+        )
+        checks = RowChecks(8 * (columns or 1))
 
         waiting: list[np.ndarray] = []
         enough = max(1, _WRITTEN_AT_ONCE // max(1, columns or 1))
@@ -169,9 +170,15 @@ class Writer:
             if waiting:
                 start = data.shape[0]
                 data.resize(start + count, axis=0)
-                data[start:] = np.concatenate(waiting)
+                rows = np.concatenate(waiting)
+                data[start:] = rows
+                checks.add(rows)
                 waiting.clear()
                 count = 0
+
+        def finish() -> None:
+            flush()
+            checks.write(data)
 
         def append(block: np.ndarray) -> None:
             self._note(name, np.ascontiguousarray(block).tobytes())
@@ -181,13 +188,13 @@ class Writer:
             if count >= enough:
                 flush()
 
-        self._flushes.append(flush)
+        self._ends.append(finish)
         return append
 
     def finish(self) -> None:
         """Write what waits for more rows."""
-        for flush in self._flushes:
-            flush()
+        for end in self._ends:
+            end()
         self._check()
 
     def _note(self, name: str, content: bytes) -> None:
@@ -245,8 +252,7 @@ class Reader:
 
     def array(self, name: str, dimensions: int | None = None) -> np.ndarray:
         """A numeric dataset as a whole."""
-        data = self._dataset(name)
-        value = np.asarray(data[()])
+        value = np.asarray(CheckedRows(self._dataset(name)).whole())
         if value.dtype.kind not in "fiub":
             raise ArtifactError(f"{self.path}: /{name} must hold numbers.")
         if dimensions is not None and value.ndim != dimensions:
@@ -260,7 +266,7 @@ class Reader:
         data = self._dataset(name)
         if not h5py.check_string_dtype(data.dtype) and data.size:
             raise ArtifactError(f"{self.path}: /{name} must hold text.")
-        values = np.atleast_1d(data[()])
+        values = np.atleast_1d(CheckedRows(data).whole())
         return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
     def text(self, name: str) -> str:
@@ -273,12 +279,12 @@ class Reader:
         value = value.item() if isinstance(value, np.generic) else value
         return value.decode() if isinstance(value, bytes) else value
 
-    def rows(self, name: str) -> h5py.Dataset:
-        """A numeric dataset to be read in slices."""
+    def rows(self, name: str) -> CheckedRows:
+        """A numeric dataset to be read in slices of rows."""
         data = self._dataset(name)
         if data.dtype.kind not in "fiu" or data.ndim == 0:
             raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")
-        return data
+        return CheckedRows(data)
 
     def verify(self) -> None:
         """Read all there is, and so have all checksums compared.
@@ -292,11 +298,13 @@ class Reader:
         self.file.visit(names.append)
         for name in names:
             if isinstance(self.file[name], h5py.Dataset):
-                data = self._dataset(name)
-                rows = len(data) if data.shape else 1
-                step = max(1, _AT_ONCE * rows // max(1, data.nbytes))
-                for start in range(0, rows, step):
-                    data[slice(start, start + step) if data.shape else ()]
+                data = CheckedRows(self._dataset(name))
+                if not data.ndim:
+                    data.whole()
+                    continue
+                step = max(1, _AT_ONCE * len(data) // max(1, data.nbytes))
+                for start in range(0, len(data), step):
+                    data[start : start + step]
 
     def _dataset(self, name: str) -> h5py.Dataset:
         parts = name.split("/")

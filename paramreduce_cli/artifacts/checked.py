@@ -1,0 +1,120 @@
+"""Datasets with checksums of their rows, block by block, in an attribute.
+
+XXH3 goes through what was just read many times faster than HDF5 reads it; HDF5's own Fletcher-32 takes a third
+of the time of reading.
+"""
+
+from typing import Any
+
+import h5py
+import numpy as np
+import xxhash
+
+_ATTRIBUTE = "checks"
+_BLOCK = 1 << 18
+"""Bytes of rows that a checksum is of."""
+
+
+class RowChecks:
+    """Checksums of rows that come one after the other.
+
+    Args:
+        row_bytes: Of one row.
+    """
+
+    def __init__(self, row_bytes: int) -> None:
+        self._rows = _rows_of_block(row_bytes)
+        self._hash = xxhash.xxh3_64()
+        self._missing = self._rows
+        self._values: list[int] = []
+
+    def add(self, rows: np.ndarray) -> None:
+        """Note more rows."""
+        rows = np.ascontiguousarray(rows)
+        while len(rows):
+            some, rows = rows[: self._missing], rows[self._missing :]
+            self._hash.update(some.data)
+            self._missing -= len(some)
+            if self._missing == 0:
+                self._end_block()
+
+    def write(self, data: h5py.Dataset) -> None:
+        """Keep them with what they are of."""
+        if self._missing < self._rows:
+            self._end_block()
+        data.attrs[_ATTRIBUTE] = np.array(self._values, dtype=np.uint64)
+
+    def _end_block(self) -> None:
+        self._values.append(self._hash.intdigest())
+        self._hash.reset()
+        self._missing = self._rows
+
+
+def write_checks(data: h5py.Dataset, array: np.ndarray) -> None:
+    """Keep checksums of an array with the dataset that holds it."""
+    checks = RowChecks(_row_bytes(array))
+    checks.add(array)
+    checks.write(data)
+
+
+class CheckedRows:
+    """A dataset that is read in slices of rows, each compared with its checksums; one without any is read as it is.
+
+    Slices follow each other mostly: of the last block what was read is kept for the next one.
+    """
+
+    def __init__(self, data: h5py.Dataset) -> None:
+        self._data = data
+        self.shape, self.dtype, self.ndim = data.shape, data.dtype, data.ndim
+        self.size, self.nbytes = data.size, data.nbytes
+        self._checks: np.ndarray | None = data.attrs.get(_ATTRIBUTE)
+        self._rows = _rows_of_block(_row_bytes(data)) if data.ndim else 0
+        self._kept: tuple[int, np.ndarray] = (-1, np.zeros(0))
+
+    def __len__(self) -> int:
+        return int(self.shape[0])
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, step = rows.indices(len(self))
+        if self._checks is None or stop <= start:
+            return np.asarray(self._data[start:stop:step])
+        first, last = start // self._rows, -(-stop // self._rows)
+        begin = first * self._rows
+        number, kept = self._kept
+        parts = [kept] if number == first else []
+        if first + len(parts) < last:
+            parts.append(self._read(first + len(parts), last))
+            size = min(self._rows, len(self) - (last - 1) * self._rows)
+            self._kept = (last - 1, parts[-1][-size:].copy())
+        return np.concatenate(parts)[start - begin : stop - begin : step]
+
+    def whole(self) -> Any:
+        """All of it.
+
+        Raises:
+            OSError: A checksum does not fit.
+        """
+        value = self._data[()]
+        if self._checks is not None:
+            self._compare(np.ascontiguousarray(value), 0)
+        return value
+
+    def _read(self, first: int, last: int) -> np.ndarray:
+        values = np.asarray(self._data[first * self._rows : last * self._rows])
+        self._compare(values, first)
+        return values
+
+    def _compare(self, values: np.ndarray, first: int) -> None:
+        assert self._checks is not None
+        for k, start in enumerate(range(0, len(values), self._rows), start=first):
+            found = xxhash.xxh3_64_intdigest(values[start : start + self._rows].data)
+            if k >= len(self._checks) or found != int(self._checks[k]):
+                raise OSError(f"the checksum of {self._data.name} does not fit")
+
+
+def _row_bytes(array: Any) -> int:
+    return int(np.prod(array.shape[1:], dtype=np.int64)) * array.dtype.itemsize
+
+
+def _rows_of_block(row_bytes: int) -> int:
+    return max(1, _BLOCK // max(1, row_bytes))
