@@ -11,7 +11,7 @@ import numpy as np
 import xxhash
 
 _ATTRIBUTE = "checks"
-_BLOCK = 1 << 18
+_BLOCK = 1 << 16
 """Bytes of rows that a checksum is of."""
 
 
@@ -79,14 +79,19 @@ class CheckedRows:
         if self._checks is None or stop <= start:
             return np.asarray(self._data[start:stop:step])
         first, last = start // self._rows, -(-stop // self._rows)
-        begin = first * self._rows
         number, kept = self._kept
-        parts = [kept] if number == first else []
-        if first + len(parts) < last:
-            parts.append(self._read(first + len(parts), last))
+        parts = []
+        if number == first:
+            parts.append(kept[start - first * self._rows : stop - first * self._rows].copy())
+            first += 1
+        if first < last:
+            fresh = self._read(first, last)
+            begin = first * self._rows
+            parts.append(fresh[max(start - begin, 0) : stop - begin])
             size = min(self._rows, len(self) - (last - 1) * self._rows)
-            self._kept = (last - 1, parts[-1][-size:].copy())
-        return np.concatenate(parts)[start - begin : stop - begin : step]
+            self._kept = (last - 1, fresh[-size:].copy())
+        found = parts[0] if len(parts) == 1 else np.concatenate(parts)
+        return found[::step]
 
     def whole(self) -> Any:
         """All of it.
