@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts.atomic import atomically, check_is_file, missing
-from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
+from paramreduce_cli.artifacts.hdf5 import Stamp
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
@@ -88,6 +88,8 @@ def _stamp(summary: Any) -> Stamp | None:
 def load_summary(path: Path) -> dict[str, Any]:
     """Read a summary, or that of a results folder, and compare it with its digest if it has one.
 
+    One that somebody made has none, and then no provenance at all.
+
     Raises:
         ArtifactError: It is missing, damaged, or no summary.
     """
@@ -96,13 +98,20 @@ def load_summary(path: Path) -> dict[str, Any]:
     summary = load_json(path)
     if not isinstance(summary, dict):
         raise ArtifactError(f"{path}: is no summary.json.")
-    stamp = _stamp(summary)
-    if stamp is not None and stamp.schema == SCHEMA and stamp.digest != _digest(summary):
+    if not _is_whole(summary):
         raise ArtifactError(
             f"{path}: is damaged or was changed: its digest does not fit. Make it again with "
             "`paramreduce report`."
         )
     return summary
+
+
+def _is_whole(summary: Mapping[str, Any]) -> bool:
+    """Whether the digest fits; where there is no provenance, whether none stands under a damaged name either."""
+    if "provenance" not in summary:
+        return not any(isinstance(entry, dict) and "digest" in entry for entry in summary.values())
+    stamp = _stamp(summary)
+    return stamp is not None and stamp.digest == _digest(summary)
 
 
 def verify_report(path: Path) -> None:

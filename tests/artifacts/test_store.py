@@ -268,7 +268,7 @@ def test_large_arrays_are_written_some_rows_at_a_time(tmp_path, monkeypatch):
     assert written("parts.h5") == whole
     with h5py.File(tmp_path / "parts.h5") as file:
         np.testing.assert_array_equal(file["rows"], rows)
-        assert file["rows"].attrs["checks"].size == 1
+        assert file["rows"].attrs["checks"].size > 1
 
 
 @given(
