@@ -28,6 +28,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.stages import stages
+from paramreduce_cli.stages.process_log import no_log
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
 
@@ -160,6 +161,19 @@ def measured_torques(config: Config) -> bool:
         return True
     both = len(brought_files(config, Recordings)) == 2
     return both and config.sampling.torques == "measured"
+
+
+def check_is_asked_for(stage: Stage, config: Config) -> None:
+    """Refuse a stage that has nothing to work on, before others are run for it.
+
+    Raises:
+        ConfigError: The config names no log, or no measured torques.
+    """
+    logged = config.sampling.log is not None
+    if (stage.output is MeasuredLog and not logged) or (
+        stage.output is Identification and not measured_torques(config)
+    ):
+        raise no_log()
 
 
 def stages_to_run(config: Config) -> list[Stage]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts.atomic import atomically, check_is_file, missing
-from paramreduce_cli.artifacts.hdf5 import Stamp
+from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
@@ -104,6 +104,22 @@ def load_summary(path: Path) -> dict[str, Any]:
             "`paramreduce report`."
         )
     return summary
+
+
+def newer_than_report(results: Path) -> list[str]:
+    """Artifacts of a results folder that have changed since its report was made.
+
+    Raises:
+        ArtifactError: The summary is missing or damaged, or one of them is no HDF5 file.
+    """
+    stamp = summary_stamp(results / SUMMARY)
+    found = []
+    for name, digest in ({} if stamp is None else stamp.inputs).items():
+        path = results / name
+        own = read_stamp(path) if path.suffix == ".h5" and path.exists() else None
+        if own is not None and own.digest != digest:
+            found.append(name)
+    return found
 
 
 def _is_whole(summary: Mapping[str, Any]) -> bool:

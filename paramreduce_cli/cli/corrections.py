@@ -16,6 +16,8 @@ _OF_RESULTS = ("open", "inspect", "table")
 """Commands that take results."""
 _LIKE = 0.8
 """How alike a robot's name must be to one here."""
+_LEAST_LIKE = 0.5
+"""The same to one that comes along."""
 
 
 def corrected(message: str, words: Sequence[str]) -> str:
@@ -92,7 +94,7 @@ def _example(message: str, words: Words) -> Words | None:
     """A robot that comes along, and is not here yet."""
     asked = [word for word in words[1:] if not word.startswith("-")]
     plain_init = words[0] == "init" and asked == words[1:2] == words[1:]
-    word = asked[0] if plain_init else _named(message, words[1:])
+    word = asked[0] if plain_init else _named(message, words)
     if word is None or (not plain_init and config_meant(word) is not None):
         return None
     from paramreduce_cli.config.examples import examples  # late: it loads much
@@ -168,7 +170,11 @@ def _choice(message: str, words: Words) -> Words | None:
         numbered = [one.partition(":")[0] for one in offered if ":" in one]
         name, number = selected[1] if selected else numbered[0], digits[1]
     begun = [one for one in offered if one.split(":")[0].startswith(name)]
-    near = begun or difflib.get_close_matches(name, offered, n=1, cutoff=0.0)
+    # Any model is nearer to what is wanted than none; any robot is not.
+    least = _LEAST_LIKE if message.startswith("--example") else 0.0
+    near = begun or difflib.get_close_matches(name, offered, n=1, cutoff=least)
+    if not near:
+        return None
     return _exchanged(words, wanted, _in_range(near[0], number or (selected or ("", "", ""))[2]))
 
 
@@ -183,8 +189,22 @@ def _in_range(name: str, number: str) -> str:
 
 
 def _option(message: str, words: Words) -> Words | None:
+    if "are, such as --results" in message and not any(w.startswith("--samples") for w in words):
+        return None  # results alone do not help where there are none
     found = re.search(r"such as (--\S+ [^\s.]+)\.$", message) or re.search(r"give (--[a-z]+) ", message)  # fmt: skip
     return None if found is None else [*words, *found[1].split(" ")]
+
+
+def _elsewhere(message: str, words: Words) -> Words | None:
+    """Another file, where one stands already."""
+    found = re.match(r"(\S+): exists already", message)
+    if found is None:
+        return None
+    taken = Path(found[1])
+    free = next(
+        path for k in range(2, 1000) if not (path := taken.with_stem(f"{taken.stem}_{k}")).exists()
+    )
+    return _exchanged(words, found[1], str(free)) or [*words, "--output", str(free)]
 
 
 def _after_mending(message: str, words: Words) -> Words | None:
@@ -198,6 +218,7 @@ _RULES: tuple[Callable[[str, Words], Words | None], ...] = (
     _setting,
     _choice,
     _option,
+    _elsewhere,
     _after_mending,
 )
 

@@ -24,6 +24,8 @@ def meant_command(name: str, known: Sequence[str]) -> str:
     """What is said of a command that there is not."""
     wanted = name.lower().replace("_", "-")
     near = difflib.get_close_matches(wanted, known, n=1, cutoff=_LEAST_LIKE)
+    if wanted == "version":
+        return "there is no command 'version'; see `paramreduce --version`."
     hint = f"did you mean `paramreduce {near[0]}`?" if near else "`paramreduce --help` lists them."
     return (
         f"there is no command {name!r}; {'see `paramreduce --help`.' if wanted == 'help' else hint}"

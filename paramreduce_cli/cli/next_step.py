@@ -77,11 +77,19 @@ def _robot(folder: Path, path: Path) -> list[str]:
 
 def _said_of(results: Path) -> str:
     """The selected model of a finished run."""
-    from paramreduce_cli.artifacts.report_files import load_summary  # it loads HDF5
+    from paramreduce_cli.artifacts.report_files import load_summary, newer_than_report  # HDF5
 
     try:
-        selected = load_summary(results)["selected"]
-        error = share(selected["torque_error"]["estimation"])
+        newer = newer_than_report(results)
+        if newer:
+            return f"{' and '.join(newer)} changed since its report was made; paramreduce run makes it anew"
+        summary = load_summary(results)
+        selected, measured = summary["selected"], summary["identification"]
+        if measured is None:
+            errors = {part: selected["torque_error"][part] for part in ("estimation", "validation")}
+            told = ", ".join(f"{share(e)} ({part})" for part, e in errors.items() if e is not None)
+        else:
+            told = f"{share(measured['reduced']['held_out'])} of the measured torques, held out"
     except (ArtifactError, KeyError, TypeError) as problem:
         return f"its report cannot be read ({problem})"
-    return f"{selected['heuristic']} with {selected['n']} parameters, torque error {error}"
+    return f"{selected['heuristic']} with {selected['n']} parameters, torque error {told}"

@@ -12,10 +12,13 @@ from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
-from paramreduce_cli.pipeline import Stage, describe_stage
-from paramreduce_cli.records import WHOLE, Share, Validation
+from paramreduce_cli.pipeline import Stage, check_is_asked_for, describe_stage
+from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Share, Validation
 from paramreduce_cli.runner import Outcome, Runner, asked
 from paramreduce_cli.stages import stages
+
+_OF_LOGS = (MeasuredLog, Identification)
+"""What is made where torques are measured."""
 
 
 def stage_command(name: str) -> click.Command:
@@ -42,6 +45,8 @@ def stage_command(name: str) -> click.Command:
         placed = placed_errors(config, overrides)
         lock = "" if share is None else f"-{stage.name}-{share.number}-{share.count}"
         with placed, store.locked(lock), progress_bars(quiet) as progress:
+            if loaded is not None:
+                check_is_asked_for(stage, loaded)
             runner = Runner(
                 loaded,
                 store,
@@ -86,7 +91,8 @@ def _stage_help(stage: Stage, config_optional: bool) -> str:
     reads = [file_of(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
     flow = f"Reads {source or 'the config'}; writes {file_of(stage.output)}."
-    example = f"Example: paramreduce {stage.name} configs/puma560.yaml"
+    robot = "configs/ur10.yaml" if stage.output in _OF_LOGS else "configs/puma560.yaml"
+    example = f"Example: paramreduce {stage.name} {robot}"
     if config_optional:
         example += f", or: paramreduce {stage.name} --samples my_samples.h5 --results my_results"
     text = (stage.function.__doc__ or "").strip().replace("\n    ", "\n")

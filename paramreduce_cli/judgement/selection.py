@@ -87,10 +87,16 @@ def _cross_validated(
     best = min(found.values(), key=lambda r: float(r.mean.min()))
     least = int(best.mean.argmin())
     folds = own.torque_error.shape[0]
+    if own is best and best.n[least] == choice.n:
+        beside = "the least of all, and no smaller model is within one standard error of it"
+    else:
+        beside = (
+            f"within one standard error ({share(best.standard_error[least])}) of the best, {share(best.mean[least])} "
+            f"with n = {best.n[least]}"
+        )
     reason = (
         f"{choice.heuristic} with n = {choice.n}: with each of {folds} parts left out in turn its torque error "
-        f"there is {share(float(own.mean[own.n == choice.n][0]))}, within one standard error ({share(best.standard_error[least])}) of "
-        f"the best, {share(best.mean[least])} with n = {best.n[least]}."
+        f"there is {share(float(own.mean[own.n == choice.n][0]))}, {beside}."
     )
     return choice.heuristic, row, reason
 

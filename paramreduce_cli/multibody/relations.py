@@ -15,6 +15,8 @@ _MATCH = 1e-8
 _IGNORED = 1e-10
 _COUNTED = 1e-2
 """Share of a sum below which its smallest terms are together counted instead of printed."""
+_MOST_PRINTED = 12
+"""Terms that are printed at most, the largest."""
 
 Lengths = Mapping[str, float]
 
@@ -131,7 +133,7 @@ def _largest_first(terms: Sequence[str], shares: FloatArray, first: str) -> str:
     """
     order = np.argsort(-shares, kind="stable")
     remaining = shares[order][::-1].cumsum()[::-1]
-    printed = int((remaining >= _COUNTED).sum())
+    printed = min(int((remaining >= _COUNTED).sum()), _MOST_PRINTED)
     text = " ".join([first, *(terms[k] for k in order[:printed])])
     small = int((shares[order[printed:]] > _IGNORED).sum())
     if not small:

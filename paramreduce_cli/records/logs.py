@@ -8,8 +8,10 @@ import numpy as np
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 from paramreduce_cli.records.reduction import ReducedModel
 
-_SAME_VALUES = 1e-4
-"""Relative difference of values that are the same fit."""
+_SAME_VALUES = 0.05
+"""Standard deviations by which values of the same fit may differ."""
+_ROUNDING = 1e-4
+"""The same as a share of a value, where a deviation is next to nothing."""
 
 
 @dataclass(frozen=True)
@@ -162,9 +164,10 @@ class Estimate:
         if set(values) != set(model.names):
             return {}
         own = np.array([values[name] for name in model.names])
-        if not np.allclose(own, model.values, rtol=_SAME_VALUES, atol=0):
-            return {}
-        return dict(zip(self.names, self.deviations.tolist(), strict=True))
+        deviations = dict(zip(self.names, self.deviations.tolist(), strict=True))
+        spread = np.array([deviations[name] for name in model.names])
+        near = _SAME_VALUES * spread + _ROUNDING * np.abs(own)
+        return deviations if np.all(np.abs(own - model.values) <= near) else {}
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,13 @@ import numpy as np
 
 from paramreduce_cli.records import ReducedModel, Speed
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
+from paramreduce_cli.texts.measured import measured
+
+_WEIGHTED = {
+    "nominal-torque": "each joint weighted by its nominal torque",
+    "noise": "each joint weighted by its noise",
+    "none": "",
+}
 
 
 @dataclass(frozen=True)
@@ -36,6 +43,8 @@ class Answer:
     """Of an evaluation of either function, beside that of the full model; empty where it was not measured."""
     as_identified: bool
     """Whether the values are those of identification, to which held-out errors and deviations belong."""
+    weighted: str
+    """How errors weight the joints elsewhere on the page; empty where they do not."""
     command: str
     """That writes the model as code."""
 
@@ -58,6 +67,7 @@ def answer(data: ReportData, asked: str) -> Answer:
             _nanoseconds(data, data.speed_direct, "[M_zz | δ_z] with R and b"),
         ),
         as_identified=_as_identified(data),
+        weighted=_WEIGHTED[data.weighting],
         command=export if data.known_model is not None else f"{export} --format values",
     )
 
@@ -69,9 +79,9 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
     return tuple(
         ShownParameter(
             name,
-            f"{value:.6g}",
+            measured(value, deviations.get(name))[0],
             data.unit(parameter).replace("^2", "²"),
-            f"{deviations[name]:.2g}" if name in deviations else "",
+            measured(value, deviations.get(name))[1],
             relation if relation != name else "",
         )
         for parameter, name, value, relation in zip(
@@ -113,7 +123,7 @@ def _as_identified(data: ReportData) -> bool:
 
 
 def _worst_joint(data: ReportData) -> str:
-    """By error over nominal torque, on the validation set where there is one."""
+    """By the share of its rating, or of its torques where that is not given, on the validation set if there is one."""
     if data.known_model is None:
         return ""
     name, rms = list(data.rms_torque.items())[-1]
@@ -121,11 +131,15 @@ def _worst_joint(data: ReportData) -> str:
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
     errors = getattr(result, f"torque_error_joint_{name}")[row] * rms
-    shares = np.where(np.isfinite(errors), errors / data.reduction.nominal_torque, -np.inf)
+    rated = data.known_model.nominal_torque_given
+    sizes = data.known_model.nominal_torque if rated else np.maximum(rms, NO_TORQUE)
+    shares = np.where(np.isfinite(errors), errors / sizes, -np.inf)
     j = int(shares.argmax())
     label = data.known_model.mechanism.coordinate_names[j]
     whole = _two_digits(rms[j]) if rms[j] > NO_TORQUE else "no"
-    return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole} {data.force_unit(j)}"
+    unit = data.force_unit(j)
+    rating = f" (rated {_two_digits(sizes[j])} {unit})" if rated else ""
+    return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole}\N{NO-BREAK SPACE}{unit}{rating}"
 
 
 def _two_digits(value: float) -> str:

@@ -8,10 +8,10 @@ from paramreduce_cli.records import BoolArray, FloatArray, HeuristicValidation, 
 from paramreduce_cli.report.data import ReportData
 
 COLOURS = (
-    "#7d8590", "#0b62c4", "#3a88c8", "#8e5bb5", "#d9730d", "#a97a0c", "#2f8f5b", "#c2384f", "#7a6a53",
+    "#7d8590", "#0b62c4", "#d9730d", "#8e5bb5", "#2f8f5b", "#a97a0c", "#c2384f", "#3a88c8", "#7a6a53",
     "#0b8f8f",
 )  # fmt: skip
-"""Of heuristics in their order; all of them stand out from white by 3 to 1."""
+"""Of heuristics in their order, neighbours far apart; all of them stand out from white by 3 to 1."""
 _MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
 EQUAL = 1e-4
 """Relative difference of values that single precision and other orders of columns explain."""

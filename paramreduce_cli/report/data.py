@@ -1,7 +1,7 @@
 """Everything a figure or a table may show, gathered once."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -44,9 +44,9 @@ class ShownMotion:
     W: FloatArray
     """Observation matrix, (n_samples, n_dof, n_parameters)."""
     full: FloatArray
-    """Full model, (n_samples, n_dof)."""
+    """Full model, (n_samples, n_dof), N m or N."""
     reduced: FloatArray
-    """Selected model, (n_samples, n_dof)."""
+    """Selected model, (n_samples, n_dof), N m or N."""
 
 
 @dataclass(frozen=True)
@@ -156,24 +156,25 @@ def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
     return {name: q[:: max(1, -(-len(q) * len(whole) // frames))] for name, q in whole.items()}
 
 
-def first_motion(
-    blocks: Iterable[Block], model: ReducedModel, nominal_torque: FloatArray, most: int = 1000
-) -> ShownMotion:
+def first_motion(blocks: Iterable[Block], model: ReducedModel, most: int = 1000) -> ShownMotion:
     """The first trajectory of a set, with full and reduced torques.
 
     Args:
         blocks: The set.
         model: The reduced model.
-        nominal_torque: (n_dof,)
-        most: Samples at which to stop.
+        most: Samples from which on every second, fourth, ... one is taken.
     """
     parts: list[Block] = []
-    count = 0
+    every, seen = 1, 0
     for block in blocks:
-        if block.trajectory != 0 or count >= most:
+        if block.trajectory != 0:
             break
-        parts.append(block)
-        count += block.time.size
+        parts.append(_thinned(block, -seen % every, every))
+        seen += block.time.size
+        while seen > 2 * most * every:
+            first = np.cumsum([0, *(p.time.size for p in parts)])
+            parts = [_thinned(p, -int(k) % 2, 2) for p, k in zip(parts, first[:-1], strict=True)]
+            every *= 2
     phi = model.standard
     time = np.concatenate([p.time for p in parts])
     timed = bool(np.ptp(time) > 0)
@@ -188,6 +189,17 @@ def first_motion(
         q=np.concatenate([p.q for p in parts]),
         tau=tau,
         W=W,
-        full=tau / nominal_torque,
-        reduced=W @ phi / nominal_torque,
+        full=tau,
+        reduced=W @ phi,
     )
+
+
+def _thinned(block: Block, first: int, every: int) -> Block:
+    """Some of its samples."""
+    picked = slice(first, None, every)
+    W = block.W.reshape(*block.tau.shape, block.W.shape[1])[picked]
+    states = {
+        name: getattr(block, name)[picked]
+        for name in ("time", "z", "dz", "ddz", "tau", "q", "dq", "ddq")
+    }
+    return replace(block, **states, W=W.reshape(-1, W.shape[2]))

@@ -8,6 +8,14 @@ from paramreduce_cli.identification.processing import processed
 from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
 
 
+def no_log() -> ConfigError:
+    """What is said where there is no log."""
+    return ConfigError(
+        "is missing: it says where the logs are; `paramreduce init ROBOT.urdf --log FILE` writes it.",
+        ("sampling", "log"),
+    )
+
+
 def process_log(
     log: LogSection | None, model: Model, logs: RawLogs, tell: Tell = lambda _: None
 ) -> MeasuredLog:
@@ -16,10 +24,7 @@ def process_log(
     What was done to them, and what looks wrong in them, is part of the result.
     """
     if log is None:
-        raise ConfigError(
-            "is missing: it says where the logs are; `paramreduce init ROBOT.urdf --log FILE` writes it.",
-            ("sampling", "log"),
-        )
+        raise no_log()
     found = processed(logs, log, model.mechanism.coordinate_names, tell)
     for text in found.doubts:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)

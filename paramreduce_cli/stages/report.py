@@ -76,7 +76,7 @@ def report(
 
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
-    motion = first_motion(shown.blocks(), selected.model, reduction.nominal_torque)
+    motion = first_motion(shown.blocks(), selected.model)
     running = _running(model, selected, Exported.IDM)
     direct = _running(model, selected, Exported.DDM) if running else {}
     states = {} if model is None else _states(model, motion)

@@ -151,7 +151,11 @@ def test_parameters_are_shown_with_units_and_deviations(invoke, two_link_results
     assert {p["name"]: p["deviation"] for p in told} == dict(
         zip(found.names, found.deviations.tolist(), strict=True)
     )
-    assert f"± {found.deviations[0]:.2g} " in invoke("inspect", measured).out
+    shown = re.findall(r"(\S+) ± (\S+) ", invoke("inspect", measured).out)
+    assert len(shown) == len(found.names)
+    assert [float(d) for _, d in shown] == pytest.approx(found.deviations, rel=0.05)
+    off = [abs(float(v) - truth) for (v, _), truth in zip(shown, found.values, strict=True)]
+    assert all(o < 0.06 * d for o, d in zip(off, found.deviations, strict=True))
 
 
 def test_selected_is_that_of_the_only_results(invoke, two_link_results, tmp_path, monkeypatch):

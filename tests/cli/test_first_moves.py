@@ -103,7 +103,13 @@ MOVES = [
     (["init", "ur10"], "Next: paramreduce init --example ur10"),
     (["init", "one.urdf"], "Next: paramreduce init one.urdf --floating"),
     (["init", "--example", "pmua560"], "Next: paramreduce init --example puma560"),
-    (["init", "--dh", "two_link"], "choose another with --output"),
+    (["init", "--dh", "two_link"], "Next: paramreduce init --dh two_link --output configs/two_link_2.yaml"),
+    (["version"], "see `paramreduce --version`"),
+    (["check-data", "configs/two_link.yaml"], "paramreduce check-data RECORDING.csv configs/two_link.yaml"),
+    (["identify", "configs/two_link.yaml"], "`paramreduce init ROBOT.urdf --log FILE`"),
+    (["identify", "configs/two_link.yaml", "--results", "done"], "`paramreduce init ROBOT.urdf --log FILE`"),
+    (["puma560"], "Next: paramreduce init --example puma560"),
+    (["init", "--example", "mine"], "there is cart_pole"),
     (["reduce", "--samples", "samples.h5"], "Next: paramreduce reduce --samples samples.h5 --results results/my_samples"),
     (["reduce", "--samples", "sample.h5", "--results", "r"],
      "Next: paramreduce reduce --samples samples.h5 --results r"),
@@ -141,9 +147,11 @@ def test_what_does_not_work_says_what_does(invoke, folder, words, told):
     assert suggested  # something to type as it stands, of what is here
     for command in suggested:
         for path in re.findall(r"(?:configs|results)/[\w./-]+", command):
-            assert path in words or "--results" in command or Path(path.rstrip(".")).exists(), (
-                command
-            )
+            assert (
+                path in words
+                or re.search("--(results|output)", command)
+                or Path(path.rstrip(".")).exists()
+            ), command
     assert "Traceback" not in said.err
     assert not (folder / "results").exists() or not list((folder / "results").rglob("*.h5"))
 
@@ -293,3 +301,9 @@ def test_completion_is_what_the_shell_asks_for(invoke, tmp_path, monkeypatch):
     invoke("completion", "bash", "--install")
     path = tmp_path / ".local/share/bash-completion/completions/paramreduce"
     assert "_PARAMREDUCE_COMPLETE=bash_complete" in path.read_text()
+
+
+def test_a_report_older_than_what_it_is_of_is_said(invoke, folder):
+    assert "changed since" not in invoke().out
+    invoke("validate", "configs/two_link.yaml", "--results", "done", "--set", "selected.n=3")
+    assert "validation.h5 changed since this report was made" in invoke("open", "done").err

@@ -1,8 +1,11 @@
 """What the page says of its run in words."""
 
+import dataclasses
 import html
+import itertools
 import json
 import re
+import types
 
 import h5py
 import numpy as np
@@ -10,6 +13,8 @@ import pytest
 from conftest import CONFIGS
 
 from paramreduce_cli.cli.commands.run import run
+from paramreduce_cli.records import Block, Estimate
+from paramreduce_cli.report.data import first_motion
 from paramreduce_cli.texts import share
 
 
@@ -75,3 +80,46 @@ def test_a_joint_without_torque_has_an_error_all_the_same(simulated):
     assert said[1] == ("s", "theta")[worst]
     assert float(said[2]) == pytest.approx(errors[worst], rel=0.06)
     assert "simulated motions" in paragraph(simulated)
+
+
+def test_values_of_the_same_fit_are_told_by_their_deviations():
+    values, deviations = np.array([1.0, 2.0]), np.array([0.1, 1e-12])
+    estimate = types.SimpleNamespace(names=("a", "b"), values=values, deviations=deviations)
+
+    def found(others):
+        model = types.SimpleNamespace(names=("b", "a"), values=np.array(others))
+        return Estimate.deviations_of(estimate, model)
+
+    assert found([2.0, 1.0]) == {"a": 0.1, "b": 1e-12}
+    assert found([2.0001, 1.004])  # far less than a deviation, or round-off
+    assert not found([2.0, 1.02])
+    assert not found([2.01, 1.0])
+
+
+@pytest.mark.parametrize("sizes", [[7], [100] * 37, [999, 1, 3000]])
+def test_a_motion_is_shown_from_its_beginning_to_its_end(sizes):
+    """However long it is, with torques as they are, evenly thinned."""
+    rng = np.random.default_rng(0)
+    total = sum(sizes)
+    states = {
+        name: rng.normal(size=(total, 2)) for name in ("z", "dz", "ddz", "tau", "q", "dq", "ddq")
+    }
+    W, phi = rng.normal(size=(total, 2, 3)), rng.normal(size=3)
+    edges = np.cumsum([0, *sizes])
+    blocks = [
+        Block(
+            0,
+            np.arange(a, b) * 0.1,
+            **{k: v[a:b] for k, v in states.items()},
+            W=W[a:b].reshape(-1, 3),
+        )
+        for a, b in itertools.pairwise(edges)
+    ]
+    later = dataclasses.replace(blocks[0], trajectory=1)
+    shown = first_motion([*blocks, later], types.SimpleNamespace(standard=phi), most=100)
+    every = round(shown.time[1] / 0.1) if total > 1 else 1
+    np.testing.assert_allclose(shown.time, np.arange(0, total, every) * 0.1, atol=1e-9)
+    assert shown.time.size <= 200
+    assert shown.time.size > 100 or every == 1
+    np.testing.assert_array_equal(shown.full, states["tau"][::every])
+    np.testing.assert_allclose(shown.reduced, W[::every] @ phi)

@@ -37,6 +37,10 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     from paramreduce_cli.identification.quality import quality
     from paramreduce_cli.records import RawLogs
 
+    if file.suffix in (".yaml", ".yml"):
+        raise ConfigError(
+            f"{file}: is a config, not a recording; write `paramreduce check-data RECORDING.csv {file}`."
+        )
     loaded = load_config(config, overrides) if config is not None else None
     raw = load_log(file)
     names = list(raw.columns)

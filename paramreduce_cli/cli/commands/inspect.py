@@ -20,6 +20,7 @@ from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
+from paramreduce_cli.texts.measured import measured
 
 if TYPE_CHECKING:
     from paramreduce_cli.records import ReducedModel
@@ -139,8 +140,11 @@ def _say_model(
     say(title)
     longest = max((len(p.name) for p in parameters), default=0)
     for p in parameters:
-        value = f"{p.value: .9e}"
-        value += f" ± {p.deviation:.2g}" if p.deviation is not None else ""
+        if p.deviation is None:
+            value = f"{p.value: .9e}"
+        else:
+            value = " ± ".join(measured(p.value, p.deviation))
+            value = value if p.value < 0 else f" {value}"
         say(
             f"  {p.name:{longest}}  {value} {p.unit}".rstrip()
             + (f"  =  {p.stands_for}" if relations else "")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from paramreduce_cli.artifacts.report_files import verify_report
+from paramreduce_cli.artifacts.report_files import newer_than_report, verify_report
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import complain, say
 from paramreduce_cli.errors import ArtifactError
@@ -27,6 +27,11 @@ def open(results: Path) -> None:  # the file's name is the command's
             f"{folder}: is not there.{meant or ' Make it with `paramreduce run CONFIG`.'}"
         )
     verify_report(folder / "summary.json")
+    newer = newer_than_report(folder.parent)
+    if newer:
+        complain(
+            f"Warning: {' and '.join(newer)} changed since this report was made; `paramreduce run` renews it."
+        )
     address = (folder / "index.html").resolve().as_uri()
     say(address)
     if not webbrowser.open(address):

@@ -14,7 +14,7 @@ _ANY = "#7d8590"
 
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
-    """Torques as they were given or measured, and those of the selected model over the nominal ones, along the validation set."""
+    """Torques as they were given or measured, and those of the selected model, along the validation set."""
     modelled = data.identification is None
     label = ("full" if data.known_model is not None else "given") if modelled else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
@@ -30,7 +30,8 @@ def torques(data: ReportData) -> Figure:
             data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=_DASHES,
             linewidth=1.1,
         )  # fmt: skip
-        axes.set_ylabel(f"τ / nom, {data.joint_label(j)}", fontsize="small")
+        unit = f" ({data.force_unit(j)})" if data.force_unit(j) else ""
+        axes.set_ylabel(f"τ{unit}, {data.joint_label(j)}", fontsize="small")
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:

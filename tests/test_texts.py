@@ -1,0 +1,30 @@
+"""How numbers are written for people."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from paramreduce_cli.texts.measured import measured
+
+
+@pytest.mark.parametrize(
+    ("value", "deviation", "said"),
+    [
+        (6.7633864, 0.097, ("6.763", "0.097")),
+        (0.0814335, 0.003, ("0.0814", "0.0030")),
+        (-153.2, 12.4, ("-153", "12")),
+        (1.5, None, ("1.5", "")),
+        (2.0, float("nan"), ("2", "nan")),
+        (1.234567e-9, 3.2e-11, ("1.235e-09", "3.2e-11")),
+        (0.5, 0.0, ("0.5", "0")),
+    ],
+)
+def test_values_have_the_digits_that_are_sure(value, deviation, said):
+    assert measured(value, deviation) == said
+
+
+@given(st.floats(-1e6, 1e6), st.floats(1e-12, 1e6))
+def test_what_is_left_out_is_far_less_than_the_deviation(value, deviation):
+    told, _ = measured(value, deviation)
+    assert abs(float(told) - value) <= 0.06 * deviation + 1e-12 * abs(value) or deviation > 10
+    assert abs(float(told) - value) <= 0.5
