@@ -264,6 +264,7 @@ class _Lines:
 
 
 def _plain_line(p: Progress, left: float | None) -> None:
-    state = "done" if p.done >= p.total else f"{p.done:.4g} of {p.total:.4g}"
+    share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
+    state = "done" if p.done >= p.total else share
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
     complain(f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}")

@@ -62,7 +62,7 @@ _LINE = 52
 """Characters of small print that have room in a column."""
 _LEGEND_ROW = 0.13
 """Height of a row of a legend, inches."""
-_LEAST_MEASURED = 1e-3
+LEAST_MEASURED = 1e-3
 """Where errors of measured torques are cut off below."""
 
 FORMATS: dict[str, dict] = {
@@ -204,7 +204,7 @@ def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
                 label=curve.label if line == "-" else None, marker=curve.marker if line == "-" else None,
             )  # fmt: skip
     # Measured torques are never explained to round-off.
-    bottom = FLOOR if data.identification is None else _LEAST_MEASURED
+    bottom = FLOOR if data.identification is None else LEAST_MEASURED
     axes.set_ylim(bottom=bottom, top=min(axes.get_ylim()[1], HIGHEST_ERROR))
     axes.axvline(data.reduction.rank, color="#57606a", linewidth=0.8, linestyle=":")
     axes.annotate(

@@ -307,3 +307,13 @@ def test_a_report_older_than_what_it_is_of_is_said(invoke, folder):
     assert "changed since" not in invoke().out
     invoke("validate", "configs/two_link.yaml", "--results", "done", "--set", "selected.n=3")
     assert "validation.h5 changed since this report was made" in invoke("open", "done").err
+
+
+def test_a_template_that_is_not_filled_in_is_said(invoke, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    invoke("init", "--dh", "my_arm", "--joints", "2")
+    quick = ["report.formats=[svg]", "trajectories.count=1"]
+    said = " ".join(invoke("run", "configs/my_arm.yaml", "--quiet", settings=quick).err.split())
+    lines = (tmp_path / "configs/my_arm.yaml").read_text().splitlines()
+    first = next(k for k, line in enumerate(lines, start=1) if "TODO" in line and k > 1)
+    assert f"configs/my_arm.yaml: line {first}" in said

@@ -39,6 +39,8 @@ from paramreduce_cli.runner import Runner, asked
 from paramreduce_cli.texts import share
 
 _TABLE_WIDTH = 110
+_MOST_PLACES = 8
+"""Lines that a remark names."""
 
 
 @click.command()
@@ -72,6 +74,7 @@ def run(
     quiet = quiet or as_json
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
+    _remark_on_what_is_to_do(config)
     for path, key in absent_files(loaded):
         raise missing(path, f"It is named under {key}.")
     with placed_errors(config, overrides), store.locked():
@@ -110,6 +113,18 @@ def run(
         for text in selected["remarks"]:
             remark(text.rstrip("."))
     return say_verdict(selected["accepted"], selected["verdict"], quiet)
+
+
+def _remark_on_what_is_to_do(config: Path) -> None:
+    """Say where a template is not filled in yet."""
+    lines = config.read_text(encoding="utf-8", errors="replace").splitlines()
+    marked = [str(k) for k, line in enumerate(lines, start=1) if "# TODO" in line]
+    if marked:
+        more = ", ..." if len(marked) > _MOST_PLACES else ""
+        remark(
+            f"{config}: line {', '.join(marked[:_MOST_PLACES])}{more}: marked TODO, so numbers there may be those of "
+            "the template"
+        )
 
 
 def _say_what_is_replaced(runner: Runner) -> None:

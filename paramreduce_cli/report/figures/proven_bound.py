@@ -7,7 +7,14 @@ from paramreduce_cli.records import ProofStatus, SelectionMethod
 from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import FLOOR, legend_beside, mark_selected, message, new_figure
+from paramreduce_cli.report.style import (
+    FLOOR,
+    LEAST_MEASURED,
+    legend_beside,
+    mark_selected,
+    message,
+    new_figure,
+)
 
 
 @placed(PageSection.PROOFS, 1)
@@ -18,8 +25,10 @@ def proven_bound(data: ReportData) -> Figure:
         return message("best-subset was not run")
     drawn = new_figure()
     axes = drawn.subplots()
-    shown = np.maximum(proofs.lower_bound, FLOOR)
-    axes.fill_between(proofs.n, shown, FLOOR, step="mid", color="#d5d9de", zorder=0)
+    # Measured torques are never explained to round-off; small sizes are bounded by nothing at times.
+    floor = FLOOR if data.identification is None else LEAST_MEASURED
+    shown = np.maximum(proofs.lower_bound, floor)
+    axes.fill_between(proofs.n, shown, floor, step="mid", color="#d5d9de", zorder=0)
     axes.step(proofs.n, shown, where="mid", color="#30363d", linewidth=0.9, label="proven bound")
     for curve in curves(data):
         names = [name for name in curve.names if SelectionMethod.parse(name).by_torque]
@@ -33,7 +42,7 @@ def proven_bound(data: ReportData) -> Figure:
             linestyle="none" if proven and len(names) == 1 else "-",
         )  # fmt: skip
     axes.set_yscale("log")
-    axes.set_ylim(bottom=FLOOR)
+    axes.set_ylim(bottom=floor)
     unproven = [status is not ProofStatus.OPTIMAL for status in proofs.status]
     axes.set_title(
         f"optimal for {len(unproven) - sum(unproven)} of {len(unproven)} sizes",
