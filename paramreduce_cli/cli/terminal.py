@@ -45,6 +45,11 @@ out = _Console(highlight=False, soft_wrap=True, emoji=False)
 err = _Console(stderr=True, highlight=False, soft_wrap=True, emoji=False)
 
 
+_OWN_LENGTH = len("2000-01-01T00:00:00 ")
+_OWN_LINE = re.compile(rb"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d |$")
+"""How a file of messages begins; an empty one is one, too."""
+
+
 class Journal:
     """A file that is told what is said, with times; and whether every step is."""
 
@@ -56,9 +61,13 @@ class Journal:
         """Append to a file from now on.
 
         Raises:
-            ConfigError: It cannot be written.
+            ConfigError: It cannot be written, or is no such file.
         """
         try:
+            if path.exists() and not _OWN_LINE.match(path.open("rb").read(_OWN_LENGTH)):
+                raise ConfigError(
+                    f"--log {path}: holds something else than messages of paramreduce; name another file."
+                )
             self._file = path.open("a", encoding="utf-8")
         except OSError as error:
             raise ConfigError(f"--log {path}: cannot be written: {error.strerror}.") from error

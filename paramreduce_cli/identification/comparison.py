@@ -5,6 +5,8 @@ import numpy as np
 from paramreduce_cli.records import Estimate
 from paramreduce_cli.texts import share
 
+_ALIKE = 0.02
+"""Relative difference of held-out errors, of which there is but one each, that says nothing."""
 _SURE = 2.0
 """Standard errors of the mean difference over folds that tell two models apart."""
 
@@ -16,11 +18,14 @@ def compared(full: Estimate, reduced: Estimate) -> str:
             f"The reduced model has as many parameters as the full one, {len(full.names)}: "
             f"{share(full.held_out)} held out."
         )
-    better = reduced.held_out < full.held_out
+    beside = reduced.held_out / full.held_out - 1 if full.held_out > 0 else np.inf
+    verdict = "beats the full one" if beside < 0 else "is worse"
+    if abs(beside) < _ALIKE:
+        verdict = "is as good as the full one"
     n, m = len(reduced.names), len(full.names)
     text = (
         f"Held out, {n} parameters have an error of {share(reduced.held_out)}, all {m} "
-        f"{share(full.held_out)}: the reduced model {'beats the full one' if better else 'is worse'}."
+        f"{share(full.held_out)}: the reduced model {verdict}."
     )
     if full.folds.size < 2 or full.folds.size != reduced.folds.size:
         return text

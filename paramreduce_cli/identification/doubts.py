@@ -8,6 +8,8 @@ from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import FloatArray
 
+_SLOW = 5.0
+"""Samples per second below which nobody records motions."""
 _SURE = 0.9
 """Correlation from which on two signals are the same but for a factor."""
 _UNLIKE = 0.5
@@ -32,6 +34,8 @@ def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
         rate: Samples per second.
         names: Of the coordinates.
     """
+    if rate < _SLOW:
+        yield f"there are {rate:.3g} samples a second: is time in milliseconds? Then say so under units."
     for j, name in enumerate(names):
         z, tau = piece.z[:, j], piece.tau[:, j]
         if np.ptp(z) == 0:

@@ -4,6 +4,8 @@ Base parameters take up a common factor of all torques, and most of what another
 alone do not show either.
 """
 
+from collections.abc import Iterable, Sequence
+
 import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import least_squares
@@ -14,7 +16,9 @@ _ALIKE = 0.8
 _OTHER_UNIT = 3.0
 """Factor beyond which that is no error of the parameters."""
 _FAR_LESS = 0.5
-"""What squared residuals fall to with gravity along the axis that it has."""
+"""What squared residuals fall to once gravity is along the axis that it has, or a joint counts as it does."""
+_TOO_LARGE, _TOO_SMALL = 3.0, 0.01
+"""Largest torques over the nominal ones that make another unit likely."""
 _NEAR = 0.1
 """Share of gravity by which its direction may be off an axis of the base."""
 
@@ -46,6 +50,63 @@ def doubted_unit(expected: FloatArray, found: FloatArray) -> list[str]:
     ]
 
 
+def doubted_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) -> list[str]:
+    """A sentence where torques are far from what joints are made for.
+
+    Args:
+        tau: (n_samples, n_dof)
+        rating: Nominal torques, (n_dof,); infinite where none is measured.
+        names: Of the coordinates.
+    """
+    shares = np.abs(tau).max(axis=0) / rating
+    j = int(shares.argmax())
+    if _TOO_SMALL <= shares[j] <= _TOO_LARGE or shares[j] == 0:
+        return []
+    return [
+        f"The torque that is largest beside its nominal_torque, of {names[j]}, goes up to {shares[j]:.2g} times it: "
+        "are torques in another unit, or currents, or before the gears? See units, torque_constants and transmission "
+        "under sampling.log."
+    ]
+
+
+def doubted_sign(
+    usual: FloatArray,
+    mirrored: Iterable[FloatArray],
+    tau: FloatArray,
+    deviation: FloatArray,
+    names: Sequence[str],
+) -> list[str]:
+    """A sentence where a joint that counts the other way fits far better.
+
+    Args:
+        usual: Observation matrix, (n_samples, n_dof, n).
+        mirrored: The same with each joint's motion turned round in turn.
+        tau: (n_samples, n_dof)
+        deviation: Standard deviations of the torques, (n_dof,).
+        names: Of the coordinates.
+    """
+    found: list[tuple[float, str]] = []
+    for j, W in enumerate(mirrored):
+        turned = np.where(np.arange(tau.shape[1]) == j, -tau, tau)
+        for torques, what in ((tau, "but not torques"), (turned, "and torques")):
+            text = (
+                f"With positions and speeds of {names[j]} counted the other way, {what}, the residuals are far "
+                "smaller: are signs and torque_signs under sampling.log right?"
+            )
+            found.append((_left(W, torques, deviation), text))
+    left, text = min(found)
+    return [text] if left < _FAR_LESS * _left(usual, tau, deviation) else []
+
+
+def _left(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
+    """Squared residuals of the best fit, over the deviations."""
+    weighted = np.concatenate([W, tau[..., None]], axis=2) / deviation[:, None]
+    rows: FloatArray = weighted.reshape(-1, weighted.shape[2])
+    # A triangular factor first: rows are many, and columns depend on each other.
+    factor = np.asarray(np.linalg.qr(rows, mode="r"))
+    return float(np.sum((factor[:, -1] - factor[:, :-1] @ least_squares(factor)) ** 2))
+
+
 def doubted_gravity(
     W: FloatArray, pulls: FloatArray, tau: FloatArray, deviation: FloatArray, gravity: FloatArray
 ) -> list[str]:
@@ -62,11 +123,7 @@ def doubted_gravity(
 
     def left(direction: FloatArray) -> float:
         added = np.tensordot(size * direction - gravity, pulls, axes=1)
-        weighted = np.concatenate([W + added, tau[..., None]], axis=2) / deviation[:, None]
-        rows: FloatArray = weighted.reshape(-1, weighted.shape[2])
-        # A triangular factor first: rows are many, and columns depend on each other.
-        factor = np.asarray(np.linalg.qr(rows, mode="r"))
-        return float(np.sum((factor[:, -1] - factor[:, :-1] @ least_squares(factor)) ** 2))
+        return _left(W + added, tau, deviation)
 
     if size == 0:
         return []

@@ -6,7 +6,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramreduce_cli.identification.estimation import LinearFit
-from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
+from paramreduce_cli.identification.expectations import (
+    doubted_gravity,
+    doubted_rating,
+    doubted_sign,
+    doubted_unit,
+)
 from paramreduce_cli.identification.hints import hints, negative_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import INERTIAL, Estimate, FloatArray, Kind, Model, SampleSet
@@ -45,15 +50,19 @@ def suspicions(
     gravity = doubted_gravity(
         looked_at.W, looked_at.pulls, looked_at.tau, fitted.deviation, model.mechanism.gravity
     )
-    if gravity:  # what else is seen follows from that
-        return gravity
     mechanism = model.mechanism
+    names = mechanism.coordinate_names
+    wrong = gravity or doubted_sign(
+        looked_at.exact, looked_at.mirrored(), looked_at.tau, fitted.deviation, names
+    )
+    if wrong:  # what else is seen follows from that
+        return [*_missed(full), *wrong]
     return [
         *_missed(full),
         *_doubted_bodies(model, looked_at, full),
         *hints(
             fitted,
-            mechanism.coordinate_names,
+            names,
             _tilts(model, training, fitted),
             gravity=float(np.linalg.norm(mechanism.gravity)),
             delay=delay,
@@ -92,6 +101,24 @@ class _Looked:
     """What gravity of one unit along each axis of the base adds to W, (3, n_samples, n_dof, n_standard)."""
     tau: FloatArray
     """(n_samples, n_dof), N m or N."""
+    states: tuple[FloatArray, FloatArray, FloatArray]
+    """Generalised coordinates, their speeds and accelerations."""
+    dynamics: Dynamics
+
+    @property
+    def exact(self) -> FloatArray:
+        """W of the states, without the low-pass of the torques, (n_samples, n_dof, n_standard)."""
+        return self.dynamics.regressor(*self.states)
+
+    def mirrored(self) -> Iterator[FloatArray]:
+        """The same with each joint turned round; as it is with loops, where joints depend on each other."""
+        if self.dynamics.mechanism.loops is not None:
+            yield self.exact
+            return
+        for j in range(self.states[0].shape[1]):
+            sign = np.ones(self.states[0].shape[1])
+            sign[j] = -1
+            yield self.dynamics.regressor(*(sign * state for state in self.states))
 
 
 def _some(model: Model, training: SampleSet) -> _Looked:
@@ -101,6 +128,7 @@ def _some(model: Model, training: SampleSet) -> _Looked:
     still = Dynamics(replace(mechanism, gravity=np.zeros(3)))
     along = [Dynamics(replace(mechanism, gravity=axis)) for axis in np.eye(3)]
     W, pulls, tau, seen = [], [], [], 0
+    states: list[tuple[FloatArray, ...]] = []
     for block in training.blocks():
         picked = slice(-seen % every, None, every)
         seen += len(block.tau)
@@ -108,18 +136,29 @@ def _some(model: Model, training: SampleSet) -> _Looked:
         if len(q):
             W.append(block.W.reshape(*block.tau.shape, -1)[picked])
             tau.append(block.tau[picked])
+            states.append((q, block.dq[picked], block.ddq[picked]))
             weightless = still.regressor(q, np.zeros_like(q), np.zeros_like(q))
             pulls.append(
                 [d.regressor(q, np.zeros_like(q), np.zeros_like(q)) - weightless for d in along]
             )
-    return _Looked(np.concatenate(W), np.concatenate(pulls, axis=1), np.concatenate(tau))
+    q, dq, ddq = (np.concatenate(parts) for parts in zip(*states, strict=True))
+    return _Looked(
+        np.concatenate(W),
+        np.concatenate(pulls, axis=1),
+        np.concatenate(tau),
+        (q, dq, ddq),
+        Dynamics(mechanism),
+    )
 
 
 def _doubted_bodies(model: Model, looked_at: _Looked, full: Estimate) -> list[str]:
-    """What is said where the config has values of the bodies."""
+    """What is said where the config has values of the bodies, or ratings of the joints."""
     bodies = [k for k, p in enumerate(model.mechanism.parameters) if p.kind in INERTIAL]
     W = looked_at.W[:, :, bodies]
-    return doubted_unit(W @ model.values[bodies], W @ full.standard[bodies])
+    found = doubted_unit(W @ model.values[bodies], W @ full.standard[bodies])
+    if found or not model.nominal_torque_given:
+        return found
+    return doubted_rating(looked_at.tau, model.nominal_torque, model.mechanism.coordinate_names)
 
 
 def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[FloatArray, ...]]:

@@ -117,7 +117,7 @@ def report(
             files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
     made = {name: make(data) for name, make in _shown(tables, model)}
     symbols = {} if model is None else model.mechanism.symbols
-    for name, table in ((name, table) for name, table in made.items() if table.rows):
+    for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
         files[f"tables/{name}.tex"] = latex_table(table, symbols).encode()
     files["index.html"] = render_page(

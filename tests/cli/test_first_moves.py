@@ -317,3 +317,15 @@ def test_a_template_that_is_not_filled_in_is_said(invoke, tmp_path, monkeypatch)
     lines = (tmp_path / "configs/my_arm.yaml").read_text().splitlines()
     first = next(k for k, line in enumerate(lines, start=1) if "TODO" in line and k > 1)
     assert f"configs/my_arm.yaml: line {first}" in said
+
+
+def test_messages_are_never_appended_to_something_else(invoke, folder):
+    """A recording, say, for who has read of `init --log`."""
+    before = (folder / "log.csv").read_text()
+    said = invoke("check-data", "log.csv", "--log", "log.csv", code=2).err
+    assert "holds something else than messages of paramreduce" in said
+    assert (folder / "log.csv").read_text() == before
+    (folder / "run.log").touch()
+    for _ in range(2):
+        invoke("inspect", "done", "--log", "run.log")
+    assert (folder / "run.log").read_text().count("$ ") == 2

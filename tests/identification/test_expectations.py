@@ -1,12 +1,18 @@
 """Torques in another unit, and gravity along another axis, on simulated logs."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from simulated_logs import along_axes, arm, coloured, simulated
 
-from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
+from paramreduce_cli.identification.expectations import (
+    doubted_gravity,
+    doubted_rating,
+    doubted_sign,
+    doubted_unit,
+)
 from paramreduce_cli.multibody.dynamics import Dynamics
 
 SEEDS = range(10)
@@ -59,3 +65,40 @@ def test_unknown_values_let_nothing_expect():
     found = np.random.default_rng(0).normal(size=(50, 3))
     assert not doubted_unit(np.zeros((50, 3)), found)
     assert not doubted_unit(np.random.default_rng(1).normal(size=(50, 3)), 100 * found)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+@pytest.mark.parametrize("torques", ["and torques", "but not torques"])
+@pytest.mark.parametrize("joint", [None, 0, 2, 4])
+def test_a_joint_that_counts_the_other_way_is_found(joint, torques, seed):
+    """Recorded motions of one joint turned round, with its torques or without."""
+    _, dynamics, _, _ = arm()
+    log = simulated(seed)
+    names = log.names
+    states = [s[::EVERY].copy() for s in (log.z, log.dz, log.ddz)]
+    noise = 0.03 * np.std(log.tau, axis=0)
+    tau = (log.tau + coloured(log.tau.shape, noise, 0.9, seed))[::EVERY]
+    if joint is not None:
+        for values in states:
+            values[:, joint] *= -1
+        tau[:, joint] *= -1 if torques == "and torques" else 1
+
+    def mirrored():
+        for j in range(len(names)):
+            sign = np.ones(len(names))
+            sign[j] = -1
+            yield dynamics.regressor(*(sign * values for values in states))
+
+    found = doubted_sign(dynamics.regressor(*states), mirrored(), tau, noise, names)
+    assert len(found) == (joint is not None)
+    assert joint is None or re.search(rf"speeds of {names[joint]} counted .*, {torques}", found[0])
+
+
+@pytest.mark.parametrize(
+    ("factor", "said"), [(1.0, ""), (2.5, ""), (1000.0, "b"), (0.005, "a")], ids=str
+)
+def test_torques_far_from_what_joints_are_rated_for_are_doubted(factor, said):
+    tau = factor * np.array([[0.5, -0.2], [-0.3, 0.3]]) * np.array([330.0, 56.0])
+    rating = np.array([330.0, 56.0]) * np.array([1.0, 0.5] if said == "b" else [1.0, 1.0])
+    found = doubted_rating(tau, rating, ("a", "b"))
+    assert (f", of {said}, goes up to" in found[0]) if said else not found

@@ -76,7 +76,9 @@ def run(
     store = results_store(loaded, results)
     _remark_on_what_is_to_do(config)
     for path, key in absent_files(loaded):
-        raise missing(path, f"It is named under {key}.")
+        raise missing(
+            path, f"It is named under {key} in {config}, whose comments may say where it is from."
+        )
     with placed_errors(config, overrides), store.locked():
         if overrides and results is None:
             _say_what_is_replaced(Runner(loaded, store))
