@@ -44,6 +44,12 @@ def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, st
         columns = _numbered(names, words, len(joints)) or _by_joint(names, words, joints)
         if columns is not None:
             found[key] = columns
+    more = _more_joints(names, len(joints))
+    if more and not _by_joint(names, _WORDS["position"], joints):
+        raise ConfigError(
+            f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}): is "
+            "it of this robot? If it is, take a config without --log, and write sampling.log with lists of columns into it."
+        )
     missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
     if missing:
         raise ConfigError(
@@ -51,6 +57,29 @@ def guessed_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, st
             f"any usual name among {', '.join(names[:30])}. {_remedy(names, joints)}"
         )
     return {"time": _time_of(times, found["position"]), **found}
+
+
+def joints_by_name(names: Sequence[str]) -> list[str]:
+    """Joints whose positions stand in columns of their names, such as ``/joint_states/position/elbow``."""
+    words = _WORDS["position"]
+    found: dict[str, None] = {}
+    for name in names:
+        parts = [part for part in re.split(r"[/.]", name) if part]
+        others = [part for part in parts if part.lower() not in words]
+        before, _, last = name.rpartition("_")
+        if others and len(others) < len(parts):
+            found.setdefault(others[-1])
+        elif before and last.lower() in words:
+            found.setdefault(before)
+    return list(found)
+
+
+def _more_joints(names: Sequence[str], n: int) -> int:
+    """How many joints the numbered columns are of, if more than n; else zero."""
+    most = n
+    while all(_numbered(names, _WORDS[key], most + 1) is not None for key in _NEEDED):
+        most += 1
+    return most if most > n else 0
 
 
 def _remedy(names: Sequence[str], joints: Sequence[str]) -> str:

@@ -1,6 +1,6 @@
 """What looks wrong in recorded motions, before any model is asked."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -26,13 +26,16 @@ _PER_PERIOD = 20
 """Samples of that."""
 
 
-def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
+def doubts(
+    piece: Signals, rate: float, names: Sequence[str], unmeasured: Collection[str] = ()
+) -> Iterator[str]:
     """Sentences on joints that stand still, units, signs and order of columns, and limits.
 
     Args:
         piece: An uninterrupted motion as recorded.
         rate: Samples per second.
         names: Of the coordinates.
+        unmeasured: Those without torques.
     """
     if rate < _SLOW:
         yield f"there are {rate:.3g} samples a second: is time in milliseconds? Then say so under units."
@@ -47,6 +50,8 @@ def doubts(piece: Signals, rate: float, names: Sequence[str]) -> Iterator[str]:
             )
         elif piece.dz is not None and np.ptp(piece.dz[:, j]) == 0:
             yield f"{name} moves, but its recorded speed is constant: is it recorded?"
+        if name in unmeasured:
+            continue
         if np.ptp(tau) == 0:
             yield f"the torque of {name} is constant: is it recorded?"
         elif _longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:

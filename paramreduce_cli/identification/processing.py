@@ -1,7 +1,7 @@
 """Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
 
 import itertools
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,7 +59,11 @@ _TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut o
 
 
 def processed(
-    logs: RawLogs, wanted: LogSection, names: Sequence[str], tell: Tell = lambda _: None
+    logs: RawLogs,
+    wanted: LogSection,
+    names: Sequence[str],
+    tell: Tell = lambda _: None,
+    unmeasured: Collection[str] = (),
 ) -> MeasuredLog:
     """Make logs ready to identify from.
 
@@ -68,6 +72,7 @@ def processed(
         wanted: What is where, and what is to be done.
         names: Of the independent coordinates.
         tell: Told how far it is.
+        unmeasured: Coordinates without torques.
 
     Raises:
         DataError: They cannot be used; the message names file, row and column.
@@ -79,8 +84,8 @@ def processed(
 
     steps: list[str] = []
     begin(0)
-    files = _read(logs.training, wanted, names, steps)
-    others = _read(logs.held_out, wanted, names, steps)
+    files = _read(logs.training, wanted, names, unmeasured, steps)
+    others = _read(logs.held_out, wanted, names, unmeasured, steps)
     training, held_out, rate = files.motions, others.motions, files.rate
     if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
         raise DataError(
@@ -88,7 +93,9 @@ def processed(
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
-    suspected = dict.fromkeys(text for piece in recorded for text in doubts(piece, rate, names))
+    suspected = dict.fromkeys(
+        text for piece in recorded for text in doubts(piece, rate, names, unmeasured)
+    )
     learned_from, tested_on = _parts(training, held_out, wanted)
     _check_left(learned_from, files.sources, wanted)
     raw = [piece for part in learned_from for piece in part]
@@ -154,12 +161,16 @@ class _Files:
 
 
 def _read(
-    logs: Iterable[RawLog], wanted: LogSection, names: Sequence[str], steps: list[str]
+    logs: Iterable[RawLog],
+    wanted: LogSection,
+    names: Sequence[str],
+    unmeasured: Collection[str],
+    steps: list[str],
 ) -> _Files:
     files = _Files()
     for log in logs:
         source = log.source
-        recorded = signals(log, wanted, names)
+        recorded = signals(log, wanted, names, unmeasured)
         del log  # the next one is read while this name would hold it
         for tau in recorded.tau.T if wanted.delay else ():
             # Torques at the times at which they acted.
@@ -281,6 +292,9 @@ def _joint_ready(
     s: Signals, rate: float, state: FloatArray, torque: FloatArray
 ) -> tuple[FloatArray, ...]:
     """z, dz, ddz and tau of one joint, (n_samples, 1) each, through the filters of states and torques."""
+    if np.ptp(s.z) == 0:  # round-off of filters would be taken for a motion
+        still = np.zeros_like(s.z)
+        return s.z, still, still, filters.filtered(s.tau, torque)
     z = filters.filtered(s.z, state)
     dz = filters.derivative(z, rate) if s.dz is None else filters.filtered(s.dz, state)
     ddz = filters.derivative(dz, rate) if s.ddz is None else filters.filtered(s.ddz, state)

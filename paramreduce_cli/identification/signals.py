@@ -1,7 +1,7 @@
 """Recorded columns as the signals of a robot's joints, in SI units, even in time; or what is wrong."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,13 +58,16 @@ class Signals:
         return Signals(self.time, self.z[:, j : j + 1], dz, ddz, self.tau[:, j : j + 1])
 
 
-def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
+def signals(
+    log: RawLog, wanted: LogSection, names: Sequence[str], unmeasured: Collection[str] = ()
+) -> Signals:
     """The signals of a file, row by row.
 
     Args:
         log: The file.
         wanted: What is where in it.
         names: Of the coordinates.
+        unmeasured: Those without torques, for which zeros stand; columns may lack, or hold anything.
 
     Raises:
         DataError: Columns are missing, or hold what cannot be; file, line and column are named.
@@ -77,7 +80,8 @@ def signals(log: RawLog, wanted: LogSection, names: Sequence[str]) -> Signals:
         where = getattr(columns, key)
         if where is None:
             return None
-        values = _matrix(log, where, names, key, columns.time)
+        left_out = unmeasured if key == "torque" else ()
+        values = _matrix(log, where, names, key, columns.time, left_out)
         values *= factor
         return values
 
@@ -134,7 +138,14 @@ def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:
     return per_joint(values, n_dof)
 
 
-def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str, times: str) -> FloatArray:
+def _matrix(
+    log: RawLog,
+    names: Names,
+    joints: Sequence[str],
+    key: str,
+    times: str,
+    left_out: Collection[str],
+) -> FloatArray:
     n_dof = len(joints)
     if isinstance(names, str):
         if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:
@@ -148,13 +159,20 @@ def _matrix(log: RawLog, names: Names, joints: Sequence[str], key: str, times: s
             for j, joint in enumerate(joints)
         ]
     else:
-        listed = list(names)
-    if len(listed) != n_dof:
-        raise ConfigError(
-            f"names {len(listed)} columns for {n_dof} joints.", ("sampling", "log", "columns", key)
-        )
-    found = [_column(log, name) for name in listed]
+        given = iter(names)
+        alone = len(names) == n_dof - len(left_out)  # a list may be of the measured ones
+        listed = ["" if alone and joint in left_out else next(given, "") for joint in joints]
+        if len(names) != n_dof and not alone:
+            raise ConfigError(
+                f"names {len(names)} columns for {n_dof} joints.",
+                ("sampling", "log", "columns", key),
+            )
     reference = log.columns.get(times)
+    nothing = np.zeros(0 if reference is None else reference.size)
+    found = [
+        nothing if joint in left_out else _column(log, name)
+        for joint, name in zip(joints, listed, strict=True)
+    ]
     for name, column in zip(listed, found, strict=True):
         if reference is not None and column.size != reference.size:
             raise DataError(

@@ -2,6 +2,8 @@
 
 import warnings
 
+import numpy as np
+
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.identification.processing import processed
@@ -25,7 +27,11 @@ def process_log(
     """
     if log is None:
         raise no_log()
-    found = processed(logs, log, model.mechanism.coordinate_names, tell)
+    names = model.mechanism.coordinate_names
+    unmeasured = [
+        name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
+    ]
+    found = processed(logs, log, names, tell, unmeasured)
     for text in found.doubts:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

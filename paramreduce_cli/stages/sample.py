@@ -358,6 +358,9 @@ def _nominal_acceleration(
     if given != "standard-deviation":
         return per_joint(given, model.mechanism.n_dof)
     deviation = standard_deviation(block.ddz for block in estimation.states())
+    if deviation.any():
+        # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
+        deviation[deviation == 0] = 1.0
     return _scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
 
 

@@ -9,7 +9,7 @@ from simulated_logs import two_link_log, write_log
 
 from paramreduce_cli.artifacts import log_files
 from paramreduce_cli.artifacts.log_files import load_log
-from paramreduce_cli.config.log_template import guessed_columns
+from paramreduce_cli.config.log_template import guessed_columns, joints_by_name
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
 from paramreduce_cli.identification.signals import evened, signals
@@ -277,3 +277,37 @@ def test_guesses(names, expected):
 def test_nothing_to_guess():
     with pytest.raises(ConfigError, match="no columns for torque of 2 joints"):
         guessed_columns(["t", "q1", "q2"], NAMES)
+
+
+@pytest.mark.parametrize("torque", ["tau{}", ["tau1"], ["tau1", "none"]], ids=str)
+@pytest.mark.parametrize("change", ["absent", "not numbers"])
+def test_torques_that_are_not_measured_need_no_column(torque, change):
+    columns = {**LOG, "tau2": np.full_like(LOG["tau2"], np.nan)}
+    if change == "absent":
+        del columns["tau2"]
+    wanted = section(columns={"torque": torque})
+    found = signals(RawLog("x.csv", columns, 2), wanted, NAMES, unmeasured=[NAMES[1]])
+    np.testing.assert_array_equal(found.tau[:, 0], LOG["tau1"])
+    assert not found.tau[:, 1].any()
+    with pytest.raises((DataError, ConfigError)):
+        signals(RawLog("x.csv", columns, 2), wanted, NAMES)
+
+
+@pytest.mark.parametrize(
+    ("names", "joints"),
+    [
+        (["/js/time", "/js/position/elbow", "/js/position/hand", "/js/effort/elbow"], ["elbow", "hand"]),
+        (["t", "elbow.q", "hand.q", "elbow.tau"], ["elbow", "hand"]),
+        (["t", "elbow_position", "hand_position"], ["elbow", "hand"]),
+        (["t", "q1", "tau1"], []),
+    ],
+)  # fmt: skip
+def test_joints_are_read_from_columns_of_their_names(names, joints):
+    assert joints_by_name(names) == joints
+
+
+def test_a_log_with_more_joints_than_the_robot_is_refused():
+    names = ["t", *(f"{kind}{j}" for kind in ("q", "tau") for j in (1, 2, 3))]
+    with pytest.raises(ConfigError, match="3 joints by its columns, the robot 2"):
+        guessed_columns(names, ["a", "b"])
+    assert guessed_columns(names, ["a", "b", "c"])["position"] == "q{}"

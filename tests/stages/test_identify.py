@@ -222,16 +222,32 @@ def test_another_heuristic_is_cross_validated_anew(measured_copy, invoke):
 
 
 def test_a_joint_whose_torque_is_not_measured(tmp_path, invoke):
-    """It makes no hints, and all else is identified."""
+    """Its column is not needed; it makes no hints, and all else is identified."""
     log = two_link_log()
     del log["tau2"]
     write_log(tmp_path / "log.csv", log)
     extra = "unmeasured: [z_fore]\n"
     path = log_config(tmp_path, extra)
-    settings = ["report.formats=[svg]", "sampling.log.columns.torque=[tau1, tau1]"]
+    settings = ["report.formats=[svg]"]
     error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
     assert "exchanged" not in error
     assert "torque_signs" not in error
+
+
+def test_a_joint_that_never_moves_is_told_by_rank(tmp_path, invoke):
+    """Round-off of differentiated positions is no motion; its parameters are not told, and nothing stops."""
+    log = two_link_log()
+    log = {name: values for name, values in log.items() if not name.startswith("dq")}
+    log["q2"] = np.full_like(log["q2"], 0.3)
+    write_log(tmp_path / "log.csv", log)
+    path = log_config(tmp_path)
+    settings = ["report.formats=[svg]", "identification.consistency=none"]
+    columns = "sampling.log.columns={time: t, position: 'q{}', torque: 'tau{}'}"
+    said = invoke("check-data", tmp_path / "log.csv", path, settings=[columns])
+    assert "rank 10 of 12 base parameters" in said.out
+    error = invoke("run", path, "--results", tmp_path / "r", settings=[*settings, columns]).err
+    assert "only 10 of the 12 base parameters" in " ".join(error.split())
+    assert "negative" not in error
 
 
 def test_folds_of_which_nothing_is_left_are_none(tmp_path, invoke):

@@ -9,7 +9,7 @@ import rich.table
 from paramreduce_cli.cli.options import SET
 from paramreduce_cli.cli.terminal import LOG, remark, say, say_table
 from paramreduce_cli.config import load_config, placed_errors
-from paramreduce_cli.config.log_template import guessed_columns
+from paramreduce_cli.config.log_template import guessed_columns, joints_by_name
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.texts import share
@@ -52,7 +52,8 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         section = LogSection(files=[file], columns=columns)
     section = section.model_copy(update={"held_out_files": []})
     with placed_errors(config, overrides):
-        log = processed(RawLogs((raw,), ()), section, joints)
+        unmeasured = [] if loaded is None else loaded.unmeasured
+        log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
         found = None if mechanism is None else quality(mechanism, log)
     for text in log.steps:
         say(text)
@@ -92,5 +93,6 @@ def _joints(names: list[str]) -> list[str]:
         except ConfigError:
             continue
         return joints
-    guessed_columns(names, ["q1"])  # says what is missing
-    raise AssertionError
+    joints = joints_by_name(names) or ["q1"]
+    guessed_columns(names, joints)  # says what is missing
+    return joints
