@@ -45,8 +45,8 @@ def doubts(
             yield f"{name} never moves, so its inertia is not seen."
         elif np.abs(z).max() > _TURNS:
             yield (
-                f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees? Then say so "
-                "under units."
+                f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees, or of a motor before its "
+                "gears? Then say so under units, or transmission."
             )
         elif piece.dz is not None and np.ptp(piece.dz[:, j]) == 0:
             yield f"{name} moves, but its recorded speed is constant: is it recorded?"

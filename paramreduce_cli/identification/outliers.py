@@ -8,6 +8,8 @@ from paramreduce_cli.records import FloatArray
 
 _WINDOW = 7
 """Neighbours that tell an outlier."""
+_STRETCH = 200
+"""Samples whose noise is taken to be alike."""
 _FAR = 12.0
 """Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
 _SMALL = 0.02
@@ -28,7 +30,7 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
             for j, column in enumerate(values.T):
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
-                sigma = max(_TO_SIGMA * float(np.median(away)), _SMALL * float(np.std(column)))
+                sigma = np.maximum(_TO_SIGMA * _around(away), _SMALL * float(np.std(column)))
                 far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
                 if far.any():
                     found.setdefault((signal, j), []).extend(piece.time[far].tolist())
@@ -37,7 +39,17 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
     return found
 
 
-def _alone(column: FloatArray, least: float) -> np.ndarray:
+def _around(away: FloatArray) -> FloatArray:
+    """Medians of the stretch of each sample and its neighbours, the largest: noise varies along a motion."""
+    stretches = -(-away.size // _STRETCH)
+    padded = np.full(stretches * _STRETCH, np.nan)
+    padded[: away.size] = away
+    medians = np.nanmedian(padded.reshape(stretches, _STRETCH), axis=1)
+    largest: FloatArray = ndimage.maximum_filter1d(medians, 3, mode="nearest")
+    return np.repeat(largest, _STRETCH)[: away.size]
+
+
+def _alone(column: FloatArray, least: FloatArray) -> np.ndarray:
     """Samples that stick out from both neighbours to one side; a step's samples do not."""
     before = np.diff(column, prepend=column[:1])
     after = -np.diff(column, append=column[-1:])
