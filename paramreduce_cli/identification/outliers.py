@@ -10,6 +10,8 @@ _WINDOW = 7
 """Neighbours that tell an outlier."""
 _STRETCH = 200
 """Samples whose noise is taken to be alike."""
+_AT_ONCE = 500
+"""Such stretches."""
 _FAR = 12.0
 """Robust standard deviations from the median of its neighbours at which a sample is an outlier."""
 _SMALL = 0.02
@@ -41,10 +43,11 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
 
 def _around(away: FloatArray) -> FloatArray:
     """Medians of the stretch of each sample and its neighbours, the largest: noise varies along a motion."""
-    stretches = -(-away.size // _STRETCH)
-    padded = np.full(stretches * _STRETCH, np.nan)
-    padded[: away.size] = away
-    medians = np.nanmedian(padded.reshape(stretches, _STRETCH), axis=1)
+    whole = away[: away.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
+    # Some at a time, as medians are of copies.
+    parts = [np.median(whole[k : k + _AT_ONCE], axis=1) for k in range(0, len(whole), _AT_ONCE)]
+    rest = away[whole.size :]
+    medians = np.concatenate([*parts, [np.median(rest)] if rest.size else []])
     largest: FloatArray = ndimage.maximum_filter1d(medians, 3, mode="nearest")
     return np.repeat(largest, _STRETCH)[: away.size]
 

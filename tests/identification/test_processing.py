@@ -152,6 +152,19 @@ def test_single_outliers_are_replaced():
     assert np.abs(kept.training.tau - usual.training.tau).max() > 30
 
 
+def test_noise_that_varies_is_no_outlier():
+    """Ripple in one half of a motion; an outlier in the other half is found all the same."""
+    log = two_link_log()
+    rng = np.random.default_rng(5)
+    half = log["t"].size // 2
+    log["tau1"] = log["tau1"].copy()
+    log["tau1"][half:] += 2 * rng.choice([-1, 1], log["t"].size - half) * rng.uniform(0.5, 2, log["t"].size - half)  # fmt: skip
+    assert not any("outliers" in step for step in made(log).steps)
+    log["tau1"][500] += 8
+    (step,) = [step for step in made(log).steps if "outliers" in step]
+    assert f"1 in the torque of upper (the first at {log['t'][500]:.6g} s)" in step
+
+
 def test_what_is_shown_is_what_was_done():
     log = two_link_log()
     log["tau1"] = log["tau1"].copy()
