@@ -62,8 +62,17 @@ def _of_here(example: str) -> str:
         elif configs:
             first = f"\nFirst: paramreduce run {shlex.quote(str(configs[0]))} makes results."
     if named and not configs and not results:
-        first = "\nFirst: paramreduce init --example puma560 writes its config."
+        first = f"\nFirst: paramreduce init {_example_of(named)} writes its config."
     return example + first
+
+
+def _example_of(paths: Sequence[str]) -> str:
+    """Options for the robot that paths in an example are of, if it comes along; else for one that does."""
+    from paramreduce_cli.config.examples import examples  # late: it loads much
+
+    known = examples()
+    named = [Path(path).stem for path in paths if Path(path).stem in known]
+    return f"--example {named[0]}" if named else "--example puma560"
 
 
 def after(message: str, command: click.Command | None) -> str:
