@@ -80,7 +80,7 @@ def doubted_sign(
 
     Args:
         usual: Observation matrix, (n_samples, n_dof, n).
-        mirrored: The same with each joint's motion turned round in turn.
+        mirrored: The same with each joint's motion turned round in turn; or none.
         tau: (n_samples, n_dof)
         deviation: Standard deviations of the torques, (n_dof,).
         names: Of the coordinates.
@@ -94,7 +94,7 @@ def doubted_sign(
                 "smaller: are signs and torque_signs under sampling.log right?"
             )
             found.append((_left(W, torques, deviation), text))
-    left, text = min(found)
+    left, text = min(found, default=(np.inf, ""))
     return [text] if left < _FAR_LESS * _left(usual, tau, deviation) else []
 
 

@@ -111,9 +111,8 @@ class _Looked:
         return self.dynamics.regressor(*self.states)
 
     def mirrored(self) -> Iterator[FloatArray]:
-        """The same with each joint turned round; as it is with loops, where joints depend on each other."""
+        """The same with each joint turned round; none with loops, where joints depend on each other."""
         if self.dynamics.mechanism.loops is not None:
-            yield self.exact
             return
         for j in range(self.states[0].shape[1]):
             sign = np.ones(self.states[0].shape[1])
@@ -125,8 +124,9 @@ def _some(model: Model, training: SampleSet) -> _Looked:
     """Of what is learned from."""
     mechanism = model.mechanism
     every = max(1, training.n_samples * mechanism.n_dof // _ENOUGH)
-    still = Dynamics(replace(mechanism, gravity=np.zeros(3)))
-    along = [Dynamics(replace(mechanism, gravity=axis)) for axis in np.eye(3)]
+    still, *along = (
+        Dynamics(replace(mechanism, gravity=axis), once=True) for axis in (np.zeros(3), *np.eye(3))
+    )
     W, pulls, tau, seen = [], [], [], 0
     states: list[tuple[FloatArray, ...]] = []
     for block in training.blocks():
