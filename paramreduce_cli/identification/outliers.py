@@ -4,7 +4,7 @@ import numpy as np
 from scipy import ndimage
 
 from paramreduce_cli.identification.signals import Signals
-from paramreduce_cli.records import FloatArray
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 
 _WINDOW = 7
 """Neighbours that tell an outlier."""
@@ -32,29 +32,32 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
             for j, column in enumerate(values.T):
                 away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
-                sigma = np.maximum(_TO_SIGMA * _around(away), _SMALL * float(np.std(column)))
-                far = (away > _FAR * sigma) & _alone(column, 0.5 * _FAR * sigma)
-                if far.any():
+                limits = _FAR * np.maximum(
+                    _TO_SIGMA * _around(away), _SMALL * float(np.std(column))
+                )
+                far = np.flatnonzero(away > np.repeat(limits, _STRETCH)[: away.size])
+                far = far[_alone(column, far, 0.5 * limits[far // _STRETCH])]
+                if far.size:
                     found.setdefault((signal, j), []).extend(piece.time[far].tolist())
-                    good = np.flatnonzero(~far)
-                    column[far] = np.interp(np.flatnonzero(far), good, column[good])
+                    good = np.delete(np.arange(column.size), far)
+                    column[far] = np.interp(far, good, column[good])
     return found
 
 
 def _around(away: FloatArray) -> FloatArray:
-    """Medians of the stretch of each sample and its neighbours, the largest: noise varies along a motion."""
+    """Medians of stretches and their neighbours, the largest: noise varies along a motion."""
     whole = away[: away.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
     # Some at a time, as medians are of copies.
     parts = [np.median(whole[k : k + _AT_ONCE], axis=1) for k in range(0, len(whole), _AT_ONCE)]
     rest = away[whole.size :]
     medians = np.concatenate([*parts, [np.median(rest)] if rest.size else []])
     largest: FloatArray = ndimage.maximum_filter1d(medians, 3, mode="nearest")
-    return np.repeat(largest, _STRETCH)[: away.size]
+    return largest
 
 
-def _alone(column: FloatArray, least: FloatArray) -> np.ndarray:
-    """Samples that stick out from both neighbours to one side; a step's samples do not."""
-    before = np.diff(column, prepend=column[:1])
-    after = -np.diff(column, append=column[-1:])
-    found: np.ndarray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
+def _alone(column: FloatArray, places: IntArray, least: FloatArray) -> BoolArray:
+    """Which samples stick out from both neighbours to one side; a step's samples do not."""
+    before = column[places] - column[np.maximum(places - 1, 0)]
+    after = column[places] - column[np.minimum(places + 1, column.size - 1)]
+    found: BoolArray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
     return found
