@@ -13,7 +13,7 @@ _OPTIONS = (
 
 
 @contextmanager
-def opened(page, *, width=1280, height=800, place="", dark=False):
+def opened(page, *, width=1280, height=800, place="", dark=False, scripts=True):
     """A window with a page in it, ready to be used.
 
     Args:
@@ -22,6 +22,7 @@ def opened(page, *, width=1280, height=800, place="", dark=False):
         height: Of the window, px.
         place: What follows the # of the address.
         dark: Whether the reader prefers dark pages.
+        scripts: Whether those of the page run.
     """
     from selenium import webdriver
     from selenium.webdriver.support.ui import WebDriverWait
@@ -37,9 +38,11 @@ def opened(page, *, width=1280, height=800, place="", dark=False):
         driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
         scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"features": [scheme]})
+        driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": not scripts})
         driver.get(f"file://{page}{place and '#' + place}")
         ready = "return document.getElementById('explorer').dataset.ready === 'true'"
-        WebDriverWait(driver, 20, 0.02).until(lambda d: d.execute_script(ready))
+        if scripts:
+            WebDriverWait(driver, 20, 0.02).until(lambda d: d.execute_script(ready))
         yield driver
     finally:
         driver.quit()

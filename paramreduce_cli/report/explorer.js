@@ -250,7 +250,7 @@
   const spoken = (k, row) => {
     const c = curves[k];
     const cost = c.operations.inverse ? `, ${data.functions[0]} in ${c.operations.inverse[row]} operations` : "";
-    return `${finders(k, row).join(", ")}: ${c.n[row]} parameters, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
+    return `${finders(k, row).join(", ")}: ${c.n[row]} ${c.n[row] === 1 ? "parameter" : "parameters"}, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
   };
 
   // Error against the number of parameters. What several heuristics found is drawn once, for the first one that is shown.
