@@ -9,7 +9,7 @@ from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.records import FloatArray, MeasuredLog, Mechanism
+from paramreduce_cli.records import BoolArray, FloatArray, MeasuredLog, Mechanism
 
 _STATES = 200
 """Random states on which the base parameters are found."""
@@ -33,16 +33,17 @@ class LogQuality:
     """Base parameters that can hardly be told from the others."""
 
 
-def quality(mechanism: Mechanism, log: MeasuredLog) -> LogQuality:
+def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQuality:
     """How well the part of a log to learn from excites a robot's base parameters.
 
     Args:
         mechanism: The robot.
         log: Made ready.
+        measured: Coordinates whose torques are measured, (n_dof,).
     """
     dynamics = Dynamics(mechanism, once=True)
     states = random_states(mechanism, _STATES, np.random.default_rng(0))
-    K = dynamics.regressor(*states)
+    K = dynamics.regressor(*states)[:, measured]
     base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE)
     factors = LoggedSet(log.training, log, dynamics, "training part").factors()
     scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))

@@ -231,6 +231,10 @@ def test_a_joint_whose_torque_is_not_measured(tmp_path, invoke):
     settings = ["report.formats=[svg]"]
     error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
     assert "exchanged" not in error
+    said = invoke("check-data", tmp_path / "log.csv", path).out
+    assert re.search(
+        r"rank (\d+) of \1 base parameters", said
+    )  # those that the measured torques can tell
     assert "torque_signs" not in error
 
 

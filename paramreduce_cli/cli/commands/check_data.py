@@ -54,7 +54,9 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     with placed_errors(config, overrides):
         unmeasured = [] if loaded is None else loaded.unmeasured
         log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
-        found = None if mechanism is None else quality(mechanism, log)
+        found = None
+        if mechanism is not None and loaded is not None:
+            found = quality(mechanism, log, loaded.measured())
     for text in log.steps:
         say(text)
     table = rich.table.Table(box=rich.box.SIMPLE)
