@@ -94,7 +94,8 @@ class Ways:
         try:
             return [self._straight(start, end)]
         except _NoWayError as error:
-            found = self._around(start, end)
+            standing = all(self._can_stand(state[0]) for state in (start, end))
+            found = self._around(start, end) if standing else []
             if not found:
                 raise DataError(str(error)) from None
             return found
@@ -151,9 +152,8 @@ class Ways:
         while duration < _LONGEST:
             way = Way(duration, _quintic(start, end, duration))
             z, dz, ddz = way.states(np.linspace(0, duration, _CHECKED))
-            inside = (z >= limits.lower - _ROUNDING) & (z <= limits.upper + _ROUNDING)
             slow = (np.abs(dz) <= fast * (1 + _ROUNDING)) & (np.abs(ddz) <= hard * (1 + _ROUNDING))
-            if inside.all() and slow.all():
+            if self._is_inside(z) and slow.all():
                 name = self._missed(z)
                 if name is not None:
                     raise _NoWayError(
@@ -167,6 +167,17 @@ class Ways:
             "no way between trajectories.start_pose and the trajectory keeps to the limits; choose another "
             "pose within the position limits, or trajectories.rest_to_rest."
         )
+
+    def _can_stand(self, pose: FloatArray) -> bool:
+        """Whether a pose is within the limits and can be held; else no detour helps."""
+        z, still = pose[None], np.zeros((1, pose.size))
+        inside = self._is_inside(z)
+        return inside and self._missed(z) is None and self._is_loadable(z, still, still)
+
+    def _is_inside(self, z: FloatArray) -> bool:
+        limits = self._limits
+        inside = (z >= limits.lower - _ROUNDING) & (z <= limits.upper + _ROUNDING)
+        return bool(inside.all())
 
     def _missed(self, z: FloatArray) -> str | None:
         """Name of a bound that is not kept along a motion, None if all are."""

@@ -275,7 +275,8 @@ def test_a_way_around_what_is_in_the_way(ur10):
     """Under a ceiling an arm cannot swing over the top: it passes a third pose, clear by brute force all along."""
     ceiling = {"name": "ceiling", "point": [0, 0, CEILING], "normal": [0, 0, -1]}
     section = ClearanceSection(radius=0.05, planes=[{"name": "table"}, ceiling])
-    config, model = config_and_model("ur10")
+    config = config_of("ur10")
+    model = types.SimpleNamespace(mechanism=ur10, values=config.parameter_values())
     constraints = tuple(section.constraints(model.mechanism))
     trajectories = types.SimpleNamespace(
         limits=config.trajectories.limits(6), constraints=constraints, period=1.0
