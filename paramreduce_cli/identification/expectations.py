@@ -1,7 +1,7 @@
-"""What measured torques look like beside the config's values, and with gravity along other axes.
+"""What measured torques look like beside the config's values, and with gravity or joints the other way.
 
-Base parameters take up a common factor of all torques, and most of what another direction of gravity does: residuals
-alone do not show either.
+Base parameters take up a common factor of all torques, and most of what another direction of gravity or the other sign of
+a joint does: residuals alone do not show what it is.
 """
 
 from collections.abc import Iterable, Sequence

@@ -29,7 +29,7 @@ NO_TORQUE = 1e-100
 
 @dataclass(frozen=True)
 class ShownMotion:
-    """One trajectory of the validation set with its torques over the nominal ones."""
+    """One trajectory of the validation set with its torques."""
 
     time: FloatArray
     """s, or numbers of samples where times are not known."""

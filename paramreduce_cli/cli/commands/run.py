@@ -118,7 +118,9 @@ def run(
 
 
 def _remark_on_what_is_to_do(config: Path) -> None:
-    """Say where a template is not filled in yet."""
+    """Say where a template is not filled in yet; of a pipe there is nothing left to read."""
+    if not config.is_file():
+        return
     lines = config.read_text(encoding="utf-8", errors="replace").splitlines()
     marked = [str(k) for k, line in enumerate(lines, start=1) if "# TODO" in line]
     if marked:
