@@ -15,6 +15,8 @@ from paramreduce_cli.terms.tape import Remains, Tape
 
 _LARGEST = 1e100
 """Share of an allowed error from which on it does not matter how large it is."""
+_NOTHING = 1e-12
+"""Share of a column that is left, squared, from which on it is no more than rounding."""
 _RIDGE = 1e-13
 """Added to the unit diagonal of normal equations: parameters that nothing tells stay small."""
 
@@ -26,6 +28,19 @@ class Budget:
     torque: float
     acceleration: float
     """Infinite where accelerations do not matter; mass matrices must be positive definite even so."""
+
+
+@dataclass(frozen=True)
+class Costs:
+    """What changes of rows add to the sum of squares, to first order."""
+
+    again: FloatArray
+    """The parameters fitted again: exactly where they change by multiples of one combination of them,
+    otherwise to columns as they were, (k,)."""
+    plain: FloatArray
+    """The parameters as they are, (k,)."""
+    sure: FloatArray
+    """Fitted again where that is exact, otherwise as they are, (k,)."""
 
 
 @dataclass(frozen=True)
@@ -43,7 +58,39 @@ class Linear:
 
     def explained(self, changes: FloatArray) -> FloatArray:
         """Squares of what the parameters make up for, (k,), of changes (k, n_rows)."""
-        return np.sum((changes @ self.rows.T @ self.factor.T) ** 2, axis=1)
+        return np.sum(self._coordinates(changes) ** 2, axis=1)
+
+    def costs(self, changes: FloatArray, beta: FloatArray, combinations: FloatArray) -> Costs:
+        """What it costs that rows lose something.
+
+        Args:
+            changes: What rows lose, (k, n_rows).
+            beta: The parameters that fit, (n_parameters,).
+            combinations: Of the parameters that these are multiples of, zero where they are none of one,
+                (k, n_parameters).
+        """
+        size = np.einsum("cr,cr->c", changes, changes)
+        along = changes @ self.residual
+        C = self._coordinates(changes)
+        explained = np.einsum("cn,cn->c", C, C)
+        plain = size + 2 * along
+        again, sure = plain - explained, plain.copy()
+        (one,) = np.nonzero(combinations.any(axis=1))
+        # With a the combination, columns become W - d a': the residual is least, over the multiple s of
+        # what a' beta was, at r + s d's part out of reach, and e (1 - s) + s C along the direction of a.
+        directions = combinations[one] @ self.factor.T
+        lengths = np.linalg.norm(directions, axis=1)
+        e = combinations[one] @ beta / lengths
+        t = e - np.einsum("cn,cn->c", C[one], directions) / lengths
+        left = t**2 + np.maximum(size[one] - explained[one], 0.0)
+        gone = left <= _NOTHING * (e**2 + size[one])
+        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, left)
+        again[one] = sure[one] = e**2 - np.where(gone, 0.0, regained)
+        return Costs(again, plain, sure)
+
+    def _coordinates(self, changes: FloatArray) -> FloatArray:
+        """In the orthonormal basis of the columns, (k, n_parameters)."""
+        return np.asarray(changes @ self.rows.T @ self.factor.T)
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,8 @@ CODES = {
     "sin": SIN, "cos": COS, "tanh": TANH, "sign": SIGN,
 }  # fmt: skip
 NONE = -1
+SEVERAL = -2
+"""In place of a number where there is more than one."""
 FIRST, SECOND, WHOLE, ITSELF = range(4)
 """What of a node can be otherwise: its operands in a sum, whether it is zero, what it stands for."""
 NUMBER = -1
@@ -239,6 +241,69 @@ def effects(
             for i in range(m):
                 result[c, q * m + i] = adjoints[k, q, i] * given[i]
     return result
+
+
+@numba.njit(cache=True, nogil=True)
+def combinations(
+    codes: IntArray,
+    operands: IntArray,
+    numbers: FloatArray,
+    kept: BoolArray,
+    source: IntArray,
+    factor: FloatArray,
+    n: int,
+) -> tuple[IntArray, FloatArray]:
+    """Of which linear combination of the first n inputs nodes are a multiple.
+
+    Returns:
+        Nodes that are such combinations, NONE or SEVERAL, (n_nodes,); coefficients where a node is one,
+        (n_nodes, n).
+    """
+    found = np.full(codes.size, NONE)
+    coefficients = np.zeros((codes.size, n))
+    number = np.zeros(codes.size)
+    for k in range(codes.size):
+        code = codes[k]
+        if not kept[k, WHOLE]:
+            continue
+        if source[k] == NUMBER:
+            number[k] = factor[k]
+        elif source[k] != k:
+            found[k] = found[source[k]]
+            coefficients[k] = factor[k] * coefficients[source[k]]
+        elif code == CONSTANT:
+            number[k] = numbers[k]
+        elif code == INPUT and numbers[k] < n:
+            found[k] = k
+            coefficients[k, int(numbers[k])] = 1.0
+        elif code in (SUM, PRODUCT):
+            a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
+            s = -1.0 if operands[k, 0] & 1 else 1.0
+            t = -1.0 if operands[k, 1] & 1 else 1.0
+            first = found[a] if code == PRODUCT or kept[k, FIRST] else NONE
+            second = found[b] if code == PRODUCT or kept[k, SECOND] else NONE
+            if code == PRODUCT:
+                found[k] = first if second == NONE else second
+                coefficients[k] = (
+                    s * t * (number[a] * coefficients[b] + number[b] * coefficients[a])
+                )
+                continue
+            if first != NONE:
+                coefficients[k] += s * coefficients[a]
+            if second != NONE:
+                coefficients[k] += t * coefficients[b]
+            plain = (first == NONE or np.any(coefficients[a])) and (
+                second == NONE or np.any(coefficients[b])
+            )
+            if first in (NONE, second):
+                found[k] = second
+            elif second == NONE:
+                found[k] = first
+            else:
+                found[k] = k if plain else SEVERAL
+            if not plain:
+                coefficients[k] = 0.0
+    return found, coefficients
 
 
 @numba.njit(cache=True, nogil=True)

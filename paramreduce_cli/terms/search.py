@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
-from paramreduce_cli.terms.fitting import Fit, Fitting
+from paramreduce_cli.terms.fitting import Costs, Fit, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
 
 _TRIED = 8
@@ -22,6 +22,10 @@ _AT_ONCE = 8
 """Terms that are left out in one step, at most."""
 _SUM_HOLDS = 1.2
 """Several terms go together if they cost no more than this times what each costs alone."""
+_LITTLE = 0.2
+"""Share of what is still allowed that terms may cost which go together without being tried alone."""
+_MISJUDGED = 2.0
+"""Times that which they may cost indeed."""
 _BACK = (1, 8)
 """Terms that are put back before others are left out."""
 _NOISE = 0.3
@@ -81,19 +85,14 @@ class Search:
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
         if held is not None:
             weights[held] = np.inf
-        looked_at = _TRIED
         while True:
-            following = self._next(step, weights, looked_at)
-            if following is not None:
-                step = following
-                visit(step)
-            elif noise == 0 and looked_at == _TRIED:
-                looked_at = _TRIED_LAST
-            elif (other := self._stand_in(step, weights)) is not None:
-                step = other
-                visit(step)
-            else:
+            following = self._next(step, weights, _TRIED) or self._stand_in(step, weights)
+            if following is None and noise == 0:
+                following = self._next(step, weights, _TRIED_LAST)
+            if following is None:
                 return step
+            step = following
+            visit(step)
 
     def improved(self, step: Step, rounds: int, visit: Callable[[Step], None]) -> Step:
         """Put terms back and leave others out instead, so many times."""
@@ -121,8 +120,14 @@ class Search:
             return None
         live, saved = self._candidates[numbers], saved / weights[numbers]
         tried = []
-        again, plain = self._costs(fit, live)
-        lists = [np.argsort(cost / saved, kind="stable")[:looked_at] for cost in (again, plain)]
+        costs = self._costs(fit, live)
+        several = self._several(step, live, costs.sure, saved)
+        if several is not None:
+            return several
+        lists = [
+            np.argsort(cost / saved, kind="stable")[:looked_at]
+            for cost in (costs.again, costs.plain)
+        ]
         for number in np.unique(np.concatenate(lists)):
             changed = self._with(fit, live[number : number + 1])
             if changed.within:
@@ -139,6 +144,29 @@ class Search:
                 best, chosen = changed, [*chosen, number]
         return self._step(best)
 
+    def _several(
+        self, step: Step, live: IntArray, costs: FloatArray, saved: FloatArray
+    ) -> Step | None:
+        """The program without all the terms that cost little together, None if they are few.
+
+        Args:
+            step: Where to start.
+            live: Terms, (n_terms, 2).
+            costs: What leaving each out costs, (n_terms,).
+            saved: Operations, (n_terms,).
+        """
+        fit = step.fit
+        order = np.argsort(costs / saved, kind="stable")
+        expected = np.cumsum(np.maximum(costs[order], 0.0))
+        little = _LITTLE * (1 - fit.excess**2)
+        size = int(np.searchsorted(expected, little, side="right"))
+        while size > 1:
+            changed = self._with(fit, live[order[:size]])
+            if changed.within and changed.strain - fit.strain <= _MISJUDGED * little:
+                return self._step(changed)
+            size //= 2
+        return None
+
     def _stand_in(self, step: Step, weights: FloatArray) -> Step | None:
         """The program with one node that stands for another one, None if all are too dear."""
         fit = step.fit
@@ -147,7 +175,8 @@ class Search:
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero((counts < step.count) & np.isfinite(own))
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
-        again, _ = self._first_order(fit, ways.changes(values, pulls))
+        none = np.zeros((len(useful), self._fitting.n))
+        again = fit.linear.costs(ways.changes(values, pulls), fit.beta, none).again
         tried = []
         for place in np.argsort(again * own / saved, kind="stable")[:_TRIED]:
             changed = self._fitting.fit(fit.left.standing(*ways.one(place)), fit.beta)
@@ -170,14 +199,10 @@ class Search:
         """Fitted with some terms the other way round."""
         return self._fitting.fit(fit.left.flipped(flipped), fit.beta)
 
-    def _costs(self, fit: Fit, live: IntArray) -> tuple[FloatArray, FloatArray]:
-        """What leaving each term out costs to first order, with parameters fitted again and without."""
-        return self._first_order(fit, self._fitting.effects(fit, live))
-
-    def _first_order(self, fit: Fit, D: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """The same of what rows lose, (n_ways, n_rows)."""
-        plain = np.einsum("cr,cr->c", D, D) + 2 * (D @ fit.linear.residual)
-        return plain - fit.linear.explained(D), plain
+    def _costs(self, fit: Fit, live: IntArray) -> Costs:
+        """What leaving each term out costs."""
+        combinations = self._tape.combinations(fit.left, live, self._fitting.n)
+        return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
 
     def _some_back(self, step: Step) -> tuple[Step, IntArray]:
         """The program with some terms that help much for what they cost, and their numbers."""
@@ -193,7 +218,7 @@ class Search:
         numbers, saved = self._useful(step, everything)
         if not numbers.size:
             return step, np.zeros(0, np.int64)
-        again, _ = self._costs(step.fit, self._candidates[numbers])
+        again = self._costs(step.fit, self._candidates[numbers]).again
         order = np.argsort(again / saved, kind="stable")
         out = int(numbers[order[self._drawn(order.size, 2 * _SPREAD)]])
         fit = self._with(step.fit, self._candidates[out][None])

@@ -196,6 +196,20 @@ class Tape:
             self._operands, left.kept, left.source, left.factor, candidates, values, own, adjoints
         )
 
+    def combinations(self, left: Remains, terms: IntArray, n: int) -> FloatArray:
+        """Linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
+
+        Zero for terms that are no multiple of one, or for which that cannot be seen.
+        """
+        found, coefficients = kernels.combinations(
+            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor, n
+        )
+        nodes, what = terms.T
+        operands = self._operands[nodes, np.minimum(what, SECOND)] >> 1
+        node = found[np.where(what == WHOLE, nodes, operands)]
+        known = (node >= 0) & (what != ITSELF)
+        return np.where(known[:, None], coefficients[node], 0.0)
+
     def count(self, left: Remains) -> int:
         """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
         return int(

@@ -12,6 +12,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, ReducedModel
 from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.kernels import ITSELF
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import Search
 from paramreduce_cli.terms.tape import Tape
@@ -95,6 +96,28 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
     expected = np.linalg.norm(accelerations / scale) / np.linalg.norm(samples.ddz.T / scale)
     assert found.acceleration_error == pytest.approx(expected, rel=1e-6)
     assert expected <= 0.1
+
+
+def test_costs_of_combinations_of_parameters_are_exact(arm):
+    fitting, reduced, _ = fitting_of(arm, False, Budget(0.1, np.inf))
+    tape = fitting.tape
+    terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
+    fit = fitting.fit(tape.everything(), reduced.values)
+    for chosen in (None, 7, 12):
+        if chosen is not None:
+            fit = fitting.fit(fit.left.flipped(terms[chosen][None]), fit.beta)
+        live = terms[fit.left.has(terms)]
+        combinations = tape.combinations(fit.left, live, fitting.n)
+        costs = fit.linear.costs(fitting.effects(fit, live), fit.beta, combinations)
+        known = np.flatnonzero(combinations.any(axis=1))
+        assert known.size > 10
+        for k in known:
+            # Numbers of one sum that cancel are lost in the square of their size.
+            cost = fitting.fit(fit.left.flipped(live[k][None]), fit.beta).cost - fit.cost
+            assert costs.again[k] == pytest.approx(cost, rel=1e-6, abs=1e-8 * costs.plain.max())
+            assert costs.sure[k] == costs.again[k]
+        others = np.setdiff1d(np.arange(len(live)), known)
+        assert np.all(costs.again[others] <= costs.plain[others])
 
 
 def test_nothing_leaner_can_be_had_on_a_small_arm(arm):
