@@ -21,6 +21,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Judge
+from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.simplify import Simplified, simplified
 from paramreduce_cli.terms.starts import starts_within
 
@@ -28,6 +29,8 @@ _SEARCHED, _WATCHED = 300, 200
 """Samples of the estimation and the validation set that are looked at while terms are left out."""
 _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
+_PARTS = 4
+"""Of a log's training part, which are fitted to and watched by turns."""
 _FITTED = 1000
 """Samples of the estimation set to which the parameters of what is left are fitted."""
 
@@ -71,12 +74,9 @@ def reduce_terms(
         def progress(share: float, remark: str, name: str = name) -> None:
             run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
 
-        validation = None if measured else samples.validation
+        searched, watched = _looked_at(judge, samples)
         found, front = simplified(
-            lean, starts,
-            judge.thinned(samples.estimation, _SEARCHED),
-            judge.thinned(validation, _WATCHED) if validation is not None else None,
-            judge.poses(_POSES),
+            lean, starts, searched, watched, judge.poses(_POSES),
             budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
         )  # fmt: skip
         fitted = judge.thinned(samples.estimation, _FITTED)
@@ -88,6 +88,23 @@ def reduce_terms(
             functions[name] = record
     _say_missing([name for name in section.functions if name not in functions], bool(functions))
     return TermReduction(budget.torque, budget.acceleration, functions)
+
+
+def _looked_at(judge: Judge, samples: Samples) -> tuple[TermSamples, TermSamples | None]:
+    """What parameters are fitted to while terms are left out, and what errors are watched on.
+
+    Measured torques: both are of the training part, quarters of it by turns, as one motion alone says
+    little of what a program without terms is worth on another.
+    """
+    if judge.measured:
+        some = judge.thinned(samples.estimation, _SEARCHED + _WATCHED)
+        count = some.states.shape[1]
+        fitted = np.arange(count) * _PARTS // count % 2 == 0
+        return some.some(fitted), some.some(~fitted)
+    searched = judge.thinned(samples.estimation, _SEARCHED)
+    if samples.validation is None:
+        return searched, None
+    return searched, judge.thinned(samples.validation, _WATCHED)
 
 
 def _say_missing(names: list[str], others: bool) -> None:

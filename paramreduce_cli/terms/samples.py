@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.records import Block, FloatArray, IntArray, Mechanism
+from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
 from paramreduce_cli.terms.matrices import inverses
 
 
@@ -36,6 +36,15 @@ class TermSamples:
     """Accelerations to be met by the direct dynamics, (n_dof, n_samples)."""
     nominal_acceleration: FloatArray
     """(n_dof,)"""
+
+    def some(self, which: BoolArray) -> TermSamples:
+        """Those that are marked, (n_samples,)."""
+        tangent = None if self.tangent is None else self.tangent[which]
+        arrays = {
+            name: np.ascontiguousarray(getattr(self, name)[:, which])
+            for name in ("states", "ddq", "tau", "ddz")
+        }
+        return replace(self, tangent=tangent, **arrays)
 
     @cached_property
     def seeds(self) -> FloatArray:

@@ -3,6 +3,7 @@
 import ctypes
 import json
 import shutil
+import sys
 
 import numpy as np
 import pytest
@@ -230,6 +231,33 @@ def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measu
         assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
         assert estimation <= 0.2
         assert np.isnan(term.random_torque_error), "torques at other states are not known"
+
+
+def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_copy, monkeypatch):
+    seen = []
+
+    def nothing(lean, starts, searched, watched, *_, **__):
+        seen.append((searched, watched))
+        return [], []
+
+    module = sys.modules["paramreduce_cli.stages.reduce_terms"]
+    monkeypatch.setattr(module, "simplified", nothing)
+    settings = [text for text in TERMS if "acceleration" not in text]
+    config = load_config(measured_copy / "arm.yaml", [ONE_FORMAT, *settings])
+    runner = Runner(config, Store(measured_copy / "results"))
+    with pytest.raises(ConfigError):
+        runner.run(STAGES["reduce-terms"])
+    training = np.hstack([b.z.T for b in loaded(runner, Samples).estimation.blocks()])
+    n_dof = len(training)
+
+    def places(some):
+        return np.array(
+            [np.argmin(np.abs(training.T - z).sum(axis=1)) for z in some.states[:n_dof].T]
+        )
+
+    (searched, watched), *_ = seen
+    quarters = [places(some) * 4 // training.shape[1] for some in (searched, watched)]
+    assert [set(numbers.tolist()) for numbers in quarters] == [{0, 2}, {1, 3}]
 
 
 def test_bad_input(two_link, invoke, tmp_path):
