@@ -8,6 +8,7 @@ import re
 import zipfile
 
 import h5py
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from browser import MISSING, complaints, opened
@@ -201,6 +202,10 @@ def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
         assert width < 1000 or header.rect["y"] + header.rect["height"] < 800
         background = driver.execute_script("return getComputedStyle(document.body).backgroundColor")
         assert (sum(map(int, re.findall(r"\d+", background)[:3])) < 200) == dark
+        figure = driver.find_element("css selector", "figure")
+        driver.execute_script("arguments[0].scrollIntoView()", figure)
+        seen = plt.imread(io.BytesIO(figure.screenshot_as_png))[..., :3]
+        assert (np.median(seen) < 0.3) == dark, "figures are on the page's own background"
         charts = driver.find_elements("css selector", ".uplot canvas")
         assert all(chart.size["width"] <= width for chart in charts)
         wide = "return [...document.querySelectorAll('.tile b')].some((b) => b.scrollWidth > b.clientWidth + 1)"
