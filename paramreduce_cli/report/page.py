@@ -136,20 +136,19 @@ def _text(name: str) -> str:
 def _items(
     images: Mapping[str, bytes], made: Mapping[str, Table]
 ) -> dict[PageSection, list[_Item]]:
-    """Figures and tables by section, in their order; empty tables are left out."""
+    """Figures and tables by section, in their order."""
     found = []
     for name, svg in images.items():
         draw = figures[name]
         source = f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}"
         found.append((place_of(draw), _Item(name, (draw.__doc__ or name).strip(), source)))
     for name, table in made.items():
-        if table.rows:
-            make = tables[name]
-            place = place_of(make)
-            caption = (make.__doc__ or name).strip()
-            symbols = explained(name, table.header)
-            item = _Item(name, caption, table=table, tall=place.tall, symbols=symbols)
-            found.append((place, item))
+        make = tables[name]
+        place = place_of(make)
+        caption = (make.__doc__ or name).strip()
+        symbols = explained(name, table.header)
+        item = _Item(name, caption, table=table, tall=place.tall, symbols=symbols)
+        found.append((place, item))
     found.sort(key=lambda entry: entry[0].order)
     return {
         section: [item for place, item in found if place.section is section]

@@ -115,7 +115,8 @@ def report(
         if encoded:
             images[name] = encoded["svg"]
             files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
-    made = {name: make(data) for name, make in _shown(tables, model)}
+    every = ((name, make(data)) for name, make in _shown(tables, model))
+    made = {name: table for name, table in every if table.rows}
     symbols = {} if model is None else model.mechanism.symbols
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()

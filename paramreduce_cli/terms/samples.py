@@ -39,12 +39,14 @@ class TermSamples:
 
     def some(self, which: BoolArray) -> TermSamples:
         """Those that are marked, (n_samples,)."""
-        tangent = None if self.tangent is None else self.tangent[which]
-        arrays = {
-            name: np.ascontiguousarray(getattr(self, name)[:, which])
-            for name in ("states", "ddq", "tau", "ddz")
-        }
-        return replace(self, tangent=tangent, **arrays)
+        return replace(
+            self,
+            states=np.ascontiguousarray(self.states[:, which]),
+            ddq=np.ascontiguousarray(self.ddq[:, which]),
+            tangent=None if self.tangent is None else self.tangent[which],
+            tau=np.ascontiguousarray(self.tau[:, which]),
+            ddz=np.ascontiguousarray(self.ddz[:, which]),
+        )
 
     @cached_property
     def seeds(self) -> FloatArray:

@@ -42,7 +42,8 @@ def command(*arguments, **options):
         (MERGES, "holds more than"),
         ("a: &a [*a]", "refers to itself"),
         ("[" * 900, "nested too deep"),
-        ("x: " + "[" * 5000 + "]" * 5000, "nested too deep"),
+        # From 6.0.4 of PyYAML on its own scanner refuses it first: "exceeded maximum nesting depth".
+        ("x: " + "[" * 5000 + "]" * 5000, "nest"),
         ("robot: !unknown 3", "could not determine a constructor"),
         ("".join(f"k{k}: 1\n" for k in range(30_000)), "holds more than"),
         ("".join(f"k{k}: 1\n" for k in range(3_000)), "more problems like these"),
