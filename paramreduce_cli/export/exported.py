@@ -3,6 +3,7 @@
 import keyword
 import re
 import sys
+import textwrap
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
@@ -177,6 +178,9 @@ _C_WORDS = frozenset(
 """Words of C and C++, and names that their programs have already."""
 
 
+_WIDTH = 100
+"""Characters of a line of a header, at most, where its words allow."""
+_FIXED = "\N{NO-BREAK SPACE}"
 _MADE_OF = (
     "Parameters, {}; each is followed by what it is made of, ordered and counted",
     "by the values in the config; what is zero there is left out:",
@@ -233,7 +237,21 @@ def about(model: ExportedModel, first: int = 0) -> list[str]:
     for k, p in enumerate(model.parameters, first):
         made_of = f", {plain(p.expression)}" if p.expression else ""
         lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}{made_of}")
-    return lines
+    return [part for line in lines for part in wrapped(line)]
+
+
+def wrapped(line: str) -> list[str]:
+    """A line in parts of a readable width, all but the first indented; signs and factors stay with their terms."""
+    if len(line) <= _WIDTH:
+        return [line]
+    together = re.sub(
+        r"(?<= [+-]) ([0-9.e+-]+ )?", lambda found: found[0].replace(" ", _FIXED), line
+    )
+    indent = " " * (len(line) - len(line.lstrip()) + 4)
+    parts = textwrap.wrap(
+        together, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False
+    )
+    return [part.replace(_FIXED, " ") for part in parts]
 
 
 def _listed(model: ExportedModel, positions: Iterable[int], first: int) -> list[str]:

@@ -15,7 +15,7 @@ from conftest import TWO_LINK, model_of
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.check import check, random_cases
 from paramreduce_cli.export.choice import chosen_model
-from paramreduce_cli.export.exported import identifier, plain
+from paramreduce_cli.export.exported import identifier, plain, wrapped
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.writing import Exported, export, exported_functions
 
@@ -168,12 +168,20 @@ def test_the_header_says_what_depends_on_parameters_alone(puma, tmp_path):
         assert int(said.group(1)) == before.count("const double t") > 0
 
 
+def test_lines_of_headers_fit_a_window_and_terms_are_whole():
+    terms = " + ".join(f"{k / 7:.6g} Izz_{k}" for k in range(2, 40))
+    first, *others = wrapped(f"  0: Izz_1 = 1 kg m^2, Izz_1 - {terms} and 3 smaller terms")
+    assert len(others) > 4
+    assert max(map(len, [first, *others])) <= 100
+    assert all(re.match(r" {6}[+] [0-9.]+ Izz_\d+", line) for line in others[:-1])
+    assert wrapped("short - as it is") == ["short - as it is"]
+
+
 def test_the_header_says_what_single_precision_costs(model, tmp_path):
     write(model, tmp_path, "c", single=True)
     header = (tmp_path / f"{model.mechanism.robot}.h").read_text()
-    said = re.search(
-        r"off by at most .*: tau (\S+), M (\S+), delta (\S+)\.", " ".join(header.split())
-    )
+    text = " ".join(header.replace(" *", "").split())
+    said = re.search(r"off by at most .*: tau (\S+), M (\S+), delta (\S+)\.", text)
     assert all(1e-8 < float(error) < 1e-4 for error in said.groups())
 
 
