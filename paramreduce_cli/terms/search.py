@@ -24,6 +24,9 @@ _SUM_HOLDS = 1.2
 """Several terms go together if they cost no more than this times what each costs alone."""
 _LITTLE = 0.2
 """Share of what is still allowed that terms may cost which go together without being tried alone."""
+_RISE, _LEAST = 3.0, 1e-8
+"""The same as a share of the squared error so far, so that programs of all errors are passed on the way, or of the
+budget's at least."""
 _MISJUDGED = 2.0
 """Times that which they may cost indeed."""
 _BACK = (1, 8)
@@ -158,7 +161,7 @@ class Search:
         fit = step.fit
         order = np.argsort(costs / saved, kind="stable")
         expected = np.cumsum(np.maximum(costs[order], 0.0))
-        little = _LITTLE * (1 - fit.excess**2)
+        little = min(_LITTLE * (1 - fit.excess**2), max(_RISE * fit.excess**2, _LEAST))
         size = int(np.searchsorted(expected, little, side="right"))
         while size > 1:
             changed = self._with(fit, live[order[:size]])
