@@ -5,9 +5,9 @@ more; that different nodes may then compute the same, and that sums and products
 rearranged, is not looked at. It takes microseconds and is meant for comparing many subsets.
 """
 
-import numba
 import numpy as np
 
+from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import BoolArray, IntArray
 
@@ -44,7 +44,7 @@ class LiveCount:
         return int(_live(self._kinds, self._operands, self._inputs, self._outputs, zero))
 
 
-@numba.njit(cache=True)
+@compiled()
 def _live(
     kinds: IntArray, operands: IntArray, inputs: IntArray, outputs: IntArray, zero: BoolArray
 ) -> int:

@@ -5,9 +5,9 @@ Of a program in arrays: codes of the operations, signed operands, which of them 
 
 from __future__ import annotations
 
-import numba
 import numpy as np
 
+from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 
 CONSTANT, INPUT, SUM, PRODUCT, SIN, COS, TANH, SIGN = range(8)
@@ -24,7 +24,7 @@ NUMBER = -1
 """What a node stands for that is a number."""
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def needed(
     codes: IntArray, operands: IntArray, outputs: IntArray, kept: BoolArray, source: IntArray
 ) -> BoolArray:
@@ -46,7 +46,7 @@ def needed(
     return used
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _made(
     k: int,
     codes: IntArray,
@@ -89,7 +89,7 @@ def _made(
                 result[i] = np.sign(x)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def values(
     codes: IntArray,
     operands: IntArray,
@@ -115,7 +115,7 @@ def values(
     return v
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def own_values(
     codes: IntArray,
     operands: IntArray,
@@ -131,7 +131,7 @@ def own_values(
     return own
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def adjoints(
     codes: IntArray,
     operands: IntArray,
@@ -204,7 +204,7 @@ def adjoints(
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def effects(
     operands: IntArray,
     kept: BoolArray,
@@ -243,7 +243,7 @@ def effects(
     return result
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def combinations(
     codes: IntArray,
     operands: IntArray,
@@ -306,7 +306,7 @@ def combinations(
     return found, coefficients
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def count(
     codes: IntArray,
     operands: IntArray,
@@ -365,7 +365,7 @@ def count(
     return found
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def counts(
     codes: IntArray,
     operands: IntArray,
@@ -392,7 +392,7 @@ def counts(
     return result
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def counts_standing(
     codes: IntArray,
     operands: IntArray,

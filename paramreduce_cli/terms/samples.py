@@ -6,9 +6,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import numba
 import numpy as np
 
+from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
@@ -137,7 +137,7 @@ def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float,
     return float(torque), float(acceleration)
 
 
-@numba.njit(cache=True, nogil=True)
+@compiled(nogil=True)
 def _projected(
     entries: FloatArray, rows: IntArray, columns: IntArray, tangent: FloatArray
 ) -> FloatArray:

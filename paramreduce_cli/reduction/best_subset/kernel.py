@@ -24,9 +24,9 @@ A node is three arrays:
 
 from typing import NamedTuple
 
-import numba
 import numpy as np
 
+from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
 
@@ -54,10 +54,10 @@ INSIDE, BOUND = 0, 1
 LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
 DONE, PAUSED = 0, 1
 
-_compiled = numba.njit(cache=True, nogil=True, _nrt=False)
+_compiled = compiled(nogil=True, _nrt=False)
 """Without reference counts, whose atomic steps for the arrays of Data and State took seven tenths
 of the time. Such functions make no array: all that they see belong to who called them from Python."""
-_making_arrays = numba.njit(cache=True, _nrt=True)
+_making_arrays = compiled(_nrt=True)
 
 
 class Data(NamedTuple):

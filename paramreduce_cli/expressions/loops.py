@@ -1,0 +1,74 @@
+"""Loops that Numba compiles once for all runs, kept in its cache and checked before they are loaded.
+
+Numba keeps machine code and its index without any checksum, and runs what it finds. Here a SHA-256 follows both, which
+unpickling does not look at; what does not fit is compiled again.
+"""
+
+import hashlib
+import pickle
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numba
+from numba.core.caching import IndexDataCacheFile
+
+Loop = TypeVar("Loop", bound=Callable[..., Any])
+
+_DIGEST = 32
+"""Bytes of a SHA-256."""
+
+
+class _CheckedCache(IndexDataCacheFile):
+    """Numba's files of one function, each with a checksum behind it."""
+
+    def _load_index(self) -> Any:
+        try:
+            _whole(self._index_path)
+            return super()._load_index()
+        except OSError:
+            return {}
+
+    def _save_index(self, overloads: Any) -> None:
+        version = pickle.dumps(self._version, protocol=-1)
+        self._write(self._index_path, version + self._dump((self._source_stamp, overloads)))
+
+    def _load_data(self, name: str) -> Any:
+        return pickle.loads(_whole(self._data_path(name)))
+
+    def _save_data(self, name: str, data: Any) -> None:
+        self._write(self._data_path(name), self._dump(data))
+
+    def _write(self, path: str, content: bytes) -> None:
+        with self._open_for_write(path) as file:
+            file.write(content + hashlib.sha256(content).digest())
+
+
+def _whole(path: str) -> bytes:
+    """What a file holds before its checksum.
+
+    Raises:
+        OSError: It cannot be read, or its checksum does not fit.
+    """
+    content = Path(path).read_bytes()
+    if hashlib.sha256(content[:-_DIGEST]).digest() != content[-_DIGEST:]:
+        raise OSError(f"the checksum of {path} does not fit")
+    return content[:-_DIGEST]
+
+
+def compiled(**options: Any) -> Callable[[Loop], Loop]:
+    """Have a function compiled when it is first called, and kept.
+
+    Args:
+        options: Of ``numba.njit``.
+    """
+
+    def made(function: Loop) -> Loop:
+        dispatcher: Any = numba.njit(cache=True, **options)(function)
+        if hasattr(
+            dispatcher, "_cache"
+        ):  # not where NUMBA_DISABLE_JIT leaves functions as they are
+            dispatcher._cache._cache_file.__class__ = _CheckedCache
+        return dispatcher
+
+    return made
