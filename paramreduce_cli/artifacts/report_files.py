@@ -136,7 +136,11 @@ def verify_report(path: Path) -> None:
     Raises:
         ArtifactError: One of them is missing, damaged or changed.
     """
-    for name, digest in load_summary(path)["files"].items():
+    listed = load_summary(path).get("files")
+    if not isinstance(listed, dict):
+        raise ArtifactError(f"{path}: lists no files, so it is no report's summary. {_AGAIN}")
+    for name, digest in listed.items():
+        check_is_file(path.parent / name)
         try:
             found = hashlib.sha256((path.parent / name).read_bytes()).hexdigest()
         except OSError as error:

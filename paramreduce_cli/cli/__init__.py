@@ -41,7 +41,8 @@ def main() -> None:
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(
-            "\nInterrupted. Finished stages, trajectories and proofs are kept: the same command goes on from there."
+            "\nInterrupted. Finished stages, trajectories and proofs are kept, of other stages nothing: the same command goes "
+            "on from there."
         )
         code = INTERRUPTED
     except BrokenPipeError:

@@ -31,6 +31,8 @@ def project_above(folder: Path) -> Path | None:
 
 def _is_config(path: Path) -> bool:
     """Whether it names a robot, and more than that."""
+    if not _is(path, Path.is_file):  # a pipe would be waited for
+        return False
     try:
         with path.open(encoding="utf-8", errors="replace") as file:
             text = file.read(_READ)

@@ -259,7 +259,9 @@ class _Lines:
         begun = self._begun.setdefault(p.task, now)
         told_before = p.task in self._told
         pause = self._pause if told_before else min(self._pause, _FIRST_PAUSE)
-        if p.done < p.total and now - self._told.get(p.task, begun) < pause:
+        # A task of one step has no other moment to be told of before its end.
+        single = p.done == 0 and p.total == 1
+        if p.done < p.total and not single and now - self._told.get(p.task, begun) < pause:
             return
         share = p.done / p.total if p.total else 1.0
         if p.done >= p.total:
@@ -274,6 +276,6 @@ class _Lines:
 
 def _plain_line(p: Progress, left: float | None) -> None:
     share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
-    state = "done" if p.done >= p.total else share
+    state = "done" if p.done >= p.total else share if p.done else "begun"
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
     complain(f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}")

@@ -49,7 +49,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
             raise ConfigError(str(error)) from error
     config, problems = _validate(document.data)
     lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
-    lines += [_line(document, problem) for problem in problems]
+    lines += [_line(document, problem) for problem in problems if problem[0] not in document.unread]
     if lines or config is None:
         lines = list(dict.fromkeys(lines))
         if "description" not in document.data:

@@ -31,6 +31,8 @@ class Document:
     lines: dict[Key, int] = field(default_factory=dict)
     problems: list[tuple[int, str]] = field(default_factory=list)
     """(line, message) of what YAML allows but a config must not hold."""
+    unread: set[Key] = field(default_factory=set)
+    """Keys whose values are None for one of these problems."""
     overrides: dict[Key, str] = field(default_factory=dict)
     """Keys set on the command line, with the text given there."""
 
@@ -133,9 +135,11 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Docume
         kind = node.tag.rpartition(":")[2]
         reason = error if isinstance(error, ValueError) else f"it is no {kind}"
         document.problems.append((line, f"{shown} cannot be read: {reason}"))
+        document.unread.add(path)
         return None
     if isinstance(value, int) and abs(value) > _LARGEST_INTEGER:
         document.problems.append((line, f"{shown} is too large"))
+        document.unread.add(path)
         return None
     return value
 

@@ -6,6 +6,7 @@ A library is kept with its SHA-256 behind it, which a loader of programs does no
 import hashlib
 import os
 import platform
+import shutil
 import stat
 import tempfile
 import time
@@ -19,6 +20,8 @@ _DIGEST = 32
 """Bytes of a SHA-256."""
 _OLDEST = 90 * 24 * 3600.0
 """Seconds after its last use that a library is kept."""
+_KILLED = 24 * 3600.0
+"""Seconds after which a folder to compile in belongs to no process any more."""
 _MOST = 512 * 2**20
 """Bytes of all libraries together; of more the ones used longest ago go."""
 
@@ -77,6 +80,8 @@ def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
 def kept(library: Path) -> bool:
     """Whether a library is there and whole; it counts as used, one that is damaged is removed."""
     try:
+        if library.exists() and not library.is_file():  # a pipe would be waited for
+            library.unlink()
         content = library.read_bytes()
         if hashlib.sha256(content[:-_DIGEST]).digest() == content[-_DIGEST:]:
             os.utime(library)
@@ -103,6 +108,9 @@ def keep(built: Path, library: Path) -> None:
 
 
 def _prune(folder: Path, new: Path) -> None:
+    for left in folder.glob("tmp*"):  # by compilations that were killed
+        if left.is_dir() and left.stat().st_mtime < time.time() - _KILLED:
+            shutil.rmtree(left, ignore_errors=True)
     found = []
     for path in folder.glob(f"*{new.suffix}"):
         try:

@@ -23,6 +23,13 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 }
 _LONGEST = 100
 _LARGEST_POWER = 64
+_SHOWN = 80
+"""Characters of a value in a message."""
+
+
+def _shown(value: Any) -> str:
+    text = repr(value)
+    return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> float:
@@ -39,7 +46,7 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
     known = {**_CONSTANTS, **(constants or {})}
     example = "write one such as 0.5, 1e-3, pi/2 or 90deg"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{value!r} is not a number; {example}")
+        raise ValueError(f"{_shown(value)} is not a number; {example}")
     if isinstance(value, int | float):
         result = float(value)
     else:
@@ -52,7 +59,7 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
         except (ValueError, SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
             if constants:
                 example += f", or with the constants {', '.join(constants)}"
-            raise ValueError(f"{value!r} is not a number; {example}") from error
+            raise ValueError(f"{_shown(value)} is not a number; {example}") from error
     if math.isnan(result):
         raise ValueError("NaN is not a number that can be used here")
     return result

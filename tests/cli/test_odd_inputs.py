@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from conftest import ONE_FORMAT, TWO_LINK
 
+from paramreduce_cli.expressions import cache
+
 ALIASES = "a0: &a0 [x, x]\n" + "".join(
     f"a{k}: &a{k} [{', '.join([f'*a{k - 1}'] * 9)}]\n" for k in range(1, 9)
 )
@@ -75,6 +77,28 @@ def test_values_that_do_not_fit(invoke, write_config, value, key):
     assert len(refused.err) < 2000
     refused = invoke("build-model", TWO_LINK, settings=[f"{name.strip()}={value}"], code=2)
     assert "Error: " in refused.err
+
+
+@pytest.mark.parametrize("value", ["!!bool x", "!!timestamp x", "9" * 400])
+def test_a_value_that_cannot_be_read_is_said_once(invoke, write_config, value):
+    gravity = "gravity: [0, -9.81, 0]"
+    refused = invoke("build-model", write_config((gravity, f"gravity: [0, {value}, 0]")), code=2)
+    assert refused.err.count("Error: ") == 1
+
+
+def test_a_long_value_is_shown_in_part(invoke, write_config):
+    for value in ("+".join(["1"] * 5000), "-" * 5000 + "1"):
+        refused = invoke("build-model", write_config(("  count: 2", f"  period: {value}")), code=2)
+        assert "is not a number" in refused.err
+        assert len(refused.err) < 1000
+
+
+@pytest.mark.parametrize("text", ["{}", '{"robot": 1}'])
+def test_a_summary_without_files_is_none_of_a_page(invoke, tmp_path, text):
+    (tmp_path / "report").mkdir()
+    for name, content in (("summary.json", text), ("index.html", "<p>")):
+        (tmp_path / "report" / name).write_text(content)
+    assert "no report's summary" in invoke("open", tmp_path, code=2).err
 
 
 @pytest.mark.parametrize("text", ["[1]", "null", "3", '"a"', "{}", "[" * 900, '{"reduction": 1}'])
@@ -154,6 +178,32 @@ def test_a_pipe_is_no_file(invoke, tmp_path):
         ("reduce", "--samples", pipe, "--results", tmp_path / "r"),
     ):
         assert "is no file" in invoke(*arguments, code=2).err
+
+
+def test_a_pipe_in_the_folder_is_no_config_to_propose(tmp_path):
+    os.mkfifo(tmp_path / "a.yaml")
+    done = command("inspect", "nothing", cwd=tmp_path)
+    assert done.returncode == 2
+
+
+def test_a_pipe_in_the_cache_is_no_library(tmp_path):
+    library = tmp_path / "kept.so"
+    os.mkfifo(library)
+    assert not cache.kept(library)
+    assert not library.exists()
+
+
+def test_folders_of_killed_compilations_go_after_a_day(tmp_path):
+    old, new = tmp_path / "tmpold", tmp_path / "tmpnew"
+    for folder in (old, new):
+        folder.mkdir()
+    os.utime(old, (1e9, 1e9))
+    built = tmp_path / "built.so"
+    built.write_bytes(b"code")
+    cache.keep(built, tmp_path / "kept.so")
+    assert cache.kept(tmp_path / "kept.so")
+    assert not old.exists()
+    assert new.exists()
 
 
 def test_names_cannot_steer_the_terminal(invoke, brought, tmp_path):

@@ -53,6 +53,10 @@ def test_it_is_first_told_after_two_seconds_and_then_at_leisure(lines):
     assert len(lines(12.2, 4)) == 2
 
 
+def test_work_of_one_step_is_told_when_it_begins(lines):
+    assert lines(2, 0, total=1) == [(0, None)]
+
+
 def test_the_end_of_long_work_without_steps_is_told(lines):
     lines(0, 0)
     assert lines(30, 10) == [(10, None)]
