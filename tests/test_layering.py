@@ -110,6 +110,12 @@ except SystemExit as stopped:
     assert not modules_after(script) & set(heavy)
 
 
+def test_what_stages_need_seldom_is_loaded_when_they_do():
+    """Half of the time until a stage begins was that of loading these."""
+    loaded = modules_after("from paramreduce_cli.pipeline import pipeline; pipeline()")
+    assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib", "jinja2"}
+
+
 def test_reading_a_config_loads_no_numerics():
     """Names on offer are listed without importing what they stand for."""
     loaded = modules_after("from paramreduce_cli.config import config_schema; config_schema()")

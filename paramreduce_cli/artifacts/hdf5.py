@@ -316,6 +316,7 @@ class Reader:
                 )
         found = self.file.get(name)
         if not isinstance(found, h5py.Dataset):
+            self.verify()  # a damaged group hides what is in it
             raise ArtifactError(
                 f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
             )

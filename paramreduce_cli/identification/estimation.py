@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from scipy import stats
+import scipy  # its stats takes a third of a second to load, so only when it is used
 
 from paramreduce_cli.identification.uncertainty import (
     ColouredNoise,
@@ -215,7 +215,7 @@ class LinearFit:
             n = every.shape[0]
             statistic = n * (n + 2) * np.sum(correlation[lags] ** 2 / (n - lags))
             lag_one.append(correlation[1] if correlation.size > 1 else 0.0)
-            white.append(stats.chi2.sf(statistic, max(1, lags.size)))
+            white.append(scipy.stats.chi2.sf(statistic, max(1, lags.size)))
         unknown = np.where(np.isfinite(self.deviation), 1.0, np.nan)
         return Residuals(
             deviation=np.std(every, axis=0) * unknown,

@@ -8,7 +8,7 @@ same filter block by block.
 from collections.abc import Iterable
 
 import numpy as np
-from scipy import signal
+import scipy  # whose parts load when they are first used: signal takes half a second
 
 from paramreduce_cli.records import FloatArray
 
@@ -37,8 +37,8 @@ def low_pass(cutoff: float, rate: float) -> FloatArray:
     """
     if cutoff >= _NYQUIST * rate:
         return np.ones(1)
-    order, beta = signal.kaiserord(_STOP_BAND, _TRANSITION * cutoff / (0.5 * rate))
-    taps: FloatArray = signal.firwin(order | 1, cutoff, window=("kaiser", beta), fs=rate)
+    order, beta = scipy.signal.kaiserord(_STOP_BAND, _TRANSITION * cutoff / (0.5 * rate))
+    taps: FloatArray = scipy.signal.firwin(order | 1, cutoff, window=("kaiser", beta), fs=rate)
     return taps
 
 
@@ -56,7 +56,7 @@ def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
         return x
     result = np.empty(x.shape)
     for column, out in zip(x.T, result.T, strict=True):  # one at a time: transforms are large
-        out[:] = signal.oaconvolve(_continued(column, k), taps, mode="valid")
+        out[:] = scipy.signal.oaconvolve(_continued(column, k), taps, mode="valid")
     return result
 
 
@@ -108,7 +108,7 @@ def spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, Fl
     densities = []
     for column in columns:
         length = max(min(64, column.size), column.size // _SEGMENTS)
-        frequency, density = signal.welch(
+        frequency, density = scipy.signal.welch(
             column, rate, window="blackmanharris", nperseg=length, noverlap=3 * length // 4,
             detrend="linear",
         )  # fmt: skip

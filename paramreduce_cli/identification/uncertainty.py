@@ -9,7 +9,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy import fft, linalg, signal
+import scipy  # its signal takes half a second to load, so only when it is used
+from scipy import fft, linalg
 
 from paramreduce_cli.records import FloatArray
 
@@ -41,7 +42,7 @@ class ColouredNoise:
         """Some of it, (n,)."""
         white = np.sqrt(self.variance) * rng.standard_normal(n + _SETTLING)
         denominator = np.concatenate([[1.0], -self.coefficients])
-        result: FloatArray = signal.lfilter([1.0], denominator, white)[_SETTLING:]
+        result: FloatArray = scipy.signal.lfilter([1.0], denominator, white)[_SETTLING:]
         return result
 
 

@@ -158,6 +158,16 @@ def test_parameters_are_shown_with_units_and_deviations(invoke, two_link_results
     assert all(o < 0.06 * d for o, d in zip(off, found.deviations, strict=True))
 
 
+def test_damage_beside_what_is_looked_at_is_said(invoke, two_link_copy):
+    path = two_link_copy / "model.h5"
+    content = bytearray(path.read_bytes())
+    content[len(content) * 3 // 5] ^= 8
+    path.write_bytes(content)
+    assert "model.h5: is damaged" in invoke("inspect", two_link_copy).err
+    refused = invoke("export", TWO_LINK, "--results", two_link_copy, code=2)
+    assert "model.h5: is damaged" in refused.err
+
+
 def test_selected_is_that_of_the_only_results(invoke, two_link_results, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     assert "`paramreduce run CONFIG`" in invoke("inspect", "selected", code=2).err

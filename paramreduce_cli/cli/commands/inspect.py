@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import itertools
 import json
+import warnings
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +18,7 @@ from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
-from paramreduce_cli.errors import ArtifactError, ConfigError
+from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
 from paramreduce_cli.texts.measured import measured
 
@@ -188,12 +188,19 @@ def _selected(file: Path) -> tuple[str, ReducedModel]:
 
 
 def _beside(file: Path, record: type) -> Any:
-    """What a file beside the one that is looked at holds; None if there is none, or no readable one."""
+    """What a file beside the one that is looked at holds; None if there is none.
+
+    It only tells more, so one that cannot be read is said, and no more.
+    """
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
 
-    with contextlib.suppress(ArtifactError):  # it only tells more
+    if not file.exists():
+        return None
+    try:
         return load_file(file, record, None, "")[0]
-    return None
+    except ArtifactError as error:
+        warnings.warn(f"what it tells is left out: {error}", ParamreduceWarning, stacklevel=2)
+        return None
 
 
 def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
