@@ -13,7 +13,7 @@ from paramreduce_cli.expressions.loops import _CheckedCache
 KEY, STAMP = ("signature", "processor"), (1.0, 2)
 
 
-def test_a_flip_of_any_bit_is_noticed(tmp_path):
+def test_a_flip_in_any_byte_is_noticed(tmp_path):
     cache = _CheckedCache(str(tmp_path), "loop", STAMP)
     kept = {"code": bytes(range(200)), "name": "search"}
     cache.save(KEY, kept)
