@@ -30,6 +30,8 @@ _FEWEST = 50
 """Samples of an uninterrupted motion that is used."""
 _AT_ONCE = 10_000
 """Rows."""
+_LARGEST = 1e30
+"""More than any signal in any unit, nanoseconds since 1970 included; powers of it can be computed with."""
 _MOST_SHOWN = 12
 """Names of columns in a message."""
 
@@ -191,11 +193,12 @@ def _column(log: RawLog, name: str) -> FloatArray:
             f"{log.source}: there is no column {name}; there are {shown}. Say under "
             "sampling.log.columns what is where."
         )
-    wrong = np.flatnonzero(~np.isfinite(column))
+    wrong = np.flatnonzero(~(np.abs(column) < _LARGEST))
     if wrong.size:
+        more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
-            f"{log.place(int(wrong[0]))}, column {name}: is not a finite number, nor are "
-            f"{wrong.size - 1} others. Remove such rows."
+            f"{log.place(int(wrong[0]))}, column {name}: is not a finite number below {_LARGEST:g}{more}. "
+            "Remove such rows."
         )
     if column.size < _FEWEST:
         raise DataError(f"{log.source}: {column.size} rows are too few; bring {_FEWEST} or more.")

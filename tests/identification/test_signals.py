@@ -141,6 +141,10 @@ def with_at(values, row, value):
         ({"t": swapped_rows(LOG["t"])}, r"log\.csv, line 103, column t: time goes back"),
         ({"t": with_at(LOG["t"], 7, LOG["t"][6])}, r"line 9, column t: time stands still"),
         ({"q2": with_at(LOG["q2"], 50, np.nan)}, r"line 52, column q2: is not a finite number"),
+        (
+            {"q2": with_at(LOG["q2"], 50, 1e308)},
+            r"line 52, column q2: is not a finite number below 1e\+30",
+        ),
         ({"tau1": with_at(LOG["tau1"], 3, np.inf)}, r"line 5, column tau1"),
         ({"q3": LOG["q1"]}, r"column q3, but the robot has 2 joints"),
     ],

@@ -10,12 +10,14 @@ import rich.console
 import rich.table
 
 from paramreduce_cli.errors import ParamreduceWarning
-from tests.torture.configs import try_configs
+from tests.simulated_logs import log_config, two_link_log, write_log
 from tests.torture.damage import try_cache, try_damage
 from tests.torture.disk import try_full_disks
+from tests.torture.inputs import try_configs, try_data
 from tests.torture.kills import start, try_kills
 
-GOOD = {"noticed", "harmless", "equal", "one message", "a config", "made"}
+_TERMS = "\nterms: {torque_error: 0.1, functions: [inverse], rounds: 0}\n"
+GOOD = {"noticed", "harmless", "equal", "one message", "a config", "a log", "a recording", "made"}
 
 
 def main():
@@ -41,9 +43,13 @@ def main():
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         assert start(folder / "run").wait() == 0
-        for file, found in try_damage(folder / "run", of(167), given.seed).items():
-            tell(f"bytes of {file} flipped or cut off", found)
-        tell("bytes of compiled functions flipped", try_cache(folder, of(100), given.seed))
+        write_log(folder / "log.csv", two_link_log())
+        assert start(folder / "measured", log_config(folder, _TERMS)).wait() == 0
+        for run in ("run", "measured"):
+            for file, found in try_damage(folder / run, of(167), given.seed).items():
+                tell(f"bytes of {file} flipped or cut off", found)
+        tell("bytes of compiled code flipped or cut off", try_cache(folder, of(100), given.seed))
+        tell("recordings tampered with", try_data(folder, of(10_000), given.seed))
         tell("configs tampered with", try_configs(folder, of(10_000), given.seed))
         tell(
             "disk full", try_full_disks(folder / "run", [int(500 * 1.6**k) for k in range(of(20))])

@@ -12,7 +12,6 @@ from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
-from tests.torture import CONFIG
 
 RECORDS = (*LAYOUTS, Report)
 
@@ -36,11 +35,11 @@ def plain(value):
     return [plain(entry) for entry in value] if isinstance(value, tuple | list) else value
 
 
-def outcome(store, record, expected):
+def outcome(store, record, robot, expected):
     """What became of a damaged file: noticed or harmless; or silently wrong, which must not be."""
     whole = store.is_whole(record)
     try:
-        store.refuse_to_replace(record, CONFIG.stem)
+        store.refuse_to_replace(record, robot)
     except ArtifactError:
         return "not made again"
     try:
@@ -61,39 +60,50 @@ def damaged(content, rng):
     return content[:place] + bytes([flipped]) + content[place + 1 :]
 
 
-def try_cache(folder, count, seed=0):
-    """Damage a compiled function in the cache; it is made anew and computes the same.
-
-    Args:
-        folder: For a cache of its own.
-        count: How often.
-        seed: Of the places.
-
-    Returns:
-        How often each thing happened.
-    """
-    script = """
+_COMPUTED = """
 import casadi as ca, numpy as np
 from paramreduce_cli.expressions.compiled import BatchFunction
 x = ca.SX.sym("x", 3)
 found, = BatchFunction([x], [ca.vertcat(ca.sin(x[0]) * x[1], x[2] / x[1])])(np.arange(6.0).reshape(2, 3) + 1)
 print(found.tolist())
 """
-    environment = {**os.environ, "PARAMREDUCE_CACHE": str(folder / "cache")}
+_LOOPED = """
+import numpy as np
+from paramreduce_cli.terms.matrices import times
+print(times(np.arange(12.0).reshape(2, 2, 3), np.ones((1, 2, 3))).tolist())
+"""
 
-    def computed():
-        done = subprocess.run([sys.executable, "-c", script], env=environment, capture_output=True)
-        return done.stdout
 
-    rng, expected = np.random.default_rng(seed), computed()
-    (library,) = (folder / "cache").glob("*.so")
-    content, found = library.read_bytes(), Counter()
-    for _ in range(count):
-        wrong = damaged(content, rng)
-        library.unlink(missing_ok=True)
-        library.write_bytes(wrong)
-        same = computed() == expected and library.read_bytes() != wrong
-        found["noticed" if same else "wrong"] += 1
+def try_cache(folder, count, seed=0):
+    """Damage compiled models and loops in their caches; they are made anew and compute the same.
+
+    Args:
+        folder: For caches of their own.
+        count: How often each kind of file.
+        seed: Of the places.
+
+    Returns:
+        How often each thing happened.
+    """
+    rng, found = np.random.default_rng(seed), Counter()
+    for script, endings in ((_COMPUTED, (".so",)), (_LOOPED, (".nbi", ".nbc"))):
+        cache = folder / f"cache{endings[0]}"
+        environment = {**os.environ, "PARAMREDUCE_CACHE": str(cache), "NUMBA_CACHE_DIR": str(cache)}
+
+        def computed(script=script, environment=environment):
+            command = [sys.executable, "-c", script]
+            return subprocess.run(command, env=environment, capture_output=True).stdout
+
+        expected = computed()
+        files = [path for path in cache.rglob("*") if path.suffix in endings]
+        for k in range(count):
+            path = files[k % len(files)]
+            content = path.read_bytes()
+            path.unlink()
+            path.write_bytes(wrong := damaged(content, rng))
+            same = computed() == expected and path.read_bytes() != wrong
+            found["noticed" if same else "wrong"] += 1
+            path.write_bytes(content)
     return found
 
 
@@ -110,15 +120,16 @@ def try_damage(results, count, seed=0):
     """
     rng = np.random.default_rng(seed)
     store = Store(results)
+    robot = load_summary(store.path(Report))["robot"]
     found = {}
     for record in RECORDS:
         path = store.path(record)
-        if not path.exists():  # only runs on a log make them
+        if not path.exists():  # only runs on a log make some of them, only others the rest
             continue
         content, expected = path.read_bytes(), read(store, record)
         found[path.name] = Counter()
         for _ in range(count):
             path.write_bytes(damaged(content, rng))
-            found[path.name][outcome(store, record, expected)] += 1
+            found[path.name][outcome(store, record, robot, expected)] += 1
         path.write_bytes(content)
     return found

@@ -19,16 +19,8 @@ _PATIENCE = 5.0
 """Seconds in which the processes of a run that was killed end."""
 
 
-def start(folder):
-    command = [
-        sys.executable,
-        "-m",
-        "paramreduce_cli",
-        "run",
-        str(CONFIG),
-        "--results",
-        str(folder),
-    ]
+def start(folder, config=CONFIG):
+    command = [sys.executable, "-m", "paramreduce_cli", "run", config, "--results", folder]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
     settings = ["--quiet", "--jobs", "2", "--set", "report.formats=[svg]"]
     return subprocess.Popen([*command, *settings], start_new_session=True, **quiet)
