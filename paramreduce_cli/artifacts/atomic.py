@@ -6,6 +6,7 @@ import errno
 import os
 import re
 import tempfile
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -60,14 +61,24 @@ def missing(path: Path, hint: str = "") -> ArtifactError:
 
 _LEFT = re.compile(r"\..+\.\w{8}\.tmp")
 """Names of temporary files."""
+_LONGEST_WRITING = 24 * 3600
+"""Seconds for which nobody writes one file without a pause."""
 
 
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
     for path in folder.rglob(".*.tmp"):
-        # Shares of a stage may be at work on other machines.
-        if _LEFT.fullmatch(path.name) and path.parent.suffix != SHARES:
+        if _LEFT.fullmatch(path.name) and not _may_be_written(path):
             path.unlink(missing_ok=True)
+
+
+def _may_be_written(path: Path) -> bool:
+    """Whether a share of a stage, which may be at work on another machine, could be writing this file."""
+    if path.parent.suffix != SHARES:
+        return False
+    with contextlib.suppress(FileNotFoundError):
+        return time.time() - path.stat().st_mtime < _LONGEST_WRITING
+    return False
 
 
 def _reason(error: Exception) -> str:

@@ -141,6 +141,8 @@ def _bag(path: Path) -> RawLog:
         ) from error
     if not path.exists():
         raise missing(path)
+    if not path.is_dir():
+        check_is_file(path)
     found: dict[str, array.array] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:

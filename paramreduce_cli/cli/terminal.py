@@ -21,6 +21,7 @@ import rich.console
 import rich.progress
 import rich.table
 
+from paramreduce_cli.artifacts.atomic import check_is_file
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 
 if TYPE_CHECKING:
@@ -61,8 +62,10 @@ class Journal:
         """Append to a file from now on.
 
         Raises:
-            ConfigError: It cannot be written, or is no such file.
+            ConfigError: It cannot be written, or holds something else.
+            ArtifactError: It is no file.
         """
+        check_is_file(path)
         try:
             if path.exists() and not _OWN_LINE.match(path.open("rb").read(_OWN_LENGTH)):
                 raise ConfigError(
@@ -134,9 +137,13 @@ def emit(**event: Any) -> None:
     sys.stdout.flush()
 
 
+_STEERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u2066-\u2069]")
+"""Control characters but for tabs and new lines, and those that turn the direction of text."""
+
+
 def harmless(text: str) -> str:
     """A text in which what would steer a terminal is spelled out; names in files may hold it."""
-    return re.sub(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", lambda found: ascii(found[0])[1:-1], text)
+    return _STEERS.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def show_errors(text: str) -> None:

@@ -16,6 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.artifacts import hdf5, sample_files
+from paramreduce_cli.artifacts.atomic import remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, reading, write
 from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
@@ -140,6 +141,18 @@ def test_a_disk_that_fills_up(two_link_copy):
     assert "Traceback" not in done.stderr
     assert samples.read_bytes() == before
     assert not list(two_link_copy.glob(".*.tmp"))
+
+
+def test_temporary_files_of_kills_go_but_not_those_that_a_share_may_be_writing(tmp_path):
+    shares = tmp_path / "samples.h5.parts"
+    shares.mkdir()
+    new, old = shares / ".new.h5.abcd1234.tmp", shares / ".old.h5.abcd1234.tmp"
+    left = tmp_path / ".samples.h5.abcd1234.tmp"
+    for path in (new, old, left):
+        path.touch()
+    os.utime(old, (1e9, 1e9))
+    remove_leftovers(tmp_path)
+    assert [path.exists() for path in (new, old, left)] == [True, False, False]
 
 
 def make_foreign(path):

@@ -172,7 +172,13 @@ def test_links_out_of_a_file_are_not_followed(invoke, brought, tmp_path):
 def test_a_pipe_is_no_file(invoke, tmp_path):
     pipe = tmp_path / "pipe.h5"
     os.mkfifo(pipe)
+    log, bag = tmp_path / "pipe.csv", tmp_path / "pipe.mcap"
+    os.mkfifo(log)
+    os.mkfifo(bag)
     for arguments in (
+        ("check-data", log),
+        ("check-data", bag),
+        ("check-data", tmp_path, "--log", log),
         ("inspect", pipe),
         ("compare", pipe, pipe),
         ("reduce", "--samples", pipe, "--results", tmp_path / "r"),
@@ -207,11 +213,12 @@ def test_folders_of_killed_compilations_go_after_a_day(tmp_path):
 
 
 def test_names_cannot_steer_the_terminal(invoke, brought, tmp_path):
-    names = np.array(["a", "\x1b[31mred\x1b[0m", "c", "d", "e"], dtype=h5py.string_dtype())
+    names = np.array(["a", "\x1b[31mred\x1b[0m", "\u202ec", "d", "e"], dtype=h5py.string_dtype())
     invoke(*brought(W, TAU, [("parameters/names", names)]))
     out = invoke("inspect", tmp_path / "r" / "reduction.h5", "--model", "qr:5").out
     assert r"\x1b[31mred" in out
     assert "\x1b" not in out
+    assert r"\u202ec" in out
 
 
 @pytest.mark.parametrize(

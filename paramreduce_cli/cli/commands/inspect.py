@@ -15,7 +15,8 @@ import rich.markup
 import rich.table
 
 from paramreduce_cli.artifacts.inspection import contents
-from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.hints import results_below
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
@@ -60,6 +61,8 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
         _say_model(title, _parameters(model, folder), relations, as_json)
     elif file.suffix == ".json":
         loaded = load_summary(file)
+        if file.name == Path(SUMMARY).name:  # a reference stands alone
+            verify_report(file)
         _say_all({**loaded.get("provenance", {}), **loaded.get("selected", {})}, as_json)
     else:
         _say_contents(file, as_json)
