@@ -25,7 +25,7 @@ help:
 	@echo "make check       lint, format and types"
 	@echo "make regression  compare with the committed references"
 	@echo "make reference   renew the committed references"
-	@echo "make benchmark   measure speed, as ratios; BEFORE=REVISION compares the stages with it"
+	@echo "make benchmark   measure speed, as ratios, and CPU seconds; BEFORE=REVISION compares the stages with it"
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
 	@echo "make pages       reports in a browser: sizes and times"
 	@echo "make identification  intervals and hints on simulated logs"
@@ -121,6 +121,7 @@ benchmark robots identification controllers pages: export PYTHONPATH := tests
 benchmark: $(VENV)/.installed-dev
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev,benchmark]'
 	$(BIN)/python -m tests.benchmarks
+	$(BIN)/python -m tests.benchmarks.budgets
 	$(if $(BEFORE),$(BIN)/python -m tests.benchmarks.revisions $(BEFORE))
 
 # Arms that people have, from their URDF to code: sizes, operations and times in results/robots.

@@ -246,6 +246,8 @@ class Reader:
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
         self.file = file
+        self._inside: set[str] = set()
+        """Places that no link to another file leads to."""
 
     def __contains__(self, name: str) -> bool:
         return name in self.file
@@ -294,32 +296,44 @@ class Reader:
         """
         for name in self.file.attrs:
             self.attribute(name)
-        names: list[str] = []
-        self.file.visit(names.append)
-        for name in names:
-            if isinstance(self.file[name], h5py.Dataset):
-                data = CheckedRows(self._dataset(name))
-                if not data.ndim:
-                    data.whole()
-                    continue
-                step = max(1, _AT_ONCE * len(data) // max(1, data.nbytes))
-                for start in range(0, len(data), step):
-                    data[start : start + step]
+        self.file.visititems(self._verify_item)
+
+    def _verify_item(self, name: str, item: h5py.Group | h5py.Dataset) -> None:
+        if not isinstance(item, h5py.Dataset):
+            return
+        data = CheckedRows(self._plausible(name, item))
+        if not data.ndim:
+            data.whole()
+            return
+        step = max(1, _AT_ONCE * len(data) // max(1, data.nbytes))
+        for start in range(0, len(data), step):
+            data[start : start + step]
 
     def _dataset(self, name: str) -> h5py.Dataset:
         parts = name.split("/")
         for k in range(len(parts)):
-            link = self.file.get("/".join(parts[: k + 1]), getlink=True)
-            if isinstance(link, h5py.ExternalLink):
+            place = "/".join(parts[: k + 1])
+            if place in self._inside:
+                continue
+            if isinstance(self.file.get(place, getlink=True), h5py.ExternalLink):
                 raise ArtifactError(
                     f"{self.path}: /{name} is in another file; copy it into this one."
                 )
+            self._inside.add(place)
         found = self.file.get(name)
         if not isinstance(found, h5py.Dataset):
             self.verify()  # a damaged group hides what is in it
             raise ArtifactError(
                 f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
             )
+        return self._plausible(name, found)
+
+    def _plausible(self, name: str, found: h5py.Dataset) -> h5py.Dataset:
+        """A dataset, if it holds what it declares.
+
+        Raises:
+            ArtifactError: Its numbers are in another file, or are not there.
+        """
         if found.is_virtual or found.external:
             raise ArtifactError(f"{self.path}: /{name} is in another file; copy it into this one.")
         if found.nbytes > _SMALL + _MOST_COMPRESSED * found.id.get_storage_size():

@@ -4,11 +4,13 @@ A large observation matrix is not kept where the model next to the file gives it
 computed than read.
 """
 
+from __future__ import annotations
+
 import itertools
 from collections.abc import Callable, Iterator
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -16,10 +18,12 @@ from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
 from paramreduce_cli.artifacts.places import SHARES
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
 from paramreduce_cli.records import LAST, Block, FloatArray, Model, Samples, SampleSet
+
+if TYPE_CHECKING:
+    from paramreduce_cli.multibody.dynamics import Dynamics
 
 _MOST_KEPT = 1 << 27
 """Numbers of an observation matrix that are kept though they can be computed again: 1 GiB."""
@@ -166,6 +170,9 @@ class StoredSet:
                     f"{path}: is not the model that {self._path} was computed with. Rebuild both with "
                     "`paramreduce run`."
                 )
+            # Late: CasADi and all kinds of robots, of which looking at a file needs nothing.
+            from paramreduce_cli.multibody.dynamics import Dynamics
+
             return Dynamics(layouts.load(reader, Model).mechanism)
 
     def blocks(self) -> Iterator[Block]:

@@ -10,13 +10,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, FloatArray, Share
+
+if TYPE_CHECKING:
+    from paramreduce_cli.multibody.dynamics import Dynamics
+    from paramreduce_cli.multibody.loops.coordinates import Coordinates
 
 BLOCK_SAMPLES = 150
 """Samples evaluated at a time: small enough for the cache, large enough for the loops."""
@@ -90,6 +93,9 @@ class ObservedSet:
 
     @cached_property
     def _coordinates(self) -> Coordinates:
+        # Late: all kinds of mechanisms, of which looking at a file needs nothing.
+        from paramreduce_cli.multibody.loops.coordinates import Coordinates
+
         return Coordinates(self.dynamics.mechanism)
 
     def blocks(self) -> Iterator[Block]:
