@@ -46,6 +46,20 @@ def test_parts_make_what_one_job_makes(two_link_results, tmp_path):
     assert not list(tmp_path.glob("*.parts"))
 
 
+def test_more_parts_than_trajectories_make_what_one_job_makes(two_link_results, tmp_path):
+    long = ["sampling.points=9000"]  # in two blocks
+    runner = Runner(config_of("two_link", ONE_FORMAT, *long), Store(tmp_path))
+    for name in ("model.h5", "trajectories.h5"):
+        shutil.copy(two_link_results / name, tmp_path / name)
+    runner.run(STAGES["sample"])
+    whole = digest(tmp_path, "samples.h5")
+    runner.store.path(Samples).unlink()
+    for number in range(1, 6):
+        runner.run(STAGES["sample"], share=Share(number, 5))
+    runner.run(STAGES["sample"])
+    assert digest(tmp_path, "samples.h5") == whole
+
+
 def test_parts_of_loops_are_whole_trajectories(tmp_path):
     few = ["trajectories.count=2", "trajectories.starts=1", "trajectories.polished=1",
            "trajectories.points=30"]  # fmt: skip

@@ -72,6 +72,8 @@ class ObservedSet:
     """Standard parameters, for torques that were not measured."""
     source: str
     """What the states are, for messages."""
+    divisible: bool = False
+    """Whether a share may begin within a trajectory, whose factor is then the same to round-off alone."""
     recomputable = True
 
     @property
@@ -84,9 +86,9 @@ class ObservedSet:
         return map(self.at, self.spans)
 
     def restricted(self, share: Share) -> ObservedSet:
-        """A share of it: whole trajectories where there are enough, and of loops, which are followed along them."""
+        """A share of it: whole trajectories, some shares none, or a piece where there are fewer and it is divisible."""
         numbers = list(dict.fromkeys(span.trajectory for span in self.spans))
-        if self.dynamics.mechanism.loops is None and len(numbers) < share.count:
+        if self.divisible and len(numbers) < share.count:
             return replace(self, spans=share.cut(self.spans))
         own = set(share.cut(numbers))
         return replace(self, spans=[span for span in self.spans if span.trajectory in own])

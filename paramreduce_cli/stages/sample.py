@@ -210,6 +210,7 @@ def _recorded(
         dynamics,
         model.values,
         recording.source,
+        divisible=model.mechanism.loops is None,  # loops are followed along a trajectory
     )
 
 

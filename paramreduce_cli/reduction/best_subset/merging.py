@@ -8,6 +8,7 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import IntArray, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import together
 from paramreduce_cli.reduction.best_subset.search import BEGINNING
+from paramreduce_cli.reduction.best_subset.ties import as_good
 
 
 def joined(shares: Sequence[Proofs]) -> Proofs:
@@ -27,12 +28,12 @@ def joined(shares: Sequence[Proofs]) -> Proofs:
                 "machines do that calculate differently. Make all again on machines of one kind, or write "
                 "reduction.best_subset.parts: sizes."
             )
-    best = np.argmin([one.torque_error for one in shares], axis=0)
-    error = np.min([one.torque_error for one in shares], axis=0)
+    best = [_first_of_the_best(shares, row) for row in range(first.n.size)]
+    error = np.array([one.torque_error[row] for row, one in enumerate(best)])
     return Proofs(
         units=first.units,
         n=first.n,
-        subsets=tuple(shares[k].subsets[row] for row, k in enumerate(best)),
+        subsets=tuple(one.subsets[row] for row, one in enumerate(best)),
         torque_error=error,
         lower_bound=np.minimum(error, np.min([one.lower_bound for one in shares], axis=0)),
         status=tuple(_of_all([one.status[row] for one in shares]) for row in range(first.n.size)),
@@ -41,6 +42,13 @@ def joined(shares: Sequence[Proofs]) -> Proofs:
         logs=tuple(_where_all_stand(shares, row) for row in range(first.n.size)),
         dealt=np.zeros_like(first.n),
     )
+
+
+def _first_of_the_best(shares: Sequence[Proofs], row: int) -> Proofs:
+    """Whose subset is best; of those as good as each other, whose columns come first."""
+    squared = np.array([one.torque_error[row] for one in shares]) ** 2
+    ties = np.flatnonzero(as_good(squared, squared.min()))
+    return min((shares[int(k)] for k in ties), key=lambda one: one.subsets[row].tolist())
 
 
 def _has_begun(one: Proofs, row: int) -> bool:

@@ -18,6 +18,7 @@ from paramreduce_cli.reduction.best_subset.search import (
     compile_search,
     unit_problem,
 )
+from paramreduce_cli.reduction.best_subset.ties import first_of_ties
 from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.task import SelectionTask
@@ -270,7 +271,8 @@ class ProofSearch:
     def _take_over(self, proof: _Proof, search: PartedSearch) -> None:
         """Note how far a search has come."""
         if search.squared_error < proof.squared_error and search.subset.size:
-            better = self._filled(search.subset, proof.n)
+            first = first_of_ties(self._problem, search.subset, search.squared_error)
+            better = self._filled(first, proof.n)
             proof.take(better, self._squared_error(better))
         proof.nodes += search.nodes
         certain = self._certain(search)
