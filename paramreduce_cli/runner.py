@@ -158,7 +158,7 @@ class Runner:
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
         shares = StoredShares(path)
-        found = () if force else self._shares(stage, inputs, shares)
+        found, before = ((), 0.0) if force else self._shares(stage, inputs, shares)
         self._hand(
             stage,
             arguments,
@@ -167,7 +167,7 @@ class Runner:
         with noted_warnings() as warnings:
             record = called(stage, arguments)
         self.check()
-        self.store.save(record, self._stamp(stage, inputs, started, warnings))
+        self.store.save(record, self._stamp(stage, inputs, started - before, warnings))
         if parts is not None:
             parts.clear()
         shares.clear()
@@ -210,12 +210,22 @@ class Runner:
         """Add what is lent, by its type, where the stage asks for it."""
         arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
 
-    def _shares(self, stage: Stage, inputs: Inputs, shares: StoredShares) -> tuple[Any, ...]:
-        """Records of all shares of a stage that were made from the same; none where it is done as a whole."""
+    def _shares(
+        self, stage: Stage, inputs: Inputs, shares: StoredShares
+    ) -> tuple[tuple[Any, ...], float]:
+        """Records of all shares of a stage that were made from the same, and the seconds that all took.
+
+        None where it is done as a whole.
+        """
         if not stage.in_shares:
-            return ()
-        paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), stage.name)
-        return tuple(load_file(path, stage.output, self._robot, stage.name)[0] for path in paths)
+            return (), 0.0
+        command = f"{stage.name} {self.asked}".rstrip()
+        if self.samples is not None:
+            command += f" --samples {shlex.quote(str(self.samples))}"
+        paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), command)
+        loaded = [load_file(path, stage.output, self._robot, stage.name) for path in paths]
+        seconds = sum(stamp.seconds for _, stamp in loaded if stamp is not None)
+        return tuple(record for record, _ in loaded), seconds
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""

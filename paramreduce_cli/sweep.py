@@ -82,7 +82,7 @@ class SweepRun:
         words += ["--results", str(self.folder)]
         words += [word for text in self.overrides for word in ("--set", text)]
         words += ["--part", str(share)] if share is not None else []
-        text = shlex.join([*words, "--quiet"])
+        text = shlex.join([*words, "--quiet", "--wait"])
         if stage.lends_run is not None and jobs:
             text += f" --jobs {jobs}"
         # A model that is not accepted is a result, not a failure of the job.

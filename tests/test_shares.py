@@ -138,6 +138,25 @@ def test_a_missing_part_is_named(sampled):
     assert not runner.run(STAGES["sample"], force=True).current
 
 
+def test_the_command_that_makes_a_missing_part_is_the_one_at_hand(sampled):
+    runner, folder = sampled
+    runner.asked = "arm.yaml --results r --set robot=two_link"
+    (folder / "share-0002-of-0002.h5").unlink()
+    with pytest.raises(ArtifactError, match=f"`paramreduce sample {runner.asked} --part 2/2`"):
+        runner.run(STAGES["sample"])
+
+
+def test_what_is_put_together_has_taken_as_long_as_its_parts(sampled):
+    runner, folder = sampled
+    parts = 0.0
+    for path in folder.glob("share-*.h5"):
+        with h5py.File(path, "a") as file:
+            file.attrs["wall_seconds"] = 100.0
+            parts += 100.0
+    runner.run(STAGES["sample"])
+    assert parts < runner.store.stamp(Samples).seconds < parts + 60
+
+
 def test_a_damaged_part_is_named_and_made_again(sampled):
     runner, folder = sampled
     path = folder / "share-0001-of-0002.h5"

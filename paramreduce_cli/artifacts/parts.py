@@ -115,7 +115,7 @@ class StoredShares:
 
         Args:
             stamp: What they must have been made from; others are of no concern.
-            command: That makes a share, for messages.
+            command: That makes all of it, for messages.
 
         Raises:
             ArtifactError: Some are missing or damaged.

@@ -140,18 +140,19 @@ class Store:
             os.utime(self.path(record))
 
     @contextlib.contextmanager
-    def locked(self, part: str = "") -> Iterator[None]:
+    def locked(self, part: str = "", *, wait: bool = False) -> Iterator[None]:
         """Keep other runs out of the folder, or away from one part of an artifact.
 
         Args:
             part: Name of it; all if empty.
+            wait: Whether another run is waited for.
 
         Raises:
             ArtifactError: Another run is in it.
         """
         try:
             self.folder.mkdir(parents=True, exist_ok=True)
-            lock = filelock.FileLock(self.folder / f".lock{part}", timeout=0)
+            lock = filelock.FileLock(self.folder / f".lock{part}", timeout=-1 if wait else 0)
             lock.acquire()
         except filelock.Timeout as error:
             what = "is at work on this part" if part else "is using this folder"
@@ -168,9 +169,9 @@ class Store:
                 remove_leftovers(self.folder)
             yield
         finally:
-            lock.release()
-            if part:
+            if part:  # before others can take it, who see so that it is gone
                 (self.folder / f".lock{part}").unlink(missing_ok=True)
+            lock.release()
 
 
 def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[Any, Stamp | None]:

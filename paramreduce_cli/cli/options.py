@@ -52,6 +52,11 @@ PART = click.option(
     help="Do the i-th of N shares of the work; afterwards the same command without it puts them together.",
 )  # fmt: skip
 
+WAIT = click.option(
+    "--wait", is_flag=True,
+    help="Wait for another run that is at work on the same, rather than end; for schedulers, whose jobs may outlive them.",
+)  # fmt: skip
+
 
 def cores() -> int:
     """Cores that this process may use."""

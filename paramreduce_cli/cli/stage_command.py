@@ -7,7 +7,17 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import file_of, load_file
-from paramreduce_cli.cli.options import FORCE, JOBS, PART, QUIET, RESULTS, SET, cores, results_store
+from paramreduce_cli.cli.options import (
+    FORCE,
+    JOBS,
+    PART,
+    QUIET,
+    RESULTS,
+    SET,
+    WAIT,
+    cores,
+    results_store,
+)
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, progress_bars, remark
 from paramreduce_cli.config import load_config, placed_errors
@@ -32,6 +42,7 @@ def stage_command(name: str) -> click.Command:
         overrides: tuple[str, ...],
         force: bool,
         quiet: bool,
+        wait: bool,
         jobs: int | None = None,
         samples: Path | None = None,
         share: Share | None = None,
@@ -44,7 +55,7 @@ def stage_command(name: str) -> click.Command:
         store = results_store(loaded, results)
         placed = placed_errors(config, overrides)
         lock = "" if share is None else f"-{stage.name}-{share.number}-{share.count}"
-        with placed, store.locked(lock), progress_bars(quiet) as progress:
+        with placed, store.locked(lock, wait=wait), progress_bars(quiet) as progress:
             if loaded is not None:
                 check_is_asked_for(stage, loaded)
             runner = Runner(
@@ -64,7 +75,7 @@ def stage_command(name: str) -> click.Command:
             say_outcome(outcome)
         return _exit_code(stage, outcome, quiet)
 
-    params: list[Any] = [RESULTS, SET, FORCE, QUIET, VERBOSE, LOG]
+    params: list[Any] = [RESULTS, SET, FORCE, QUIET, VERBOSE, LOG, WAIT]
     if stage.lends_run is not None:
         params.append(JOBS)
     if stage.in_shares:

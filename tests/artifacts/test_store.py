@@ -6,6 +6,8 @@ import resource
 import shutil
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import h5py
@@ -231,6 +233,25 @@ def test_one_run_at_a_time(tmp_path):
         pass
     with store.locked():
         pass
+
+
+def test_a_run_can_be_waited_for(tmp_path):
+    store, order = Store(tmp_path), []
+    inside = threading.Event()
+
+    def first():
+        with store.locked("-part"):
+            inside.set()
+            time.sleep(0.2)
+            order.append("first")
+
+    thread = threading.Thread(target=first)
+    thread.start()
+    inside.wait()
+    with store.locked("-part", wait=True):
+        order.append("second")
+    thread.join()
+    assert order == ["first", "second"]
 
 
 def test_parts_belong_to_one_origin(two_link_results, tmp_path):

@@ -17,6 +17,7 @@ from tests.cluster.sweeps import (
     command,
     different,
     killed_at_random,
+    made,
     plain_runs,
     rules,
     started_at_once,
@@ -90,15 +91,21 @@ def kills(fresh, given, expected, tell):
         listed, results = fresh(f"killed-{sweeps}")
         sweeps += 1
         words = command(listed)
+        finished = {}
         # A sweep is killed a few times before it is left to end.
         for _ in range(min(5, given.kills - count)):
             if not killed_at_random(words, listed.parent, _LONGEST, rng):
                 break
             count += 1
+            finished |= made(results)
         with (listed.parent / "last.log").open("w") as log:
             done = subprocess.run(words, stdout=log, stderr=log, check=False)
         failed += done.returncode != 0
-        tell(f"killed at random moments, then ended ({count} kills so far)", results, expected)
+        after = made(results)
+        again = [path for path, seconds in finished.items() if after.get(path) != seconds]
+        failed += bool(again)
+        what = f"killed at random moments, then ended ({count} kills so far; {len(again)} of {len(finished)} made twice)"
+        tell(what, results, expected)
     return failed
 
 

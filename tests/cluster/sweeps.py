@@ -5,7 +5,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import h5py
@@ -77,6 +76,16 @@ def digests(folder):
     return result
 
 
+def made(folder):
+    """When finished files below a folder were made, as far as that shows: the time that it took, by file."""
+    found = {}
+    for name in ARTIFACTS:
+        for path in folder.rglob(name):
+            with contextlib.suppress(OSError), h5py.File(path) as file:
+                found[path] = float(file.attrs["wall_seconds"])
+    return found
+
+
 def different(found, expected):
     """Files of runs that are not what plain runs made."""
     return [
@@ -106,12 +115,7 @@ def killed_at_random(words, folder, longest, rng):
         else:
             for pid in [process.pid, *below]:
                 _kill(pid)
-        if victim == "a job":
-            process.wait()
-        else:
-            process.poll()
-            _wait_for_jobs(below)
-            process.wait()
+        process.wait()
     return True
 
 
@@ -134,13 +138,6 @@ def _below(pid):
                 own = int(entry.name)
                 found |= {own: text} | _below(own)
     return found
-
-
-def _wait_for_jobs(pids, limit=120):
-    """Jobs outlive a killed Snakemake, and end by themselves."""
-    until = time.monotonic() + limit
-    while any(Path(f"/proc/{pid}").exists() for pid in pids) and time.monotonic() < until:
-        time.sleep(0.2)
 
 
 def started_at_once(folder, count):
