@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import re
 import shlex
 import sys
 from collections.abc import Iterator
@@ -11,18 +12,45 @@ from functools import cached_property
 from pathlib import Path
 from typing import Annotated
 
-from pydantic import Field
+from pydantic import AfterValidator, Field
 
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.config.loading import load_section
 from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.pipeline import Stage, pipeline, stages_to_run
-from paramreduce_cli.records import Report, Share, Validation
+from paramreduce_cli.records import PROVING, Reduction, Report, Samples, Share, Validation
 
 _SEED = "trajectories.seed"
 """What a seed of the list sets."""
+_VARIANT = re.compile(r"\w[\w.-]*")
+"""Names of variants, which become part of a folder's."""
+
+
+def _distinct(seeds: list[int]) -> list[int]:
+    twice = sorted({seed for seed in seeds if seeds.count(seed) > 1})
+    if twice:
+        raise ValueError(f"the seed {twice[0]} stands there twice")
+    return seeds
+
+
+def _named(variants: dict[str, list[str]]) -> dict[str, list[str]]:
+    for name in variants:
+        if not _VARIANT.fullmatch(name):
+            raise ValueError(
+                f"the name {name!r} becomes part of a folder's; use letters, digits, ., - and _"
+            )
+    return variants
+
+
+def _known(parts: dict[str, int]) -> dict[str, int]:
+    names = [stage.name for stage in pipeline() if stage.in_shares]
+    for name in parts:
+        if name not in names:
+            raise ValueError(unknown("stage that is done in parts", name, names))
+    return parts
 
 
 class SweepSection(Section):
@@ -30,11 +58,15 @@ class SweepSection(Section):
 
     robots: Annotated[list[Path], Field(min_length=1)]
     """Configs; relative to this file."""
-    seeds: Annotated[list[int], Field(min_length=1)] | None = None
+    seeds: Annotated[list[int], Field(min_length=1), AfterValidator(_distinct)] | None = None
     """Of the trajectories; those in the configs if left out."""
-    variants: Annotated[dict[str, list[str]], Field(min_length=1)] | None = None
+    variants: (
+        Annotated[dict[str, list[str]], Field(min_length=1), AfterValidator(_named)] | None
+    ) = None
     """Changes of the configs, KEY=VALUE as after --set, by a name of one's own; none if left out."""
-    parts: dict[str, Annotated[int, Field(ge=1)]] = Field(default_factory=dict)
+    parts: Annotated[dict[str, Annotated[int, Field(ge=1)]], AfterValidator(_known)] = Field(
+        default_factory=dict
+    )
     """How many jobs a stage of every run is done as; one where nothing is said."""
     results: Path = Path("../results/sweep")
     """Folder of all results; relative to this file."""
@@ -50,6 +82,10 @@ class SweepRun:
     """Of its config."""
     overrides: tuple[str, ...]
     folder: Path
+    seed: int | None = None
+    """Of the list; None where it has none."""
+    variant: str = ""
+    """Its name; empty where the list has none."""
 
     @cached_property
     def config(self) -> Config:
@@ -60,6 +96,14 @@ class SweepRun:
     def stages(self) -> list[Stage]:
         """What it consists of."""
         return stages_to_run(self.config)
+
+    def divides(self, stage: Stage) -> bool:
+        """Whether a stage of it can be done as several jobs."""
+        if stage.output is Samples and self.config.sampling.log is not None:
+            return False
+        if stage.output is Reduction and PROVING not in self.config.reduction.heuristics:
+            return False
+        return stage.in_shares
 
     def file(self, stage: Stage) -> str:
         """What a stage makes."""
@@ -93,6 +137,8 @@ class SweepRun:
 class Sweep:
     """All runs of a list, by their names."""
 
+    path: Path
+    """Of the list."""
     runs: dict[str, SweepRun]
     parts: dict[str, int]
     folder: Path
@@ -102,14 +148,13 @@ class Sweep:
         return [str(run.folder / file_of(Report)) for run in self.runs.values()]
 
     def table_command(self) -> str:
-        """What sets all runs beside each other, at the shell."""
-        words = [sys.executable, "-m", "paramreduce_cli", "table"]
-        words += [str(run.folder) for run in self.runs.values()]
+        """What sets all runs that have ended beside each other, at the shell."""
+        words = [sys.executable, "-m", "paramreduce_cli", "table", "--sweep", str(self.path)]
         return shlex.join([*words, "--output", str(self.folder / "table")])
 
-    def shares(self, stage: Stage) -> list[Share]:
-        """The jobs that a stage is done as; none where it is one."""
-        count = self.parts.get(stage.name, 1) if stage.in_shares else 1
+    def shares(self, stage: Stage, run: SweepRun) -> list[Share]:
+        """The jobs that a stage of a run is done as; none where it is one."""
+        count = self.parts.get(stage.name, 1) if run.divides(stage) else 1
         return [Share(number, count) for number in range(1, count + 1)] if count > 1 else []
 
     def phases(self, jobs: str) -> list[list[str]]:
@@ -131,12 +176,14 @@ class Sweep:
 
         for stage in pipeline():
             having = {name: run for name, run in self.runs.items() if stage in run.stages}
-            shares = self.shares(stage)
-            if shares:
+            parts = [
+                run.command(stage, share, "1")
+                for run in having.values()
+                for share in self.shares(stage, run)
+            ]
+            if parts:
                 close()
-                found.append(
-                    [run.command(stage, share, "1") for run in having.values() for share in shares]
-                )
+                found.append(parts)
             for name, run in having.items():
                 text = run.command(stage, jobs=jobs)
                 waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
@@ -151,7 +198,7 @@ def load_sweep(path: Path) -> Sweep:
         path: The YAML; relative paths in it are relative to its folder.
 
     Raises:
-        ConfigError: It is no such list, or two runs would have one name.
+        ConfigError: It is no such list, two runs would have one name, or a config cannot be used.
     """
     wanted = load_section(path, SweepSection)
     folder = _beside(path, wanted.results)
@@ -163,19 +210,37 @@ def load_sweep(path: Path) -> Sweep:
                 "other names."
             )
         runs[run.name] = run
-    return Sweep(runs, wanted.parts, folder)
+    first = {(run.path, run.variant): run for run in reversed(runs.values())}
+    for run in first.values():  # seeds change nothing that could be wrong
+        _check_config(path, run)
+    return Sweep(path, runs, wanted.parts, folder)
+
+
+def _check_config(path: Path, run: SweepRun) -> None:
+    """Refuse a config that cannot be used, and say what of the list it is.
+
+    Raises:
+        ConfigError: So it is.
+    """
+    try:
+        run.stages  # noqa: B018
+    except ConfigError as error:
+        place = f"variants.{run.variant}" if run.variant and "--set" in str(error) else "robots"
+        raise ConfigError(f"{path}: {place}: {error}") from error
 
 
 def _runs(path: Path, wanted: SweepSection, folder: Path) -> Iterator[SweepRun]:
-    seeds = {"": []} if wanted.seeds is None else {f"-{k}": [f"{_SEED}={k}"] for k in wanted.seeds}
-    variants = {f"-{name}": changes for name, changes in (wanted.variants or {}).items()} or {
-        "": []
-    }
-    for robot, (seed, seeding), (variant, changes) in itertools.product(
-        wanted.robots, seeds.items(), variants.items()
+    seeds: list[int | None] = [None] if wanted.seeds is None else [*wanted.seeds]
+    for robot, seed, (variant, changes) in itertools.product(
+        wanted.robots, seeds, (wanted.variants or {"": []}).items()
     ):
-        name = f"{robot.stem}{seed}{variant}"
-        yield SweepRun(name, _beside(path, robot), (*seeding, *changes), folder / name)
+        name = "-".join(
+            [robot.stem, *([] if seed is None else [str(seed)]), *filter(None, [variant])]
+        )
+        seeding = [] if seed is None else [f"{_SEED}={seed}"]
+        yield SweepRun(
+            name, _beside(path, robot), (*seeding, *changes), folder / name, seed, variant
+        )
 
 
 def _beside(path: Path, other: Path) -> Path:

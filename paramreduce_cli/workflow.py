@@ -65,23 +65,31 @@ def _line(stage: Stage) -> str:
     return f"{stage.name}: {needs or 'the config'} -> {file_of(stage.output)}"
 
 
+_MOST_TASKS = 1000
+"""Of one array, which Slurm's MaxArraySize allows where nothing else is set."""
 _SLURM = """\
 #!/usr/bin/env bash
-# Written by `paramreduce graph --format slurm`: submits {count} arrays of jobs, each of which waits for the one
-# before; {jobs} jobs in all. Run it with bash where sbatch is. What is done is skipped, so jobs may be requeued, and the
+# Written by `paramreduce graph --format slurm`: submits {count} arrays of tasks, each of which waits for the one
+# before; {jobs} commands in all. Run it with bash where sbatch is. What is done is skipped, so tasks may be requeued, and the
 # same script may be run again. Further options of sbatch: SBATCH_OPTIONS="--partition=... --time=...".
 set -euo pipefail
 cd {folder}
-logs={logs}
+logs={logs}/$(date +%Y%m%dT%H%M%S)-$$   # of every submission: tasks of an earlier one may still read theirs
 mkdir -p "$logs"
 after=""
+cat > "$logs/task" <<'TASK'
+failed=0   # FILE TASKS: every so many of its commands, whatever becomes of the others
+while IFS= read -r line; do eval "$line" </dev/null || failed=1; done < <(sed -n "${{SLURM_ARRAY_TASK_ID}}~$2p" "$1")
+exit $failed
+TASK
 
-submit() {{  # NAME COUNT, and a command a line
+submit() {{  # NAME COUNT, and a command a line; of more than {most} a task does every so many
+  local tasks=$(($2 < {most} ? $2 : {most}))
   cat > "$logs/$1.commands"
-  after=$(sbatch --parsable --requeue --job-name="$1" --array="1-$2" --output="$logs/$1-%a.log" \\
+  after=$(sbatch --parsable --requeue --job-name="$1" --array="1-$tasks" --output="$logs/$1-%a.log" \\
     ${{after:+--dependency=afterany:$after}} ${{SBATCH_OPTIONS:-}} \\
-    --wrap "eval \\"\\$(sed -n \\${{SLURM_ARRAY_TASK_ID}}p '$logs/$1.commands')\\"")
-  echo "$1: job $after, $2 tasks"
+    --wrap "exec bash $(printf %q "$logs/task") $(printf %q "$logs/$1.commands") $tasks")
+  echo "$1: job $after, $tasks tasks"
 }}
 """
 
@@ -98,6 +106,7 @@ def slurm_script(sweep: Sweep) -> str:
         jobs=sum(map(len, phases)),
         folder=shlex.quote(str(Path.cwd())),
         logs=shlex.quote(str(sweep.folder / ".slurm")),
+        most=_MOST_TASKS,
     )
     for number, commands in enumerate(phases, 1):
         lines = "\n".join(commands)

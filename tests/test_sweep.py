@@ -6,11 +6,13 @@ from pathlib import Path
 import pytest
 from cluster.scripted import scheduled
 from conftest import CONFIGS, TWO_LINK
+from simulated_logs import log_config
 
+from paramreduce_cli import workflow
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import Share
-from paramreduce_cli.sweep import load_sweep
+from paramreduce_cli.sweep import Sweep, load_sweep
 from paramreduce_cli.workflow import slurm_script
 
 STAGES = {stage.name: stage for stage in pipeline()}
@@ -41,9 +43,30 @@ def test_every_robot_with_every_seed_and_every_variant(tmp_path):
     assert run.config.trajectories.seed == 5
     assert run.config.trajectories.points == 200
     assert run.folder == tmp_path / "here" / "two_link-5-long"
-    assert sweep.shares(STAGES["reduce"]) == [Share(1, 3), Share(2, 3), Share(3, 3)]
-    assert sweep.shares(STAGES["sample"]) == []
-    assert sweep.shares(STAGES["validate"]) == []
+    assert (run.seed, run.variant) == (5, "long")
+    assert sweep.shares(STAGES["reduce"], run) == [Share(1, 3), Share(2, 3), Share(3, 3)]
+    assert sweep.shares(STAGES["sample"], run) == []
+    assert sweep.shares(STAGES["validate"], run) == []
+
+
+def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
+    text = (
+        f"robots: [{CONFIGS / 'two_link.yaml'}]\nparts: {{reduce: 2, sample: 2}}\nresults: r\n"
+        "variants: {all: [], heuristic: ['reduction.heuristics=[swap]', selected.heuristic=swap]}\n"
+    )
+    sweep = load_sweep(listed(tmp_path, text))
+    proven, swapped = sweep.runs.values()
+    assert len(sweep.shares(STAGES["reduce"], proven)) == 2
+    assert sweep.shares(STAGES["reduce"], swapped) == []
+    assert (
+        sum(
+            " reduce " in line and "--part" in line for lines in sweep.phases("1") for line in lines
+        )
+        == 2
+    )
+    log_config(tmp_path)
+    logged = load_sweep(listed(tmp_path, "robots: [arm.yaml]\nparts: {sample: 2}\n"))
+    assert logged.shares(STAGES["sample"], logged.runs["arm"]) == []
 
 
 def test_commands_are_those_of_the_shell(tmp_path):
@@ -53,8 +76,8 @@ def test_commands_are_those_of_the_shell(tmp_path):
     text = run.command(STAGES["reduce"], Share(2, 3), jobs="4")
     words = shlex.split(text)
     assert words[2:4] == ["paramreduce_cli", "reduce"]
-    assert words[-3:] == ["--quiet", "--jobs", "4"]
-    assert words[-5:-3] == ["--part", "2/3"]
+    assert words[-4:] == ["--quiet", "--wait", "--jobs", "4"]
+    assert words[-6:-4] == ["--part", "2/3"]
     assert run.command(STAGES["validate"]).endswith("|| [ $? -eq 1 ]")
     for stage in run.stages:
         assert Path(run.needs(stage)[0]).resolve() == config
@@ -72,6 +95,14 @@ def test_commands_are_those_of_the_shell(tmp_path):
         ("robots: [a.yaml]\nparts: {reduce: 0}", "parts.reduce"),
         ("robots: [a.yaml, b/a.yaml]", "two runs are called a"),
         ("- a.yaml", "must be a mapping"),
+        ("robots: [a.yaml]\nparts: {reduced: 2}", "parts.*did you mean reduce"),
+        ("robots: [a.yaml]\nseeds: [1, 2, 1]", "the seed 1 stands there twice"),
+        ("robots: [a.yaml]\nvariants: {a/b: []}", "'a/b' becomes part of a folder's"),
+        ("robots: [missing.yaml]", r"sweep.yaml: robots: .*missing.yaml.*no such file"),
+        (
+            f"robots: [{TWO_LINK}]\nvariants: {{long: [trajectories.pints=3]}}",
+            r"sweep.yaml: variants.long: --set .*did you mean points",
+        ),
     ],
 )
 def test_lists_that_cannot_be(tmp_path, text, says):
@@ -92,8 +123,21 @@ def test_a_script_for_slurm_submits_phases_that_wait_for_each_other(tmp_path):
     ]
     assert ["--array=1-2" in call for call in calls] == [False, True, False, False, False, False]
     assert all("--requeue" in call for call in calls)
-    lines = (tmp_path / "r" / ".slurm" / "paramreduce-4.commands").read_text().splitlines()
-    assert [line.split()[-4] for line in lines] == ["1/3", "2/3", "3/3"]
+    (commands,) = (tmp_path / "r" / ".slurm").glob("*/paramreduce-4.commands")
+    lines = commands.read_text().splitlines()
+    assert [line.split()[-5] for line in lines] == ["1/3", "2/3", "3/3"]
+
+
+def test_more_commands_than_an_array_may_have_tasks_are_dealt_to_them(tmp_path, monkeypatch):
+    monkeypatch.setattr(workflow, "_MOST_TASKS", 2)
+    monkeypatch.setattr(
+        Sweep, "phases", lambda *_: [[f"echo {k} >> done" if k != 1 else "false" for k in range(5)]]
+    )
+    monkeypatch.chdir(tmp_path)
+    path = listed(tmp_path, f"robots: [{TWO_LINK}]\nresults: r s\n")
+    calls = scheduled(tmp_path, slurm_script(load_sweep(path)))
+    assert ["--array=1-2" in call for call in calls] == [True]
+    assert (tmp_path / "done").read_text().split() == ["0", "2", "4", "3"]
 
 
 def test_a_thousand_parts_take_few_calls(tmp_path):

@@ -42,6 +42,7 @@ from paramreduce_cli.records.parameters import (
 )
 from paramreduce_cli.records.reduction import (
     NOT_KEPT,
+    PROVING,
     BySize,
     Columns,
     ModelChoice,

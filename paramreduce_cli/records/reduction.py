@@ -11,6 +11,8 @@ import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
 
+PROVING = "best-subset"
+"""The heuristic that proves."""
 NOT_KEPT = -1
 """Position of a standard parameter that a reduced model does without."""
 

@@ -12,7 +12,7 @@ COLOURS = (
     "#0b8f8f",
 )  # fmt: skip
 """Of heuristics in their order, neighbours far apart; all of them stand out from white by 3 to 1."""
-_MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
+MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
 EQUAL = 1e-4
 """Relative difference of values that single precision and other orders of columns explain."""
 
@@ -57,7 +57,7 @@ def curves(data: ReportData) -> list[Curve]:
         for n, values in zip(sizes, own, strict=True):
             seen.setdefault(n, []).append(values)
         models.append(own)
-        colour, marker = COLOURS[k % len(COLOURS)], _MARKERS[k % len(_MARKERS)]
+        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
         found.append(Curve((name,), result, colour, marker, _with_neighbours(np.array(fresh))))
     return found
 

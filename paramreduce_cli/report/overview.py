@@ -15,22 +15,23 @@ HEADER = (
 
 
 def overview(rows: Sequence[tuple[str, ...]]) -> Table:
-    """The selected model of every robot beside its full one, inverse and direct dynamics."""
+    """The selected model of every robot, or run, beside its full one, inverse and direct dynamics."""
     return Table("Reduced models", ("robot", *HEADER), tuple(rows))
 
 
-def overview_row(summary: Summary) -> tuple[str, ...]:
+def overview_row(summary: Summary, name: str = "") -> tuple[str, ...]:
     """One robot's row.
 
     Args:
         summary: Contents of its ``summary.json``.
+        name: Of the run, where the robot's does not tell it from others.
 
     Raises:
         KeyError, TypeError, ValueError: It is no such summary.
     """
     model, selected = summary["model"], summary["selected"]
     return (
-        summary["robot"],
+        name or summary["robot"],
         selected["heuristic"],
         str(model["n_affecting"]),
         str(model["n_base"]),

@@ -114,23 +114,31 @@ def _plotting() -> tuple[str, str]:
     return script, style
 
 
-def render_sweep(title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table]) -> str:
+def render_sweep(
+    title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table], figure: bytes
+) -> str:
     """Many runs as one HTML page.
 
     Args:
         title: Its heading.
         records: Of the runs.
         tables: What is shown of them.
+        figure: SVG of all runs.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     robots = list(dict.fromkeys(record["robot"] for record in records))
     return environment.from_string(_text("sweep.html")).render(
-        title=title, style=_text("page.css"), count=len(records), robots=robots, tables=tables
-    )
+        title=title, style=_text("page.css"), count=len(records), robots=robots, tables=tables,
+        figure=_source(figure),
+    )  # fmt: skip
 
 
 def _text(name: str) -> str:
     return resources.files("paramreduce_cli.report").joinpath(name).read_text("utf-8")
+
+
+def _source(svg: bytes) -> str:
+    return f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}"
 
 
 def _items(
@@ -140,7 +148,7 @@ def _items(
     found = []
     for name, svg in images.items():
         draw = figures[name]
-        source = f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}"
+        source = _source(svg)
         found.append((place_of(draw), _Item(name, (draw.__doc__ or name).strip(), source)))
     for name, table in made.items():
         make = tables[name]

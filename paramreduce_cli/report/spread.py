@@ -13,12 +13,16 @@ _LISTED = 40
 """Parameters in a cell, at most."""
 
 
-def run_record(name: str, summary: Summary) -> dict[str, Any]:
+def run_record(
+    name: str, summary: Summary, variant: str = "", seed: int | None = None
+) -> dict[str, Any]:
     """One run as one row of numbers, for analysis elsewhere; None where something is not known.
 
     Args:
         name: Of the run.
         summary: Contents of its ``summary.json``.
+        variant: Of its config, in a sweep.
+        seed: Of its trajectories, in a sweep.
 
     Raises:
         KeyError, TypeError, ValueError: It is no such summary.
@@ -30,6 +34,8 @@ def run_record(name: str, summary: Summary) -> dict[str, Any]:
     return {
         "run": name,
         "robot": summary["robot"],
+        "variant": variant,
+        "seed": seed,
         "kappa_best": min(known, default=None),
         "kappa_median": statistics.median(known) if known else None,
         "n_affecting": summary["model"]["n_affecting"],
@@ -50,7 +56,7 @@ def run_record(name: str, summary: Summary) -> dict[str, Any]:
 
 
 def spread(records: Sequence[Mapping[str, Any]]) -> Table:
-    """Median, smallest and largest number over the runs of every robot."""
+    """Median, smallest and largest number over the runs of every robot, of its variants apart."""
     header = (
         "robot",
         "runs",
@@ -65,7 +71,7 @@ def spread(records: Sequence[Mapping[str, Any]]) -> Table:
         "accepted",
     )
     rows = []
-    for robot, own in _by_robot(records).items():
+    for label, own in grouped(records).items():
         cells = [
             _range([one[key] for one in own], text)
             for key, text in (
@@ -81,27 +87,29 @@ def spread(records: Sequence[Mapping[str, Any]]) -> Table:
         ]
         judged = [one["accepted"] for one in own if one["accepted"] is not None]
         accepted = f"{sum(judged)} of {len(judged)}" if judged else "-"
-        rows.append((robot, str(len(own)), *cells, accepted))
+        rows.append((label, str(len(own)), *cells, accepted))
     return Table("Spread over runs: median (smallest to largest)", header, tuple(rows))
 
 
 def choices(records: Sequence[Mapping[str, Any]]) -> Table:
-    """Parameters that every run of a robot selects, and those that some do."""
+    """Parameters that every run of a robot, or of a variant of it, selects, and those that some do."""
     rows = []
-    for robot, own in _by_robot(records).items():
+    for label, own in grouped(records).items():
         counts = Counter(name for one in own for name in one["parameters"].split())
         always = sorted(name for name, count in counts.items() if count == len(own))
         some = [
             f"{name} {count}/{len(own)}" for name, count in counts.most_common() if count < len(own)
         ]
-        rows.append((robot, *map(_listed, (always, some))))
+        rows.append((label, *map(_listed, (always, some))))
     return Table("What is selected", ("robot", "in all runs", "in some"), tuple(rows))
 
 
-def _by_robot(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+def grouped(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Runs that differ by no more than their seeds, by their robot and variant."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
-        found.setdefault(record["robot"], []).append(record)
+        label = ", ".join(filter(None, (record["robot"], record["variant"])))
+        found.setdefault(label, []).append(record)
     return found
 
 

@@ -3,7 +3,7 @@
 import io
 import textwrap
 from collections.abc import Callable
-from typing import Any
+from typing import Any, TypeVar
 
 import matplotlib as mpl
 import numpy as np
@@ -14,6 +14,9 @@ from matplotlib.ticker import MaxNLocator
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
+
+D = TypeVar("D")
+"""What is drawn."""
 
 STYLE = {
     "figure.figsize": (8.4, 3.8),
@@ -72,9 +75,7 @@ FORMATS: dict[str, dict] = {
 }
 
 
-def render(
-    draw: Callable[[ReportData], Figure | None], data: ReportData, formats: list[str]
-) -> dict[str, bytes]:
+def render(draw: Callable[[D], Figure | None], data: D, formats: list[str]) -> dict[str, bytes]:
     """Draw a figure and encode it in each format, PDF for a column; nothing where there is nothing to draw."""
     of_papers = [name for name in formats if name == "pdf"]
     of_pages = [name for name in formats if name != "pdf"]
@@ -85,10 +86,7 @@ def render(
 
 
 def _encoded(
-    draw: Callable[[ReportData], Figure | None],
-    data: ReportData,
-    formats: list[str],
-    style: dict[str, Any],
+    draw: Callable[[D], Figure | None], data: D, formats: list[str], style: dict[str, Any]
 ) -> dict[str, bytes]:
     with mpl.rc_context(style):
         drawn = draw(data) if formats else None

@@ -20,6 +20,7 @@ from paramreduce_cli.multibody.observation import (
 )
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import (
+    PROVING,
     UNSHARED,
     WHOLE,
     Columns,
@@ -48,9 +49,6 @@ from paramreduce_cli.reduction.objective import Objective
 from paramreduce_cli.reduction.setup import SIZES, effort, selection_columns, selection_problem
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
-
-PROVING = "best-subset"
-"""The heuristic that proves."""
 
 
 def reduce(

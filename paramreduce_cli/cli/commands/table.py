@@ -1,5 +1,7 @@
 """The command that sets several robots, or many runs, beside each other."""
 
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +11,23 @@ from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.hints import results_below
-from paramreduce_cli.cli.terminal import JSON, LOG, emit, say
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, remark, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
+from paramreduce_cli.sweep import Sweep, load_sweep
 from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.texts.table import Table
 
+_MOST_NAMED = 12
+
 
 @click.command()
-@click.argument("results", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("results", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "--sweep", "listed", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
+    help="A list of runs, such as pipelines/sweep.yaml: all of them that have ended, with their seeds and variants.",
+)  # fmt: skip
 @click.option(
     "--output", type=click.Path(path_type=Path), metavar="PREFIX",
     help="Files are called PREFIX.txt, .csv, .tex and .html.  [default: table, beside the first results]",
@@ -26,7 +35,13 @@ from paramreduce_cli.texts.table import Table
 @click.option("--parquet", is_flag=True, help="Write PREFIX-runs.parquet too; it needs pyarrow.")
 @JSON
 @LOG
-def table(results: tuple[Path, ...], output: Path | None, parquet: bool, as_json: bool) -> None:
+def table(
+    results: tuple[Path, ...],
+    listed: Path | None,
+    output: Path | None,
+    parquet: bool,
+    as_json: bool,
+) -> None:
     """Set one table over several robots or runs, as text, CSV, LaTeX and a page.
 
     RESULTS are results folders or summaries. Shows the selected model of each robot beside its
@@ -35,31 +50,65 @@ def table(results: tuple[Path, ...], output: Path | None, parquet: bool, as_json
 
     Example: paramreduce table results/sweep/*/
     """
+    if (listed is not None) == bool(results):
+        raise click.UsageError("Give RESULTS, or --sweep FILE.")
+    if listed is not None:
+        sweep = load_sweep(listed)
+        labels, folder = _ended(listed, sweep), sweep.folder
+    else:
+        labels, folder = {path: {} for path in results}, results[0].resolve().parent
+    summaries = {path: _summary(path) for path in labels}
+    robots = Counter(summary.get("robot") for summary in summaries.values())
     rows, records = [], []
-    for path in results:
-        if path.is_dir() and not (path / SUMMARY).exists():
-            raise ArtifactError(
-                f"{path}: holds no results itself.{results_below(path, 'table') or ' Make them with `paramreduce run`.'}"
-            )
+    for path, summary in summaries.items():
+        name = _name(path)
         try:
-            summary = load_summary(path)
-            rows.append(overview_row(summary))
-            records.append(run_record(_name(path), summary))
+            rows.append(overview_row(summary, name if robots[summary["robot"]] > 1 else ""))
+            records.append(run_record(name, summary, **labels[path]))
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(f"{path}: is no summary of this version ({error}).") from error
-    made = [overview(rows)]
-    if len({record["robot"] for record in records}) < len(records):
-        made += [spread(records), choices(records)]
-    prefix = output or results[0].resolve().parent / "table"
+    made = {"": overview(rows)}
+    if len(robots) < len(records):
+        made |= {"-spread": spread(records), "-choices": choices(records)}
+    prefix = output or folder / "table"
     _write(prefix, made, records)
     if parquet:
         _write_parquet(prefix.with_name(f"{prefix.name}-runs.parquet"), records)
     if as_json:
         emit(runs=records)
         return
-    for one in made:
+    for one in made.values():
         say(one.to_text())
-    say(f"Written to {prefix}.txt, .csv, .tex, .html and {prefix.name}-runs.csv")
+    tables = ", ".join(f"{prefix.name}{part}.csv" for part in [*made, "-runs"])
+    say(f"Written to {prefix}.txt, .tex and .html, and {tables}")
+
+
+def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
+    """Folders of the runs that have ended, with their variants and seeds; the others are named.
+
+    Raises:
+        ArtifactError: None has.
+    """
+    ended = {
+        run.folder: {"variant": run.variant, "seed": run.seed}
+        for run in sweep.runs.values()
+        if (run.folder / SUMMARY).exists()
+    }
+    left = [name for name, run in sweep.runs.items() if run.folder not in ended]
+    if not ended:
+        raise ArtifactError(f"{listed}: none of its {len(left)} runs has ended.")
+    if left:
+        more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
+        remark(f"left out, as they have not ended: {', '.join(left[:_MOST_NAMED])}{more}")
+    return ended
+
+
+def _summary(path: Path) -> dict[str, Any]:
+    if path.is_dir() and not (path / SUMMARY).exists():
+        raise ArtifactError(
+            f"{path}: holds no results itself.{results_below(path, 'table') or ' Make them with `paramreduce run`.'}"
+        )
+    return load_summary(path)
 
 
 def _name(path: Path) -> str:
@@ -68,20 +117,25 @@ def _name(path: Path) -> str:
     return folder.stem if folder.suffix == ".json" else folder.name
 
 
-def _write(prefix: Path, made: list[Table], records: list[dict[str, Any]]) -> None:
-    from paramreduce_cli.report.page import render_sweep  # Jinja is slow to load
+def _write(prefix: Path, made: Mapping[str, Table], records: list[dict[str, Any]]) -> None:
+    # Jinja and matplotlib are slow to load.
+    from paramreduce_cli.report.page import render_sweep
+    from paramreduce_cli.report.runs_figure import runs_figure
+    from paramreduce_cli.report.style import render
 
     keys = list(dict.fromkeys(key for record in records for key in record))
     runs = Table(
         "Runs", tuple(keys), tuple(tuple(_cell(one.get(key)) for key in keys) for one in records)
     )
-    for ending, text in (
-        (".txt", "\n".join(one.to_text() for one in made)),
-        (".csv", "\n".join(one.to_csv() for one in made)),
-        (".tex", "\n".join(map(latex_table, made))),
-        (".html", render_sweep("Reduced models", records, made)),
-        ("-runs.csv", runs.to_csv()),
-    ):
+    tables = list(made.values())
+    figure = render(runs_figure, records, ["svg"])["svg"]
+    for ending, text in {
+        ".txt": "\n".join(one.to_text() for one in tables),
+        ".tex": "\n".join(map(latex_table, tables)),
+        ".html": render_sweep("Reduced models", records, tables, figure),
+        **{f"{part}.csv": one.to_csv() for part, one in made.items()},
+        "-runs.csv": runs.to_csv(),
+    }.items():
         with atomically(prefix.with_name(f"{prefix.name}{ending}")) as path:
             path.write_text(text, encoding="utf-8")
 

@@ -1,0 +1,33 @@
+"""What the selected models of many runs cost, how wrong they are, and how well their trajectories excite."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from paramreduce_cli.report.curves import COLOURS, MARKERS
+from paramreduce_cli.report.spread import grouped
+from paramreduce_cli.report.style import legend_beside, pair_of_plots, visible
+
+Record = Mapping[str, Any]
+
+
+def runs_figure(records: Sequence[Record]) -> Figure:
+    """Torque error on the validation set against operations, and condition numbers, a mark for every run."""
+    drawn, errors, kappas = pair_of_plots(shared=False)
+    for k, (label, own) in enumerate(grouped(records).items()):
+        look = {
+            "color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)],
+            "linestyle": "none", "markersize": 5, "alpha": 0.75,
+        }  # fmt: skip
+        cost, error, kappa = (
+            np.array([one[key] for one in own], dtype=float)  # NaN where it is not known
+            for key in ("operations_inverse", "torque_error_validation", "kappa_best")
+        )
+        errors.semilogy(cost, visible(error), label=label, **look)
+        kappas.semilogy(np.full(kappa.shape, k), kappa, label=label, **look)
+    errors.set(xlabel="operations of d", ylabel=r"$\varepsilon_\tau$, validation")
+    kappas.set(ylabel=r"$\kappa$, best trajectory", xticks=[])
+    legend_beside(kappas)
+    return drawn
