@@ -5,10 +5,11 @@ from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from paramreduce_cli.report.curves import COLOURS, MARKERS
 from paramreduce_cli.report.spread import grouped
-from paramreduce_cli.report.style import legend_beside, pair_of_plots, visible
+from paramreduce_cli.report.style import legend_beside, pair_of_plots
 
 Record = Mapping[str, Any]
 
@@ -25,9 +26,13 @@ def runs_figure(records: Sequence[Record]) -> Figure:
             np.array([one[key] for one in own], dtype=float)  # NaN where it is not known
             for key in ("operations_inverse", "torque_error_validation", "kappa_best")
         )
-        errors.semilogy(cost, visible(error), label=label, **look)
+        errors.plot(cost, error, label=label, **look)
         kappas.semilogy(np.full(kappa.shape, k), kappa, label=label, **look)
-    errors.set(xlabel="operations of d", ylabel=r"$\varepsilon_\tau$, validation")
+    errors.set(xlabel="operations of d", ylabel=r"$\varepsilon_\tau$, validation", ylim=(0, None))
+    errors.xaxis.set_major_locator(MaxNLocator(integer=True))
+    errors.yaxis.set_major_formatter(PercentFormatter(1))
+    kappas.yaxis.set_major_formatter("{x:g}")
+    kappas.yaxis.set_minor_formatter("{x:g}")
     kappas.set(ylabel=r"$\kappa$, best trajectory", xticks=[])
     legend_beside(kappas)
     return drawn
