@@ -11,12 +11,20 @@ from conftest import ONE_FORMAT, TWO_LINK, config_of
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.pipeline import pipeline, stages_to_run
-from paramreduce_cli.records import Proofs, ProofStatus, Reduction, Samples, Share, Trajectories
+from paramreduce_cli.records import (
+    Proofs,
+    ProofStatus,
+    Reduction,
+    Samples,
+    Share,
+    TermReduction,
+    Trajectories,
+)
 from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages.reduce import _of_jobs
 
 STAGES = {stage.name: stage for stage in pipeline()}
-SHARED = ("optimize-trajectories", "sample", "reduce")
+SHARED = ("optimize-trajectories", "sample", "reduce", "reduce-terms")
 
 
 def digest(folder, name):
@@ -102,6 +110,20 @@ def test_parts_of_one_recording(two_link_results, tmp_path):
     np.testing.assert_allclose(
         squared[0], squared[1], rtol=0, atol=1e-12 * np.abs(other).max() ** 2
     )
+
+
+def test_functions_whose_terms_are_reduced_by_several_jobs(two_link_results, tmp_path):
+    rough = ["terms.torque_error=0.5", "terms.acceleration_error=2", "terms.rounds=0"]
+    for name in ("model.h5", "trajectories.h5", "samples.h5", "reduction.h5"):
+        shutil.copy(two_link_results / name, tmp_path / name)
+    runner = Runner(config_of("two_link", ONE_FORMAT, *rough), Store(tmp_path))
+    runner.run(STAGES["reduce-terms"])
+    whole = digest(tmp_path, "terms.h5")
+    runner.store.path(TermReduction).unlink()
+    for number in (1, 2, 3):  # one more than there are functions
+        runner.run(STAGES["reduce-terms"], share=Share(number, 3))
+    runner.run(STAGES["reduce-terms"])
+    assert digest(tmp_path, "terms.h5") == whole
 
 
 @pytest.fixture(scope="module")

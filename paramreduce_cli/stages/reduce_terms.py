@@ -9,12 +9,16 @@ from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
+    UNSHARED,
+    WHOLE,
     CountedDynamics,
     Model,
     Progress,
     Reduction,
     Run,
     Samples,
+    Share,
+    Shares,
     TermFront,
     TermModel,
     TermReduction,
@@ -43,51 +47,73 @@ def reduce_terms(
     samples: Samples,
     reduction: Reduction,
     run: Run,
+    share: Share = WHOLE,
+    shares: Shares = UNSHARED,
 ) -> TermReduction:
     """Leave terms out of the functions of reduced models, and fit what is left.
 
     Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
     within the budget on the validation set too, measured ones are held out. A function for which nothing
-    is found is left out, with a warning.
+    is found is left out, with a warning. A share of the work are some of the functions.
     """
     if section is None:
         raise ConfigError(
             "is missing: it says which errors are allowed, such as `terms: {torque_error: 0.01}`.",
             ("terms",),
         )
+    budget = Budget(section.torque_error, section.acceleration_error or np.inf)
+    names = list(dict.fromkeys(section.functions))
+    if shares.found:
+        functions = {name: one for found in shares.found for name, one in found.functions.items()}
+    else:
+        functions = {}
+        for name in share.dealt(names):
+            found = _searched(
+                name, section, budget, sampling, counted, model, samples, reduction, run
+            )
+            functions |= {} if found is None else {name: found}
+    functions = {name: functions[name] for name in names if name in functions}
+    if share.whole:
+        _say_missing([name for name in names if name not in functions], bool(functions))
+    return TermReduction(budget.torque, budget.acceleration, functions)
+
+
+def _searched(
+    name: str,
+    section: TermsSection,
+    budget: Budget,
+    sampling: SamplingSection,
+    counted: CountedDynamics,
+    model: Model,
+    samples: Samples,
+    reduction: Reduction,
+    run: Run,
+) -> TermModel | None:
+    """A function with terms left out, None where nothing is found within the budget."""
     measured = sampling.log is not None or (
         sampling.estimation_file is not None and sampling.torques == "measured"
     )
     projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
-    allowed = section.acceleration_error
-    budget = Budget(section.torque_error, np.inf if allowed is None else allowed)
     lean = LeanModels(model.mechanism, model.formulations, independent=projected)
-    functions: dict[str, TermModel] = {}
-    for name in dict.fromkeys(section.functions):
-        direct = name == "direct"
-        starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
-        judge = Judge(
-            model, samples, reduction.nominal_torque, direct=direct,
-            projected=projected, measured=measured,
-        )  # fmt: skip
+    direct = name == "direct"
+    starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
+    judge = Judge(
+        model, samples, reduction.nominal_torque, direct=direct,
+        projected=projected, measured=measured,
+    )  # fmt: skip
 
-        def progress(share: float, remark: str, name: str = name) -> None:
-            run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
+    def progress(share: float, remark: str) -> None:
+        run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
 
-        searched, watched = _looked_at(judge, samples)
-        found, front = simplified(
-            lean, starts, searched, watched, judge.poses(_POSES),
-            budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
-        )  # fmt: skip
-        fitted = judge.thinned(samples.estimation, _FITTED)
-        refitted = (one.refitted(fitted, budget) for one in found)
-        way = [one.refitted(fitted, budget) for one in front]
-        records = (_record(one, judge, budget, way) for one in refitted)
-        record = next((record for record in records if record is not None), None)
-        if record is not None:
-            functions[name] = record
-    _say_missing([name for name in section.functions if name not in functions], bool(functions))
-    return TermReduction(budget.torque, budget.acceleration, functions)
+    searched, watched = _looked_at(judge, samples)
+    found, front = simplified(
+        lean, starts, searched, watched, judge.poses(_POSES),
+        budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
+    )  # fmt: skip
+    fitted = judge.thinned(samples.estimation, _FITTED)
+    way = [one.refitted(fitted, budget) for one in front]
+    records = (_record(one.refitted(fitted, budget), judge, budget, way) for one in found)
+    return next((record for record in records if record is not None), None)
 
 
 def _looked_at(judge: Judge, samples: Samples) -> tuple[TermSamples, TermSamples | None]:
