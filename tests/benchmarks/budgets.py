@@ -21,10 +21,12 @@ from paramreduce_cli.lean import search
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from tests.benchmarks.growth import ANGLES, chain
+from tests.cli.test_odd_inputs import ALIASES
 from tests.conftest import dh, random_states
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (sys.executable, "-m", "paramreduce_cli")
+MANY_KEYS = "".join(f"k{k}: 1\n" for k in range(30_000))
 TIMES = 3
 """Of commands that take less than a second; the least counts."""
 
@@ -39,8 +41,14 @@ class Spent:
     """MB, of its largest process."""
 
 
-def spent(*arguments, times=1, **environment):
+def spent(*arguments, times=1, codes=(0, 1), **environment):
     """The least of several runs of a command.
+
+    Args:
+        arguments: Of paramreduce.
+        times: How often it is run.
+        codes: It may end with; 1 is a model that is not accepted.
+        environment: Changes of this process's.
 
     Raises:
         SystemExit: It failed.
@@ -55,7 +63,7 @@ def spent(*arguments, times=1, **environment):
         said = process.stderr.read().decode()
         _, status, usage = os.wait4(process.pid, 0)
         wall = time.perf_counter() - started
-        if os.waitstatus_to_exitcode(status) not in (0, 1):  # 1: a model that is not accepted
+        if os.waitstatus_to_exitcode(status) not in codes:
             raise SystemExit(f"{' '.join(map(str, arguments))}:\n{said}")
         found.append(Spent(usage.ru_utime + usage.ru_stime, wall, usage.ru_maxrss / 1e3))
     return min(found, key=lambda one: one.cpu)
@@ -116,6 +124,11 @@ def of_the_shell(folder):
     ):
         shown = " ".join(Path(argument).name for argument in map(str, arguments))
         yield shown, spent(*arguments, times=TIMES).cpu, 0.4, "CPU s"
+    for what, text in {"aliases of aliases": ALIASES, "30,000 unknown keys": MANY_KEYS}.items():
+        (folder / "odd.yaml").write_text(text)
+        found = spent("run", folder / "odd.yaml", times=TIMES, codes=(2,))
+        yield f"a config of {what}, refused", found.cpu, 1, "CPU s"
+        yield f"a config of {what}, refused", found.memory, 200, "MB"
 
 
 def of_papers_systems(folder):

@@ -18,10 +18,8 @@ ALIASES = "a0: &a0 [x, x]\n" + "".join(
 MERGES = "a0: &a0 {x: 1}\n" + "".join(
     f"a{k}: &a{k}\n  <<: [*a{k - 1}, *a{k - 1}]\n" for k in range(1, 40)
 )
-SECONDS, MEGABYTES = (
-    10,
-    500,
-)  # of data, with the libraries; a busy machine takes longer than the second it should be
+SECONDS, MEGABYTES = 10, 200
+"""Of a process with its libraries; a busy machine takes longer than the second it should be."""
 
 
 def limited():
