@@ -52,7 +52,7 @@ def _check_sizes(what: str, values: FloatArray) -> None:
 
 
 def _remark_on_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
-    lengths = np.linalg.norm(W, axis=0)
+    lengths = np.abs(W).max(axis=0)  # squares of the smallest would be zero
     small = np.flatnonzero((lengths > 0) & ~affecting)
     if small.size:
         largest = int(np.argmax(lengths))

@@ -157,6 +157,9 @@ def test_long_doubles_are_read(invoke, brought, tmp_path):
 def test_columns_that_count_as_zero_are_named(invoke, brought):
     done = invoke(*brought(W * [1, 1e14, 1, 1, 1], TAU))
     assert "4 columns of the observation matrix count as zero beside p2" in done.err
+    for size in (1e-20, 1e-200):
+        done = invoke(*brought(W * [1, 1, 1, size, 1], TAU), "--force")
+        assert "1 columns of the observation matrix count as zero" in done.err
 
 
 def test_links_out_of_a_file_are_not_followed(invoke, brought, tmp_path):
