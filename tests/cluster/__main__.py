@@ -2,6 +2,7 @@
 
 import argparse
 import random
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -42,12 +43,15 @@ def main():
     given = parser.parse_args()
     robots = ROBOTS[: given.robots]
     table = rich.table.Table("what", "runs", "equal to plain runs", "otherwise")
-    lost = 0
+    lost = []
 
     def tell(what, found, expected):
-        nonlocal lost
         bad = different(found, expected)
-        lost += bool(bad)
+        lost.extend(bad)
+        if bad:  # to be looked at afterwards
+            kept = Path(tempfile.mkdtemp(prefix="differs-"))
+            shutil.copytree(folder, kept, dirs_exist_ok=True)
+            print(f"{what}: kept in {kept}", flush=True)
         runs = len({name.partition("/")[0] for name in bad})
         table.add_row(what, str(len(expected)), str(len(expected) - runs), ", ".join(bad[:3]))
 
@@ -68,7 +72,7 @@ def main():
             calls = len(scheduled(listed.parent, text))
             tell(f"script for sbatch, {calls} calls{again}", results, expected)
         wrong = started_at_once(folder, given.starts)
-        lost += wrong
+        lost.extend(["starts"] * wrong)
         table.add_row(
             f"{given.starts} starts at once, empty cache",
             str(given.starts),
@@ -76,11 +80,12 @@ def main():
             "",
         )
         if given.kills:
-            lost += kills(fresh, given, expected, tell)
+            lost.extend(["kills"] * kills(fresh, given, expected, tell))
         if given.slurm != "no":
-            lost += on_slurm(folder, fresh, given.slurm == "all", expected, tell, table)
+            failed = on_slurm(folder, fresh, given.slurm == "all", expected, tell, table)
+            lost.extend(["Slurm"] * failed)
     rich.console.Console(width=110).print(table)
-    sys.exit(lost > 0)
+    sys.exit(bool(lost))
 
 
 def kills(fresh, given, expected, tell):
