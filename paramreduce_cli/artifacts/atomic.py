@@ -3,6 +3,7 @@
 import contextlib
 import difflib
 import errno
+import glob
 import os
 import re
 import tempfile
@@ -33,6 +34,9 @@ def atomically(path: Path) -> Iterator[Path]:
         with temporary.open("rb") as file:
             os.fsync(file.fileno())
         temporary.replace(path)
+        for left in path.parent.glob(f".{glob.escape(path.name)}.*.tmp"):
+            if _LEFT.fullmatch(left.name) and not _may_be_written(left):
+                left.unlink(missing_ok=True)
     except (OSError, RuntimeError) as error:
         raise ArtifactError(f"{path}: cannot be written: {_reason(error)}") from error
     finally:
@@ -68,14 +72,14 @@ _LONGEST_WRITING = 24 * 3600
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
     for path in folder.rglob(".*.tmp"):
-        if _LEFT.fullmatch(path.name) and not _may_be_written(path):
+        # Shares of a stage may be at work on other machines.
+        shared = path.parent.suffix == SHARES
+        if _LEFT.fullmatch(path.name) and not (shared and _may_be_written(path)):
             path.unlink(missing_ok=True)
 
 
 def _may_be_written(path: Path) -> bool:
-    """Whether a share of a stage, which may be at work on another machine, could be writing this file."""
-    if path.parent.suffix != SHARES:
-        return False
+    """Whether another process could still be writing a temporary file."""
     with contextlib.suppress(FileNotFoundError):
         return time.time() - path.stat().st_mtime < _LONGEST_WRITING
     return False

@@ -18,7 +18,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.artifacts import hdf5, sample_files
-from paramreduce_cli.artifacts.atomic import remove_leftovers
+from paramreduce_cli.artifacts.atomic import atomically, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, reading, write
 from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
@@ -155,6 +155,19 @@ def test_temporary_files_of_kills_go_but_not_those_that_a_share_may_be_writing(t
     os.utime(old, (1e9, 1e9))
     remove_leftovers(tmp_path)
     assert [path.exists() for path in (new, old, left)] == [True, False, False]
+
+
+def test_what_a_kill_has_left_of_a_file_goes_when_it_is_written_again(tmp_path):
+    new, old, other = (
+        tmp_path / name for name in (".x.c.abcd1234.tmp", ".x.c.abcd5678.tmp", ".y.c.abcd5678.tmp")
+    )
+    for path in (new, old, other):
+        path.touch()
+    for path in (old, other):
+        os.utime(path, (1e9, 1e9))
+    with atomically(tmp_path / "x.c") as temporary:
+        temporary.write_text("int x;")
+    assert [path.exists() for path in (new, old, other)] == [True, False, True]
 
 
 def make_foreign(path):
