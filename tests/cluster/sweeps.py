@@ -140,18 +140,34 @@ def _below(pid):
     return found
 
 
+LOOP = """
+import numpy as np
+from paramreduce_cli.terms.matrices import times
+print(times(np.arange(12.0).reshape(2, 2, 3), np.ones((1, 2, 3))).tolist())
+"""
+"""Something that Numba compiles and keeps."""
+
+
 def started_at_once(folder, count):
-    """Start many jobs together that share an empty cache; returns how many of them fail or differ."""
-    environment = {**os.environ, "PARAMREDUCE_CACHE": str(folder / "cache")}
+    """Start many jobs together that share empty caches; returns how many of them fail or differ.
+
+    A job builds a model, which gcc compiles, and goes through a loop, which Numba does.
+    """
+    caches = {name: str(folder / "cache") for name in ("PARAMREDUCE_CACHE", "NUMBA_CACHE_DIR")}
     config = ROOT / "configs" / "two_link.yaml"
-    words = [sys.executable, "-m", "paramreduce_cli", "build-model", str(config), "--quiet"]
+    build = [sys.executable, "-m", "paramreduce_cli", "build-model", str(config), "--quiet"]
+    words = ["bash", "-c", '"$0" -c "$1" && "${@:2}"', sys.executable, LOOP, *build]
     jobs = [
-        subprocess.Popen([*words, "--results", str(folder / "starts" / str(k))], env=environment)
+        subprocess.Popen(
+            [*words, "--results", str(folder / "starts" / str(k))], env={**os.environ, **caches},
+            stdout=subprocess.PIPE, text=True,
+        )
         for k in range(count)
-    ]
-    failed = sum(job.wait() != 0 for job in jobs)
+    ]  # fmt: skip
+    said = {job.communicate()[0] for job in jobs}
+    failed = sum(job.returncode != 0 for job in jobs)
     found = set()
     for path in (folder / "starts").glob("*/model.h5"):
         with h5py.File(path) as file:
             found.add(file.attrs["digest"])
-    return failed + len(found) - 1
+    return failed + len(found) - 1 + len(said) - 1
