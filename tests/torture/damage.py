@@ -30,6 +30,8 @@ def plain(value):
         return [plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
     if isinstance(value, np.ndarray):
         return value.dtype.str, value.shape, value.tobytes()
+    if isinstance(value, float):  # what is not a number is equal to itself
+        return np.float64(value).tobytes()
     if isinstance(value, dict):
         return [[key, plain(entry)] for key, entry in value.items()]
     return [plain(entry) for entry in value] if isinstance(value, tuple | list) else value
