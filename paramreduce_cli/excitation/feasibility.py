@@ -5,7 +5,7 @@ points is mended by drawing the motion together towards a resting position insid
 """
 
 import numpy as np
-import scipy.optimize
+import scipy  # whose optimize is loaded when it is used
 
 from paramreduce_cli.errors import Concern, ConcernError, DataError
 from paramreduce_cli.excitation.fourier import FourierBasis
@@ -76,7 +76,7 @@ def resting_position(
     )
 
 
-def _stop_inside(intermediate_result: scipy.optimize.OptimizeResult) -> None:
+def _stop_inside(intermediate_result: "scipy.optimize.OptimizeResult") -> None:
     """End the search well inside the bounds."""
     if intermediate_result.fun < -_WELL_INSIDE:
         raise StopIteration

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.integrate import solve_ivp
+import scipy  # whose integrate is loaded when it is used
 
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -87,7 +87,7 @@ def simulate(
     n = start.size
     state = np.concatenate([start, np.zeros(n)])
     with np.errstate(over="ignore", invalid="ignore"):
-        found = solve_ivp(
+        found = scipy.integrate.solve_ivp(
             forward.rates, (0.0, float(time[-1])), state, _METHOD, time,
             rtol=_TOLERANCE, atol=_TOLERANCE,
         )  # fmt: skip

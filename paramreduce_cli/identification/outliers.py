@@ -1,7 +1,7 @@
 """Single samples far from their neighbours."""
 
 import numpy as np
-from scipy import ndimage
+import scipy  # whose ndimage is loaded when it is used
 
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
@@ -30,7 +30,7 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
     for piece in pieces:
         for signal, values in (("position", piece.z), ("torque", piece.tau)):
             for j, column in enumerate(values.T):
-                away = np.abs(column - ndimage.median_filter(column, _WINDOW, mode="nearest"))
+                away = np.abs(column - scipy.ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
                 limits = _FAR * np.maximum(
                     _TO_SIGMA * _around(away), _SMALL * float(np.std(column))
@@ -51,7 +51,7 @@ def _around(away: FloatArray) -> FloatArray:
     parts = [np.median(whole[k : k + _AT_ONCE], axis=1) for k in range(0, len(whole), _AT_ONCE)]
     rest = away[whole.size :]
     medians = np.concatenate([*parts, [np.median(rest)] if rest.size else []])
-    largest: FloatArray = ndimage.maximum_filter1d(medians, 3, mode="nearest")
+    largest: FloatArray = scipy.ndimage.maximum_filter1d(medians, 3, mode="nearest")
     return largest
 
 

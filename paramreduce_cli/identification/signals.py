@@ -5,7 +5,7 @@ from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+import scipy  # its interpolate takes a quarter of a second to load, so only when it is used
 
 from paramreduce_cli.config.logs import (
     ACCELERATIONS,
@@ -261,7 +261,7 @@ def _resampled(found: Signals, step: float) -> Signals:
     def at(values: FloatArray) -> FloatArray:
         result = large_matrix(time.size, values.shape[1])
         for j, column in enumerate(values.T):
-            result[:, j] = CubicSpline(found.time, column)(time)
+            result[:, j] = scipy.interpolate.CubicSpline(found.time, column)(time)
         return result
 
     dz = None if found.dz is None else at(found.dz)

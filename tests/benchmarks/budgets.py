@@ -38,7 +38,7 @@ class Spent:
     cpu: float
     wall: float
     memory: float
-    """MB, of its largest process."""
+    """MB, of its largest process, and no less than this one's, which it began as."""
 
 
 def spent(*arguments, times=1, codes=(0, 1), **environment):
@@ -128,7 +128,6 @@ def of_the_shell(folder):
         (folder / "odd.yaml").write_text(text)
         found = spent("run", folder / "odd.yaml", times=TIMES, codes=(2,))
         yield f"a config of {what}, refused", found.cpu, 1, "CPU s"
-        yield f"a config of {what}, refused", found.memory, 200, "MB"
 
 
 def of_papers_systems(folder):
@@ -153,6 +152,7 @@ def of_papers_systems(folder):
     yield "hexaglide", found.cpu, 300, "CPU s"
     yield "hexaglide", found.wall / 60, 3, "min"
     best = ["--set", "reduction.heuristics=[best-subset]", "--set", "validation.stability=false"]
+    (folder / "hexaglide" / "reduction.h5").unlink()  # whose proofs it would go on from
     found = spent("reduce", *hexaglide, *best, **caches)
     yield "hexaglide, proofs of all sizes, d", found.cpu, 60, "CPU s"
 
