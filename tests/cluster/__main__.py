@@ -27,6 +27,8 @@ from tests.cluster.sweeps import (
 
 _LONGEST = 40.0
 """Before a kill, s."""
+_LATEST = 25.0
+"""Before a kill of Slurm's controller, s; a script's jobs take longer."""
 
 
 def main():
@@ -34,6 +36,7 @@ def main():
     parser.add_argument("--robots", type=int, default=len(ROBOTS))
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--kills", type=int, default=50)
+    parser.add_argument("--daemons", type=int, default=5, help="Kills of Slurm's controller.")
     parser.add_argument("--seed", type=int, default=0, help="Of the kills.")
     parser.add_argument("--starts", type=int, default=100, help="At once, with an empty cache.")
     parser.add_argument(
@@ -82,7 +85,7 @@ def main():
         if given.kills:
             lost.extend(["kills"] * kills(fresh, given, expected, tell))
         if given.slurm != "no":
-            failed = on_slurm(folder, fresh, given.slurm == "all", expected, tell, table)
+            failed = on_slurm(folder, fresh, given, expected, tell, table)
             lost.extend(["Slurm"] * failed)
     rich.console.Console(width=110).print(table)
     sys.exit(bool(lost))
@@ -114,24 +117,28 @@ def kills(fresh, given, expected, tell):
     return failed
 
 
-def on_slurm(folder, fresh, whole, expected, tell, table):
-    """The same on a Slurm of one node, whose controller is killed on the way."""
+def on_slurm(folder, fresh, given, expected, tell, table):
+    """The same on a Slurm of one node, whose controller is killed at random moments."""
     needed = missing()
     if needed:
         table.add_row(f"Slurm: left out, {needed} is not there", "", "", "")
         return 0
     slurm = Slurm(folder / "daemons")
     try:
-        listed, results = fresh("slurm-script")
-        (listed.parent / "sweep.sh").write_text(script_of(listed))
-        slurm.run("bash", listed.parent / "sweep.sh")
-        slurm.kill_controller(after=10)
-        slurm.wait_until_idle()
-        # A controller forgets what was submitted in its last seconds: the same script goes on.
-        slurm.run("bash", listed.parent / "sweep.sh")
-        slurm.wait_until_idle()
-        tell("script on a Slurm of one node, controller killed, script again", results, expected)
-        return snakemake_on(slurm, fresh, expected, tell) if whole else 0
+        rng = random.Random(given.seed)
+        for k in range(given.daemons):
+            listed, results = fresh(f"slurm-script-{k}")
+            (listed.parent / "sweep.sh").write_text(script_of(listed))
+            slurm.run("bash", listed.parent / "sweep.sh")
+            moment = rng.uniform(0, _LATEST)
+            slurm.kill_controller(after=moment)
+            slurm.wait_until_idle()
+            # A controller forgets what was submitted in its last seconds: the same script goes on.
+            slurm.run("bash", listed.parent / "sweep.sh")
+            slurm.wait_until_idle()
+            what = f"script on a Slurm of one node, controller killed after {moment:.0f} s, script again"
+            tell(what, results, expected)
+        return snakemake_on(slurm, fresh, expected, tell) if given.slurm == "all" else 0
     finally:
         slurm.stop()
 
