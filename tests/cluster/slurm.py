@@ -111,12 +111,16 @@ class Slurm:
         """What an operator does after a controller was killed.
 
         Nodes register, so that it learns what ended while it was away; of itself it would ask in half an hour. A
-        controller killed between the start of a job and the note of it starts that job twice, and drains the node that
-        refuses the second copy: it is resumed.
+        controller killed between the start of a job and the note of it starts that job twice, drains the node that
+        refuses the second copy, and holds the job: the one is resumed, the other released.
         """
         self.run("scontrol", "reconfigure")
         if "Duplicate jobid" in self.run("sinfo", "-h", "-R"):
             self.run("scontrol", "update", f"NodeName={self._host}", "State=RESUME")
+        for line in self.run("squeue", "-h", "-r", "-o", "%i|%r").splitlines():
+            job, why = line.split("|")
+            if why == "launch failed requeued held":
+                self.run("scontrol", "release", job)
 
     def run(self, *words):
         """Call one of its commands; returns what it prints."""
