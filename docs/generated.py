@@ -44,14 +44,16 @@ def config_page() -> str:
     examples = _examples()
     for path, section, about in _sections(schema):
         lines += ["", f"## `{path}`" if path else "## At the top", "", about, ""]
-        lines += ["| key | what it takes | unit | default | what it is | example |", "| --- | --- | --- | --- | --- | --- |"]  # fmt: skip
+        lines += ["| key | what it takes | what it is |", "| --- | --- | --- |"]
         for key, entry in section.get("properties", {}).items():
             full = f"{path}.{key}" if path else key
             needed = key in section.get("required", ())
-            default = "**must be given**" if needed else _code(entry.get("default"))
-            text = _text(entry.get("description", ""))
-            cells = (f"`{key}`", _kind(entry, schema), _unit(text), default, _cell(text), _cell(examples.get(full, "see below" if "section" in _kind(entry, schema) else "")))  # fmt: skip
-            lines.append("| " + " | ".join(cells) + " |")
+            default = "**must be given**" if needed else f"default: {_default(entry)}"
+            text, kind = _text(entry.get("description", "")), _kind(entry, schema)
+            takes = ", ".join(filter(None, (kind, _unit(text))))
+            example = examples.get(full, "see below" if "section" in kind else "")
+            about = _cell(text) + (f"<br>*Example*: {_cell(example)}" if example else "")
+            lines.append(f"| `{key}` | {takes}<br>{default} | {about} |")
     return "\n".join(lines) + "\n"
 
 
@@ -226,6 +228,11 @@ def _unit(text: str) -> str:
 
 def _plural(kind: str) -> str:
     return {"a number": "numbers", "a section": "sections", "text": "texts", "a whole number": "whole numbers"}.get(kind, kind)  # fmt: skip
+
+
+def _default(entry: Schema) -> str:
+    value = entry.get("default")
+    return "as below" if isinstance(value, dict) and value else _code(value)
 
 
 def _code(value: Any, most: int = 60) -> str:
