@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.identification.processing import UNUSED
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -71,3 +72,24 @@ def _independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
     hidden = 1 - np.diag(inverse @ (X.T @ X))  # columns that others make up altogether
     shares = np.where(diagonal > 0, 1 / np.sqrt(np.maximum(diagonal, 1e-300)), 0.0)
     return np.where((lengths > 0) & (np.abs(hidden) < 1e-3), np.minimum(shares, 1.0), 0.0)
+
+
+def noise_floor(log: MeasuredLog, nominal: FloatArray) -> float:
+    """Torque error that noise alone leaves, if it is as dense in the band of the model as it is above.
+
+    Args:
+        log: Made ready.
+        nominal: Torques that errors of joints are divided by, infinite where none is measured, (n_dof,).
+
+    Returns:
+        A share of the torques that are learned from, weighted as they are.
+    """
+    half = log.rate / 2
+    cutoff = min(log.torque_cutoff, half)
+    above = half - (cutoff if np.isfinite(log.torque_cutoff) else min(log.state_cutoff, half))
+    if above <= 0:
+        return 0.0
+    used = log.training.fold != UNUSED
+    power = np.array([np.mean(tau[used] ** 2) for tau in log.training.tau.T])
+    noise = log.noise**2 * cutoff / above
+    return float(np.sqrt(np.nansum(noise / nominal**2) / np.nansum(power / nominal**2)))

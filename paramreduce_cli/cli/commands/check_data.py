@@ -59,17 +59,21 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
             found = quality(mechanism, log, loaded.measured())
     for text in log.steps:
         say(text)
-    table = rich.table.Table(box=rich.box.SIMPLE)
-    for heading in ("joint", "range", "fastest", "torque, rms", "noise", "noise / torque"):
-        table.add_column(heading, justify="left" if heading == "joint" else "right")
+    table = rich.table.Table(box=rich.box.SIMPLE, pad_edge=False, collapse_padding=True)
+    for heading in ("joint", "range", "fastest", "torque, rms", "noise", "/ torque"):
+        table.add_column(
+            heading, justify="left" if heading == "joint" else "right",
+            overflow="fold", no_wrap=heading != "joint",
+        )  # fmt: skip
     m = log.training
     for j, name in enumerate(joints):
         rms = float((m.tau[:, j] ** 2).mean() ** 0.5)
         z = m.z[:, j]
         table.add_row(
-            name, f"{z.min():.3g} ... {z.max():.3g}", f"{abs(m.dz[:, j]).max():.3g}", f"{rms:.3g}",
+            name, f"{z.min():.3g} to {z.max():.3g}", f"{abs(m.dz[:, j]).max():.3g}", f"{rms:.3g}",
             f"{log.noise[j]:.2g}", share(float(log.noise[j]) / rms if rms else None),
         )  # fmt: skip
+    table.add_row("all", "", "", "", "", share(log.noise_share))
     say_table(table, _TABLE_WIDTH)
     if found is not None:
         say(

@@ -2,9 +2,10 @@
 
 from matplotlib.figure import Figure
 
+from paramreduce_cli.identification.quality import noise_floor
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import broken, legend_beside, mark_selected, new_figure
+from paramreduce_cli.report.style import legend_beside, mark_selected, new_figure
 
 _OVER_BEST = 4.0
 """Largest error shown, times the smallest."""
@@ -12,7 +13,7 @@ _OVER_BEST = 4.0
 
 @placed(PageSection.IDENTIFICATION, 1)
 def cross_validation(data: ReportData) -> Figure | None:
-    """Torque error against the number of parameters where the selection was learned, on parts left out in turn (with one standard error), and held out."""
+    """Torque error against the number of parameters where the selection was learned, on parts left out in turn (with one standard error), and held out; what noise alone would leave, if it is as dense within the band of the model as above."""
     crossed = data.validation.cross_validation
     if crossed is None:
         return None
@@ -30,11 +31,14 @@ def cross_validation(data: ReportData) -> Figure | None:
     limit = 100 * float(own.mean[k] + own.standard_error[k])
     axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")
     if data.log is not None:
-        floor = 100 * data.log.noise_share
-        axes.annotate(
-            broken(f"noise above the band of the model: {floor:.2g} % of the torques as recorded"), (0.98, 0.03),
-            xycoords="axes fraction", ha="right", va="bottom", fontsize="small", color="#57606a",
-        )  # fmt: skip
+        floor = 100 * noise_floor(data.log, data.reduction.nominal_torque)
+        axes.axhline(
+            floor,
+            color="#57606a",
+            linewidth=1.0,
+            linestyle="--",
+            label=f"noise alone: {floor:.2g} %",
+        )
     best = 100 * float(own.mean.min())
     axes.set_ylim(0, _OVER_BEST * best)
     mark_selected(axes, data)
