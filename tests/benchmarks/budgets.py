@@ -17,12 +17,18 @@ import rich.console
 import rich.table
 import yaml
 
+from paramreduce_cli.artifacts.store import load_file
 from paramreduce_cli.lean import search
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import ProofStatus, Reduction
+from paramreduce_cli.reduction.criteria.torque import TorqueObjective
+from paramreduce_cli.reduction.task import Effort, SelectionTask, run
 from tests.benchmarks.growth import ANGLES, chain
+from tests.benchmarks.random_columns import drawn
 from tests.cli.test_odd_inputs import ALIASES
 from tests.conftest import dh, random_states
+from tests.selecting import problem
 
 ROOT = Path(__file__).resolve().parents[2]
 PROGRAM = (sys.executable, "-m", "paramreduce_cli")
@@ -169,6 +175,38 @@ def of_searches():
         yield f"search for formulations, {n} joints", time.process_time() - started, limit, "CPU s"
 
 
+def of_proofs(folder):
+    """Best subsets of up to 20 columns: of arms with seven joints, and of random columns whose neighbours are correlated."""
+    path = config(folder, "arm7", serial(7))
+    made = [path, "--results", folder / "arm7"]
+    for stage in ("build-model", "optimize-trajectories", "sample"):
+        spent(stage, *made)
+    best = (
+        "--set", "reduction.heuristics=[best-subset]", "--set", "selected.heuristic=best-subset",
+        "--set", "reduction.stop.parameters=20",
+    )  # fmt: skip
+    found = spent("reduce", *made, *best)
+    proofs = load_file(folder / "arm7" / "reduction.h5", Reduction, None, "reduce")[0].proofs
+    what = f"best subsets of an arm of 7 joints, {proven(proofs)} of 20 sizes proven"
+    yield what, found.wall, 60, "s"
+    objective = TorqueObjective(problem(*drawn(80, 20, 0.5, 0)))
+    effort = Effort(time_limit=60.0, jobs=os.cpu_count() or 1)
+    started = time.perf_counter()
+    proofs = run("best-subset", SelectionTask(objective, largest=20, effort=effort)).proofs
+    seconds = time.perf_counter() - started
+    yield (
+        f"best subsets of 80 random columns, {proven(proofs)} of 20 sizes proven",
+        seconds,
+        60,
+        "s",
+    )
+
+
+def proven(proofs):
+    """How many sizes are."""
+    return sum(status is ProofStatus.OPTIMAL for status in proofs.status)
+
+
 def of_large_mechanisms(folder):
     """Chains and a humanoid through the stages."""
     for name, parents, limit in (
@@ -194,6 +232,7 @@ def main():
         for what, took, limit, unit in itertools.chain(
             of_the_shell(folder),
             of_searches(),
+            of_proofs(folder),
             of_large_mechanisms(folder),
             of_papers_systems(folder),
         ):

@@ -107,33 +107,44 @@ def headers():
     return [prefix / "include", prefix / "include" / "eigen3"]
 
 
-def driver():
-    """The compiled driver."""
+CONTRACTED, APART = "-ffp-contract=fast", "-ffp-contract=off"
+"""Whether a * b + c is one instruction."""
+
+
+def driver(contraction):
+    """The compiled driver with exported code compiled one way or the other."""
     files = sources()
     digest = hashlib.sha256()
     for name, content in sorted(files.items()):
         digest.update(name.encode() + content)
     folder = cache() / digest.hexdigest()[:16]
-    program = folder / "lean_code"
+    program = folder / f"lean_code{contraction}"
     if program.exists():
         return program
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in files.items():
         (folder / name).write_bytes(content)
+    if not (folder / "lean_code.o").exists():
+        includes = [f"-I{path}" for path in headers()]
+        defined = [f"-D{one}" for one in DEFINITIONS]
+        command = ["g++", "-std=c++17", "-w", *FLAGS, *defined, *includes, "-c", "lean_code.cpp"]
+        subprocess.run([*command, "-o", "building.o"], cwd=folder, check=True)
+        (folder / "building.o").rename(folder / "lean_code.o")
     c_files = sorted(name for name in files if name.endswith(".c"))
-    subprocess.run(["gcc", "-std=gnu99", *FLAGS, "-c", *c_files], cwd=folder, check=True)
+    subprocess.run(
+        ["gcc", "-std=gnu99", *FLAGS, contraction, "-c", *c_files], cwd=folder, check=True
+    )
     objects = [name.replace(".c", ".o") for name in c_files]
-    includes = [f"-I{path}" for path in headers()]
-    defined = [f"-D{one}" for one in DEFINITIONS]
-    command = ["g++", "-std=c++17", "-w", *FLAGS, *defined, *includes, "lean_code.cpp", *objects]
-    subprocess.run([*command, "-o", "building", "-lm"], cwd=folder, check=True)
+    subprocess.run(
+        ["g++", "lean_code.o", *objects, "-o", "building", "-lm"], cwd=folder, check=True
+    )
     (folder / "building").rename(program)
     return program
 
 
-def measured():
+def measured(contraction=CONTRACTED):
     """Nanoseconds a state by name, of all rounds; on one core, which it keeps."""
-    program, core = driver(), max(os.sched_getaffinity(0))
+    program, core = driver(contraction), max(os.sched_getaffinity(0))
     command = [sys.executable, "-c", PINNED, str(core), program]
     lines = subprocess.run(command, capture_output=True, text=True, check=True).stdout
     return {name: np.array(times, float) for name, *times in map(str.split, lines.splitlines())}
@@ -169,6 +180,14 @@ def rows():
     what = "[M, delta] without small terms"
     yield compared(f"{what} / crba + bias", t["terms_M_ddm"], t["crba_bias"], 1 / 14)
     yield compared(f"{what}, batched / crba + bias", t["terms_M_ddm_batch"], t["crba_bias"], 1 / 60)
+
+    apart = measured(APART)
+    for name in ("full", "fs18"):
+        for what in ("idm", "idm_batch", "ddm_batch"):
+            key = f"{name}_{what}"
+            # Over rnea in the same run, as the two are programs of their own.
+            shares = [times[key] / times["rnea"] for times in (t, apart)]
+            yield compared(f"{name} {what}, a * b + c contracted / not", *shares, 1.0)
 
 
 if __name__ == "__main__":

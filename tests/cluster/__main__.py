@@ -74,14 +74,13 @@ def main():
         for again in ("", ", and again"):
             calls = len(scheduled(listed.parent, text))
             tell(f"script for sbatch, {calls} calls{again}", results, expected)
-        wrong = started_at_once(folder, given.starts)
-        lost.extend(["starts"] * wrong)
-        table.add_row(
-            f"{given.starts} starts at once, empty cache",
-            str(given.starts),
-            str(given.starts - wrong),
-            "",
-        )
+        if given.starts:
+            wrong = started_at_once(folder, given.starts)
+            lost.extend(["starts"] * wrong)
+            equal = str(given.starts - wrong)
+            table.add_row(
+                f"{given.starts} starts at once, empty cache", str(given.starts), equal, ""
+            )
         if given.kills:
             lost.extend(["kills"] * kills(fresh, given, expected, tell))
         if given.slurm != "no":
