@@ -6,7 +6,7 @@ import types
 
 import h5py
 import pytest
-from conftest import ONE_FORMAT, TWO_LINK, summary_of
+from conftest import CONFIGS, ONE_FORMAT, TWO_LINK, summary_of
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
@@ -300,3 +300,13 @@ def test_the_first_trajectory_with_a_way_is_exported():
     assert _first(trajectories, timed) == ("estimation:2", "estimation:2")
     with pytest.raises(DataError, match="no way to the first"):
         _first(types.SimpleNamespace(estimation=(1,)), timed)
+
+
+def test_init_asks_for_the_motion_of_a_base_that_floats(invoke, tmp_path):
+    logs, path = CONFIGS / "logs", tmp_path / "ur10.yaml"
+    words = ("init", logs / "ur10.urdf", "--log", logs / "ur10.csv.gz", "--output", path)
+    refused = " ".join(invoke(*words, "--floating", code=2).err.split())
+    assert "none for the coordinates of the base (q_" in refused
+    assert "leave --floating out" in refused
+    assert not path.exists()
+    invoke(*words)

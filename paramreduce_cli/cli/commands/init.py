@@ -26,6 +26,8 @@ from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.reading import described, imported
 from paramreduce_cli.importing.writing import config_text
 
+_BASE = 6
+"""Coordinates of a base that floats, which come first."""
 _FARTHEST = 1e6
 """Where a joint may be locked, rad or m."""
 
@@ -93,7 +95,8 @@ def init(
     else:
         robot = imported(choice)
         path = output or Path("configs") / f"{robot.name}.yaml"
-        log = _log(path, logs, robot.independent) if logs else ""
+        base = robot.independent[:_BASE] if floating else ()
+        log = _log(path, logs, robot.independent, base) if logs else ""
         text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
         for remark in robot.remarks:
             say(f"- {remark}.")
@@ -109,11 +112,25 @@ def init(
     say(f"Wrote {path}. {todo}paramreduce run {quote(str(path))}")
 
 
-def _log(config: Path, logs: Sequence[Path], joints: Sequence[str]) -> str:
-    """The section for logs, with columns by their usual names."""
+def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequence[str]) -> str:
+    """The section for logs, with columns by their usual names.
+
+    Raises:
+        ConfigError: Positions or torques have none, of the joints or of a base that floats.
+    """
     from paramreduce_cli.artifacts.log_files import load_log  # late: HDF5 and NumPy
 
-    columns = guessed_columns(list(load_log(logs[0]).columns), joints)
+    names = list(load_log(logs[0]).columns)
+    try:
+        columns = guessed_columns(names, joints)
+    except ConfigError as error:
+        if not base:
+            raise
+        guessed_columns(names, joints[len(base) :])
+        raise ConfigError(
+            f"{logs[0]}: has columns for the joints, but none for the coordinates of the base ({', '.join(base)}). If it stood "
+            "still, leave --floating out. If its motion was recorded under other names, leave --log out, and write sampling.log into the config."
+        ) from error
     for key, value in columns.items():
         shown = value if isinstance(value, str) else ", ".join(value)
         say(f"- {key}: {shown}.")
