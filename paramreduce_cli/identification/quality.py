@@ -82,7 +82,8 @@ def noise_floor(log: MeasuredLog, nominal: FloatArray) -> float:
         nominal: Torques that errors of joints are divided by, infinite where none is measured, (n_dof,).
 
     Returns:
-        A share of the torques that are learned from, weighted as they are.
+        A share of the torques that are learned from, each joint's divided by the nominal ones; zero where all frequencies are in
+        the band, so that nothing tells of noise.
     """
     half = log.rate / 2
     cutoff = min(log.torque_cutoff, half)

@@ -28,9 +28,8 @@ def test_the_noise_floor_is_what_white_noise_leaves(torque_cutoff):
     left, tau = (passed[0] - passed[1])[used], passed[0][used]
     expected = np.linalg.norm(left / nominal) / np.linalg.norm(tau / nominal)
     assert noise_floor(noisy, nominal) == pytest.approx(expected, rel=0.15)
-    assert (
-        noise_floor(clean, nominal) < 0.2 * expected
-    )  # what is there above 10 Hz is Coulomb friction
+    # What the other one has above 10 Hz is Coulomb friction.
+    assert noise_floor(clean, nominal) < 0.2 * expected
 
 
 def test_joints_whose_torques_are_not_measured_have_no_part_in_it():

@@ -30,15 +30,10 @@ def cross_validation(data: ReportData) -> Figure | None:
     k = int(own.mean.argmin())
     limit = 100 * float(own.mean[k] + own.standard_error[k])
     axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")
-    if data.log is not None:
-        floor = 100 * noise_floor(data.log, data.reduction.nominal_torque)
-        axes.axhline(
-            floor,
-            color="#57606a",
-            linewidth=1.0,
-            linestyle="--",
-            label=f"noise alone: {floor:.2g} %",
-        )
+    floor = 0.0 if data.log is None else noise_floor(data.log, data.reduction.nominal_torque)
+    if floor > 0:
+        label = f"noise alone: {100 * floor:.2g} %"
+        axes.axhline(100 * floor, color="#57606a", linewidth=1.0, linestyle="--", label=label)
     best = 100 * float(own.mean.min())
     axes.set_ylim(0, _OVER_BEST * best)
     mark_selected(axes, data)
