@@ -14,13 +14,26 @@ from paramreduce_cli.identification.expectations import (
 )
 from paramreduce_cli.identification.hints import hints, negative_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import INERTIAL, Estimate, FloatArray, Kind, Model, SampleSet
+from paramreduce_cli.records import (
+    INERTIAL,
+    Consistency,
+    Estimate,
+    FloatArray,
+    Kind,
+    Model,
+    SampleSet,
+)
 from paramreduce_cli.texts import share
 
 _HARDLY = 0.3
 """Share of the torques that is left where hardly anything was understood."""
 _FARTHER = 2.5
 """Times the error of what was learned from, from which on what was held out is said to be missed."""
+_IMPOSSIBLE = 1.15
+"""Times the error of base parameters, from which on that of bodies which can exist is another; 1.00 to 1.06 on logs of the robot
+itself, 1.26 to 1.32 with the kinematics of others."""
+_BESIDE = 0.003
+"""Share of the torques that it must be more by: solvers are not exact."""
 _NOTABLE = 0.1
 """Share of the torques from which on that is worth a word."""
 _FRICTION = (Kind.COULOMB, Kind.VISCOUS)
@@ -35,7 +48,12 @@ _ENOUGH = 6000
 
 
 def suspicions(
-    model: Model, training: SampleSet, full: Estimate, fitted: LinearFit, delay: float
+    model: Model,
+    training: SampleSet,
+    full: Estimate,
+    fitted: LinearFit,
+    consistency: Consistency | None,
+    delay: float,
 ) -> list[str]:
     """Sentences on what looks wrong.
 
@@ -44,6 +62,7 @@ def suspicions(
         training: What was learned from.
         full: All base parameters.
         fitted: Their fit, with its residuals.
+        consistency: What bodies that can exist explain; None where that is not known.
         delay: Of the torques, that was taken back already, s.
     """
     looked_at = _some(model, training)
@@ -74,6 +93,7 @@ def suspicions(
             ],
         ),
         *_friction_doubts(model, full),
+        *_impossible(full, consistency),
     ]
 
 
@@ -88,6 +108,18 @@ def _missed(full: Estimate) -> Iterator[str]:
         yield (
             f"Torques that were held out are missed by {share(full.held_out)}, those that were learned from by "
             f"{share(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?"
+        )
+
+
+def _impossible(full: Estimate, consistency: Consistency | None) -> Iterator[str]:
+    """What bodies say that would explain the torques and cannot exist, as those of another robot's kinematics."""
+    if consistency is None or full.train > _HARDLY:
+        return
+    if consistency.train > max(_IMPOSSIBLE * full.train, full.train + _BESIDE):
+        yield (
+            f"Bodies and friction that can exist leave {share(consistency.train)} of the torques unexplained, base "
+            f"parameters without that restriction {share(full.train)}: is the log of this robot, are the kinematics in "
+            "the config right, and are friction and rotors modelled?"
         )
 
 

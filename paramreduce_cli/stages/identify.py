@@ -59,11 +59,12 @@ def identify(
     tell(Progress("identification", 1, _STEPS, "base parameters"))
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
     tell(Progress("identification", 2, _STEPS, "selected parameters"))
-    suspected = suspicions(model, training, full, full_fit, delay=0.0 if log is None else log.delay)
+    consistency = _consistency(identification, model, samples, deviation)
+    delay = 0.0 if log is None else log.delay
+    suspected = suspicions(model, training, full, full_fit, consistency, delay)
     for text in suspected:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _shown(held_out)
-    consistency = _consistency(identification, model, samples, deviation)
     tell(Progress("identification", _STEPS, _STEPS))
     return Identification(
         estimator=identification.estimator,

@@ -265,3 +265,14 @@ def test_folds_of_which_nothing_is_left_are_none(tmp_path, invoke):
     )[0]
     assert 2 <= found.full.folds.size < 12
     assert found.full.folds.min() > 1e-3
+
+
+def test_a_log_of_other_kinematics_is_suspected(tmp_path, invoke):
+    """Base parameters take up much of it; bodies that can exist do not."""
+    pytest.importorskip("cvxpy")
+    write_log(tmp_path / "log.csv", two_link_log())
+    path = log_config(tmp_path)
+    path.write_text(path.read_text().replace("{name: fore, a: 0.5}", "{name: fore, a: 0.5, alpha: pi/2}"))  # fmt: skip
+    settings = ["report.formats=[svg]"]
+    error = invoke("run", path, "--results", tmp_path / "r", settings=settings).err
+    assert "are the kinematics in the config right" in " ".join(error.split())
