@@ -24,7 +24,7 @@ def compared(full: Estimate, reduced: Estimate) -> str:
         verdict = "is as good as the full one"
     n, m = len(reduced.names), len(full.names)
     text = (
-        f"Held out, {n} parameters have an error of {share(reduced.held_out)}, all {m} "
+        f"Held out, the error of {n} parameters is {share(reduced.held_out)}, that of all {m} is "
         f"{share(full.held_out)}: the reduced model {verdict}."
     )
     if full.folds.size < 2 or full.folds.size != reduced.folds.size:

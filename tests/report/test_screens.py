@@ -21,10 +21,13 @@ COARSE = 16
 MEAN, PART = 4.0, 0.02
 """Mean difference of 255, and share of pixels that may differ by more than a quarter of that range."""
 STATES = {
-    "top": {"width": 1280},
-    "top-phone-dark": {"width": 390, "dark": True},
-    "explorer": {"width": 1280, "place": "explorer"},
-    "explorer-phone": {"width": 390, "place": "explorer"},
+    "top": ("two_link_results", {"width": 1280}),
+    "top-phone-dark": ("two_link_results", {"width": 390, "dark": True}),
+    "explorer": ("two_link_results", {"width": 1280, "place": "explorer"}),
+    "explorer-phone": ("two_link_results", {"width": 390, "place": "explorer"}),
+    "measured-top": ("measured_page", {"width": 1280}),
+    "measured": ("measured_page", {"width": 1280, "place": "identification"}),
+    "measured-phone-dark": ("measured_page", {"width": 390, "place": "identification", "dark": True}),
 }
 FONT = "DejaVuSans.ttf"
 """With which the stored thumbnails were made."""
@@ -38,6 +41,13 @@ def font():
     return Path(done.stdout).name
 
 
+@pytest.fixture
+def measured_page(measured_results):
+    """A run on a log, whose page tells what the measurements say."""
+    pytest.importorskip("cvxpy")  # without it a part of the page is not there
+    return measured_results / "results"
+
+
 def thumbnail(picture):
     image = Image.open(BytesIO(picture)).convert("RGB")
     size = (image.width // COARSE, image.height // COARSE)
@@ -47,9 +57,10 @@ def thumbnail(picture):
 @pytest.mark.skipif(MISSING, reason="there is no Chromium with its driver")
 @pytest.mark.skipif(font() != FONT, reason=f"the page is not set in {FONT} here")
 @pytest.mark.parametrize("state", STATES)
-def test_the_page_looks_as_it_did(two_link_results, state):
-    page = two_link_results / "report" / "index.html"
-    with opened(page, **STATES[state]) as driver:
+def test_the_page_looks_as_it_did(request, state):
+    results, seen_as = STATES[state]
+    page = request.getfixturevalue(results) / "report" / "index.html"
+    with opened(page, **seen_as) as driver:
         seen = thumbnail(driver.get_screenshot_as_png())
     path = SCREENS / f"{state}.png"
     if os.environ.get("RENEW_SCREENS"):
