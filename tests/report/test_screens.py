@@ -27,7 +27,10 @@ STATES = {
     "explorer-phone": ("two_link_results", {"width": 390, "place": "explorer"}),
     "measured-top": ("measured_page", {"width": 1280}),
     "measured": ("measured_page", {"width": 1280, "place": "identification"}),
-    "measured-phone-dark": ("measured_page", {"width": 390, "place": "identification", "dark": True}),
+    "measured-phone-dark": (
+        "measured_page",
+        {"width": 390, "place": "identification", "dark": True},
+    ),
 }
 FONT = "DejaVuSans.ttf"
 """With which the stored thumbnails were made."""
