@@ -30,10 +30,11 @@ _HARDLY = 0.3
 _FARTHER = 2.5
 """Times the error of what was learned from, from which on what was held out is said to be missed."""
 _IMPOSSIBLE = 1.15
-"""Times the error of base parameters, from which on that of bodies which can exist is another; 1.00 to 1.06 on logs of the robot
-itself, 1.26 to 1.32 with the kinematics of others."""
+"""Error of bodies that can exist over that of base parameters, from which on kinematics are doubted: between 1.00 to 1.06 on logs
+of three robots themselves, and 1.26 to 1.32 with the kinematics of others (docs/logs.md)."""
 _BESIDE = 0.003
-"""Share of the torques that it must be more by: solvers are not exact."""
+"""Share of the torques by which errors must differ besides: solvers are not exact, and where a low-pass leaves little, base
+parameters fit noise that bodies cannot (0.0016 on the Panda's own log with a cut-off from the spectrum; 0.007 with other kinematics)."""
 _NOTABLE = 0.1
 """Share of the torques from which on that is worth a word."""
 _FRICTION = (Kind.COULOMB, Kind.VISCOUS)
@@ -112,7 +113,7 @@ def _missed(full: Estimate) -> Iterator[str]:
 
 
 def _impossible(full: Estimate, consistency: Consistency | None) -> Iterator[str]:
-    """What bodies say that would explain the torques and cannot exist, as those of another robot's kinematics."""
+    """What is said where only bodies that cannot exist explain the torques, as with another robot's kinematics."""
     if consistency is None or full.train > _HARDLY:
         return
     if consistency.train > max(_IMPOSSIBLE * full.train, full.train + _BESIDE):
