@@ -126,23 +126,6 @@ class LeanModels:
         zero[kept] = False
         return zero
 
-    def several(self, model: ReducedModel, most: int, *, direct: bool) -> list[Program]:
-        """The inverse or the direct dynamics in the formulations that take the fewest operations.
-
-        Args:
-            model: Which parameters are kept, and which have one value.
-            most: How many formulations are wanted.
-            direct: Which of the two.
-
-        Returns:
-            Different programs, the leanest first.
-        """
-        variants = self._direct if direct else self._inverse
-        written = [self._written(program, model, constant=False) for program in variants.programs]
-        made = [Program.of_graph(*least([one])) for one in written]
-        made.sort(key=lambda program: program.n_operations)
-        return list(dict.fromkeys(made))[:most]
-
     def _leanest(self, variants: _Variants, model: ReducedModel, constant: bool) -> Program:
         """The formulation with the fewest operations."""
         promising = variants.promising(self._dropped(model.kept))

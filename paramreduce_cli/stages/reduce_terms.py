@@ -25,12 +25,12 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Judge
-from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.simplify import Simplified, simplified
+from paramreduce_cli.terms.simplify import LookedAt, Simplified, simplified
 from paramreduce_cli.terms.starts import starts_within
 
-_SEARCHED, _WATCHED = 300, 200
-"""Samples of the estimation and the validation set that are looked at while terms are left out."""
+_FIRST, _CLOSELY = (300, 200), (1000, 500)
+"""Samples of the estimation and the validation set that are looked at while terms are left out, at first and
+in the end."""
 _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
 _PARTS = 4
@@ -105,10 +105,9 @@ def _searched(
     def progress(share: float, remark: str) -> None:
         run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
 
-    searched, watched = _looked_at(judge, samples)
     found, front = simplified(
-        lean, starts, searched, watched, judge.poses(_POSES),
-        budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
+        lean, starts, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
+        judge.poses(_POSES), budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
     )  # fmt: skip
     fitted = judge.thinned(samples.estimation, _FITTED)
     way = [one.refitted(fitted, budget) for one in front]
@@ -116,21 +115,21 @@ def _searched(
     return next((record for record in records if record is not None), None)
 
 
-def _looked_at(judge: Judge, samples: Samples) -> tuple[TermSamples, TermSamples | None]:
-    """What parameters are fitted to while terms are left out, and what errors are watched on.
+def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
+    """So many samples that parameters are fitted to while terms are left out, and that errors are watched on.
 
     Measured torques: both are of the training part, quarters of it by turns, as one motion alone says
     little of what a program without terms is worth on another.
     """
     if judge.measured:
-        some = judge.thinned(samples.estimation, _SEARCHED + _WATCHED)
+        some = judge.thinned(samples.estimation, searched + watched)
         count = some.states.shape[1]
         fitted = np.arange(count) * _PARTS // count % 2 == 0
-        return some.some(fitted), some.some(~fitted)
-    searched = judge.thinned(samples.estimation, _SEARCHED)
+        return LookedAt(some.some(fitted), some.some(~fitted))
+    fitted_to = judge.thinned(samples.estimation, searched)
     if samples.validation is None:
-        return searched, None
-    return searched, judge.thinned(samples.validation, _WATCHED)
+        return LookedAt(fitted_to, None)
+    return LookedAt(fitted_to, judge.thinned(samples.validation, watched))
 
 
 def _say_missing(names: list[str], others: bool) -> None:

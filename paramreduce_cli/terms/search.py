@@ -13,6 +13,7 @@ import numpy as np
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.fitting import Costs, Fit, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
+from paramreduce_cli.terms.tape import Remains
 
 _TRIED = 8
 """Most promising terms that are tried: by the error with parameters fitted again, and without."""
@@ -114,6 +115,24 @@ class Search:
             if now.count > best.count + 2:
                 now = best
         return self.descended(best, visit)
+
+    def mended(self, left: Remains, beta: FloatArray) -> Step:
+        """What is left of a program, with as many terms put back as errors need to be allowed, if that is enough.
+
+        Args:
+            left: Of the program.
+            beta: Values to start from.
+        """
+        return self._step(self._mended(self._fitting.fit(left, beta, looks=2), [], self._tape.size))
+
+    def _mended(self, fit: Fit, back: list[int], most: int) -> Fit:
+        """With terms put back until errors are allowed, so many at most; note their numbers."""
+        for _ in range(most):
+            changed = fit if fit.within else self._one_back(fit, back, 0.0)
+            if changed is fit:
+                break
+            fit = changed
+        return fit
 
     def _next(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
         """The program with the cheapest terms left out, None if all are too dear."""
@@ -226,13 +245,7 @@ class Search:
         out = int(numbers[order[self._drawn(order.size, 2 * _SPREAD)]])
         fit = self._with(step.fit, self._candidates[out][None])
         back: list[int] = [out]
-        for _ in range(_BACK[1]):
-            if fit.within:
-                break
-            mended = self._one_back(fit, back, 0.0)
-            if mended is fit:
-                break
-            fit = mended
+        fit = self._mended(fit, back, _BACK[1])
         return self._step(fit), np.array(back[1:], dtype=np.int64)
 
     def _one_back(self, fit: Fit, back: list[int], spread: float) -> Fit:

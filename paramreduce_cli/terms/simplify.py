@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
@@ -15,18 +16,24 @@ from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
-from paramreduce_cli.terms.fitting import Budget, Fit, Fitting
+from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import Search, Step
-from paramreduce_cli.terms.starts import Start
-from paramreduce_cli.terms.tape import Tape
+from paramreduce_cli.terms.starts import Start, promising
+from paramreduce_cli.terms.tape import Remains, Tape
 
-_FORMULATIONS = 2
-"""Of each start that are gone down from."""
-_LEAN, _LOOKED_AT = 3, 60
-"""Leanest starts that are gone down from, and how many are looked at to find them."""
-_IMPROVED = 3
-"""Ends of descents from which the search goes on."""
+_LOOKED_AT = 60
+"""Starts that are looked at for the smallest one within the budget, at most."""
+_FEWEST, _MOST = 12, 60
+"""Programs that are gone down from, as many as :data:`_WORK` allows."""
+_WORK = 75_000
+"""Operations times torques, of all of these: time grows a little faster."""
+_IMPROVED = (10, 5)
+"""Ends of descents from which the search goes on: from many for a while, from the best of them for longer."""
+_CLOSELY = 3
+"""Best ends of all, from which it goes on longest, with more samples."""
+_SAME = 6
+"""Digits of the sums of squared errors, over those allowed, of ends that are taken for the same."""
 _LEANEST = 12
 """Programs that are looked at closely, the leanest of each search."""
 _LOOKS = 3
@@ -79,6 +86,26 @@ class Simplified:
 
 
 @dataclass(frozen=True)
+class LookedAt:
+    """Samples that are looked at while terms are left out."""
+
+    samples: TermSamples
+    """What parameters are fitted to."""
+    watched: TermSamples | None
+    """On which errors must be within the budget as well."""
+
+
+@dataclass(frozen=True)
+class _Passed:
+    """A program on the way: less of its fit than would fill the memory."""
+
+    left: Remains
+    beta: FloatArray
+    cost: float
+    excess: float
+
+
+@dataclass(frozen=True)
 class _Way:
     """A search from one program, and what it has come by."""
 
@@ -87,8 +114,8 @@ class _Way:
     search: Search
     tape: Tape
     end: Step
-    visited: dict[int, Fit]
-    """The best fit of every number of operations."""
+    visited: dict[int, _Passed]
+    """The best one of every number of operations."""
     stop: threading.Event
     """Set where the search is to end at once."""
 
@@ -98,21 +125,22 @@ class _Way:
             raise KeyboardInterrupt
         known = self.visited.get(step.count)
         if known is None or step.fit.excess < known.excess:
-            self.visited[step.count] = step.fit
+            fit = step.fit
+            self.visited[step.count] = _Passed(fit.left, fit.beta, fit.cost, fit.excess)
 
-    def simplified(self, fit: Fit) -> Simplified:
+    def simplified(self, passed: _Passed) -> Simplified:
         """A program on the way, its sums and products rearranged."""
         graph = Graph()
-        outputs = self.tape.rebuilt(fit.left).rebuilt(graph)
+        outputs = self.tape.rebuilt(passed.left).rebuilt(graph)
         program = Program.of_graph(*least([Written(graph, outputs)]))
-        return Simplified(self.start, self.operations_start, program, fit.beta)
+        return Simplified(self.start, self.operations_start, program, passed.beta)
 
 
 def simplified(
     lean: LeanModels,
-    starts: tuple[list[Start], list[Start]],
-    samples: TermSamples,
-    watched: TermSamples | None,
+    starts: list[Start],
+    looked_at: LookedAt,
+    closely: LookedAt,
     poses: TermSamples | None,
     budget: Budget,
     *,
@@ -124,14 +152,14 @@ def simplified(
 ) -> tuple[list[Simplified], list[Simplified]]:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
-    Every start is gone down from in its leanest formulations; from the best ends terms are put back
+    Starts are gone down from in their leanest formulations; from the best ends terms are put back
     and others left out instead.
 
     Args:
         lean: Programs of reduced models.
-        starts: Where to go down from: the first few that are within the budget, and all of others.
-        samples: What parameters are fitted to.
-        watched: Samples on which errors must be within the budget as well.
+        starts: Subsets to go down from, the smallest first; how many depends on their size.
+        looked_at: Samples.
+        closely: More samples, for the best of what was found.
         poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
         direct: Whether [M | delta] is meant, not torques.
@@ -147,33 +175,36 @@ def simplified(
     stop = threading.Event()
     ended: list[int] = []
 
-    def begun(start: Start, program: Program) -> _Way:
+    def begun(start: Start) -> _Way:
+        program = (lean.direct if direct else lean.inverse)(start.model)
         n, n_standard, place = start.model.n, lean.n_parameters, start.model.position
         # First the parameters of the model, not all standard ones.
         tape = Tape(
             program.renumbered(lambda k: k - n_standard + n if k >= n_standard else int(place[k]))
         )
-        search = Search(Fitting(tape, start.model.n, samples, budget, watched, poses), seed)
+        search = searched(start, tape, looked_at)
         return _Way(
             start, program.n_operations, search, tape, search.start(start.model.values), {}, stop
         )
 
-    def several(start: Start) -> list[_Way]:
-        programs = lean.several(start.model, _FORMULATIONS, direct=direct)
-        return [way for way in (begun(start, p) for p in programs) if way.end.fit.within]
+    def searched(start: Start, tape: Tape, some: LookedAt) -> Search:
+        fitting = Fitting(tape, start.model.n, some.samples, budget, some.watched, poses)
+        return Search(fitting, seed)
 
+    ways = map(begun, starts[:_LOOKED_AT])
+    smallest = next((way.start for way in ways if way.end.fit.within), None)
+    if smallest is None:
+        return [], []
     begins: list[_Way] = []
-    for start in starts[0][:_LOOKED_AT]:
-        begins += several(start)
-        if len(begins) >= _LEAN * _FORMULATIONS:
+    for way in map(begun, promising(starts, smallest.model.n)):
+        begins += [way] if way.end.fit.within else []
+        if len(begins) >= _affordable(begins, looked_at.samples):
             break
-    known = {way.start.model.names for way in begins}
-    begins += [way for s in starts[1] if s.model.names not in known for way in several(s)]
-    total = len(begins) + _IMPROVED
+    total = len(begins) + sum(_IMPROVED) + _CLOSELY
 
     def tell(operations: int) -> None:
         ended.append(operations)
-        progress(len(ended) / total, f"{min(ended)} operations")
+        progress(min(1.0, len(ended) / total), f"{min(ended)} operations")
 
     def descended(way: _Way) -> _Way:
         way.note(way.end)
@@ -181,32 +212,63 @@ def simplified(
         tell(way.end.count)
         return way
 
-    def improved(way: _Way) -> None:
-        way.search.improved(way.end, rounds, way.note)
+    def improved(way: _Way, rounds: int) -> _Way:
+        way = replace(way, end=way.search.improved(way.end, rounds, way.note))
         tell(min(way.visited))
+        return way
+
+    def refined(way: _Way) -> _Way:
+        search = searched(way.start, way.tape, closely)
+        end = search.mended(way.end.fit.left, way.end.fit.beta)
+        way = replace(way, search=search, end=end, visited={})
+        if not end.fit.within:
+            return way
+        way.note(end)
+        return improved(way, rounds)
 
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:
         try:
-            ends = sorted(pool.map(descended, begins), key=lambda way: way.end.count)
-            best = ends[:_IMPROVED]
-            list(pool.map(improved, best))
+            best = list(pool.map(descended, begins))
+            for k, number in enumerate(_IMPROVED):
+                share = rounds >> len(_IMPROVED) - k
+                best = list(
+                    pool.map(improved, _leanest_ends(best, number), itertools.repeat(share))
+                )
+            close = list(pool.map(refined, _leanest_ends(best, _CLOSELY)))
         except BaseException:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
     leanest = heapq.nsmallest(
-        _LEANEST, ((count, k) for k, way in enumerate(best) for count in way.visited)
+        _LEANEST, ((count, k) for k, way in enumerate(close) for count in way.visited)
     )
-    found = [best[k].simplified(best[k].visited[count]) for count, k in leanest]
+    found = [close[k].simplified(close[k].visited[count]) for count, k in leanest]
     found.sort(key=lambda entry: entry.program.n_operations)
-    return found, _front(best)
+    return found, _front(_leanest_ends(best, _CLOSELY) + close)
+
+
+def _affordable(ways: Sequence[_Way], samples: TermSamples) -> int:
+    """How many programs such as some are gone down from."""
+    work = np.mean([way.operations_start for way in ways]) * samples.tau.shape[0] if ways else 1
+    return int(np.clip(_WORK / work, _FEWEST, _MOST))
+
+
+def _leanest_ends(ways: Iterable[_Way], number: int) -> list[_Way]:
+    """The ways to the leanest different ends."""
+    ordered = sorted(ways, key=lambda way: (way.end.count, way.end.fit.strain))
+    different = {
+        (way.end.count, round(way.end.fit.strain, _SAME)): way for way in reversed(ordered)
+    }
+    return list(different.values())[::-1][:number]
 
 
 def _front(ways: list[_Way]) -> list[Simplified]:
     """Programs on the way that no leaner one beats, some of them, evenly spread."""
     entries = sorted(
-        (count, fit.cost, k) for k, way in enumerate(ways) for count, fit in way.visited.items()
+        (count, passed.cost, k)
+        for k, way in enumerate(ways)
+        for count, passed in way.visited.items()
     )
     kept: list[tuple[int, int]] = []
     least_cost = np.inf

@@ -1,30 +1,37 @@
 """Subsets of parameters from which terms are left out."""
 
+from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import chain, zip_longest
 
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import Model, ReducedModel, Reduction
 
-_MORE = (8, 20)
-"""Parameters that larger subsets have besides those of the smallest one within the budget."""
+_NEAR = 8
+"""Parameters more than the smallest subset has, up to which all subsets are starts."""
+_FAR = (12, 16, 20)
+"""Parameters more, of which the leanest and the most exact subset are."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Start:
     """A reduced model to leave terms of out of."""
 
     heuristic: str
     model: ReducedModel
+    torque_error: float
+    """On the estimation set."""
+    cost: int
+    """Operations, nearly."""
 
 
 def starts_within(
     torque_error: float, lean: LeanModels, model: Model, reduction: Reduction, *, direct: bool
-) -> tuple[list[Start], list[Start]]:
-    """Subsets within the budget on the estimation set.
-
-    What larger ones have besides may cost little once terms are left out, and make up for these.
+) -> list[Start]:
+    """Subsets within the budget on the estimation set, the smallest first, and the leaner ones of a size.
 
     Args:
         torque_error: Allowed on the estimation set.
@@ -32,27 +39,36 @@ def starts_within(
         model: Of the robot.
         reduction: The subsets.
         direct: Whether operations of the direct dynamics count.
-
-    Returns:
-        All of them, those of the fewest operations first; and of some larger sizes the leanest and the most
-        exact ones.
     """
-    entries: dict[frozenset[str], tuple[int, float, Start]] = {}
+    entries: dict[frozenset[str], Start] = {}
     for name, found in reduction.heuristics.items():
         for row in np.flatnonzero(found.torque_error <= torque_error).tolist():
             chosen = reduction.model(name, row).restricted(model.affecting)
             key = frozenset(chosen.names)
             if found.n[row] <= reduction.rank and key not in entries:
                 cost = lean.estimate(chosen.kept, direct=direct)
-                entries[key] = cost, float(found.torque_error[row]), Start(name, chosen)
-    if not entries:
-        return [], []
-    every = list(entries.values())
-    smallest = min(start.model.n for _, _, start in every)
-    larger = []
-    for more in _MORE:
-        off = min(abs(start.model.n - smallest - more) for _, _, start in every)
-        near = [e for e in every if abs(e[2].model.n - smallest - more) == off]
-        larger += [min(near, key=lambda e: e[0])[2], min(near, key=lambda e: e[1])[2]]
-    leanest = [start for _, _, start in sorted(every, key=lambda e: (e[0], e[1]))]
-    return leanest, list({id(start): start for start in larger}.values())
+                entries[key] = Start(name, chosen, float(found.torque_error[row]), cost)
+    return sorted(
+        entries.values(), key=lambda start: (start.model.n, start.cost, start.torque_error)
+    )
+
+
+def promising(starts: list[Start], smallest: int) -> Iterator[Start]:
+    """Where to go down from, the most promising first: the leanest of every size, and so on.
+
+    What a larger subset has besides may cost little once terms are left out, and make up for these.
+
+    Args:
+        starts: As :func:`starts_within` gives them.
+        smallest: Parameters of those that are small enough.
+    """
+    sizes: dict[int, list[Start]] = defaultdict(list)
+    for start in starts:
+        sizes[start.model.n].append(start)
+    near = [sizes[n] for n in sorted(sizes) if smallest <= n <= smallest + _NEAR]
+    far = [
+        list(dict.fromkeys((sizes[n][0], min(sizes[n], key=lambda start: start.torque_error))))
+        for n in sorted(sizes)
+        if n - smallest in _FAR
+    ]
+    return (start for start in chain(*zip_longest(*near, *far)) if start is not None)

@@ -35,7 +35,7 @@ def states(model, count, seed):
 def fitting_of(model, direct, budget, count=60, reduced=None):
     reduced = reduced or base_model(model)
     lean = LeanModels(model.mechanism, model.formulations)
-    program = lean.several(reduced, 1, direct=direct)[0]
+    program = (lean.direct if direct else lean.inverse)(reduced)
     start, place = lean.n_parameters, reduced.position
     numbered = program.renumbered(lambda k: k - start + reduced.n if k >= start else int(place[k]))
     samples = term_samples(
