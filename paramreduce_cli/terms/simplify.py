@@ -22,8 +22,8 @@ from paramreduce_cli.terms.search import Search, Step
 from paramreduce_cli.terms.starts import Start, promising
 from paramreduce_cli.terms.tape import Remains, Tape
 
-_LOOKED_AT = 60
-"""Starts that are looked at for the smallest one within the budget, at most."""
+_LOOKED_AT = 200
+"""Leanest starts that are looked at to find one within the budget, at most."""
 _FEWEST, _MOST = 12, 60
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
 _WORK = 75_000
@@ -157,7 +157,7 @@ def simplified(
 
     Args:
         lean: Programs of reduced models.
-        starts: Subsets to go down from, the smallest first; how many depends on their size.
+        starts: Subsets to go down from, the leanest first; how many depends on their size.
         looked_at: Samples.
         closely: More samples, for the best of what was found.
         poses: States at which mass matrices must be positive definite.
@@ -192,11 +192,11 @@ def simplified(
         return Search(fitting, seed)
 
     ways = map(begun, starts[:_LOOKED_AT])
-    smallest = next((way.start for way in ways if way.end.fit.within), None)
-    if smallest is None:
+    leanest = next((way.start for way in ways if way.end.fit.within), None)
+    if leanest is None:
         return [], []
     begins: list[_Way] = []
-    for way in map(begun, promising(starts, smallest.model.n)):
+    for way in map(begun, promising(starts, leanest.model.n)):
         begins += [way] if way.end.fit.within else []
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
@@ -240,10 +240,10 @@ def simplified(
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
             raise
-    leanest = heapq.nsmallest(
+    last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, way in enumerate(close) for count in way.visited)
     )
-    found = [close[k].simplified(close[k].visited[count]) for count, k in leanest]
+    found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda entry: entry.program.n_operations)
     return found, _front(_leanest_ends(best, _CLOSELY) + close)
 
