@@ -247,12 +247,12 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
     runner = Runner(config, Store(measured_copy / "results"))
     with pytest.raises(ConfigError):
         runner.run(STAGES["reduce-terms"])
-    training = np.hstack([b.z.T for b in loaded(runner, Samples).estimation.blocks()])
-    n_dof = len(training)
+    blocks = loaded(runner, Samples).estimation.blocks()
+    training = np.hstack([np.vstack([b.z.T, b.dz.T]) for b in blocks])
 
     def places(some):
         return np.array(
-            [np.argmin(np.abs(training.T - z).sum(axis=1)) for z in some.states[:n_dof].T]
+            [np.argmin(np.abs(training.T - z).sum(axis=1)) for z in some.states[: len(training)].T]
         )
 
     assert len(seen) == 4, "of two functions, at first and closely"
