@@ -245,7 +245,7 @@ def simplified(
     )
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda entry: entry.program.n_operations)
-    return found, _front(_leanest_ends(best, _CLOSELY) + close)
+    return found, _front(begins + close)
 
 
 def _affordable(ways: Sequence[_Way], samples: TermSamples) -> int:
@@ -263,7 +263,7 @@ def _leanest_ends(ways: Iterable[_Way], number: int) -> list[_Way]:
     return list(different.values())[::-1][:number]
 
 
-def _front(ways: list[_Way]) -> list[Simplified]:
+def _front(ways: Sequence[_Way]) -> list[Simplified]:
     """Programs on the way that no leaner one beats, some of them, evenly spread."""
     entries = sorted(
         (count, passed.cost, k)
