@@ -218,13 +218,13 @@ def simplified(
         return way
 
     def refined(way: _Way) -> _Way:
-        search = searched(way.start, way.tape, closely)
-        end = search.mended(way.end.fit.left, way.end.fit.beta)
-        way = replace(way, search=search, end=end, visited={})
-        if not end.fit.within:
-            return way
-        way.note(end)
-        return improved(way, rounds)
+        closer = replace(way, search=searched(way.start, way.tape, closely), visited={})
+        for _, passed in sorted(way.visited.items()):
+            end = closer.search.mended(passed.left, passed.beta)
+            if end.fit.within:
+                closer.note(end)
+                return improved(replace(closer, end=end), rounds)
+        return closer
 
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:

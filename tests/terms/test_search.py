@@ -98,6 +98,24 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
     assert expected <= 0.1
 
 
+@pytest.mark.parametrize("direct", [False, True])
+def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
+    fitting, reduced, _ = fitting_of(arm, direct, Budget(1e-6, np.inf))
+    search, tape = Search(fitting, 0), fitting.tape
+    whole = search.start(reduced.values)
+    terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
+    missed = helped = 0
+    for term in terms:
+        broken = fitting.fit(whole.fit.left.flipped(term[None]), whole.fit.beta)
+        missed += not broken.within
+        mended = search.mended(broken.left, broken.beta)
+        helped += mended.fit.within and not broken.within
+        assert mended.count <= whole.count
+        assert np.all(mended.fit.left.has(terms)[broken.left.has(terms)]), "nothing else goes"
+    assert missed > 5
+    assert helped >= 0.8 * missed, "a square whose root is gone does not tell that it helps"
+
+
 def test_costs_of_combinations_of_parameters_are_exact(arm):
     fitting, reduced, _ = fitting_of(arm, False, Budget(0.1, np.inf))
     tape = fitting.tape
