@@ -113,7 +113,8 @@ def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
         assert mended.count <= whole.count
         assert np.all(mended.fit.left.has(terms)[broken.left.has(terms)]), "nothing else goes"
     assert missed > 5
-    assert helped >= 0.8 * missed, "a square whose root is gone does not tell that it helps"
+    # A square whose root is gone, or a parameter whose only term is, does not tell that it helps.
+    assert helped >= 0.7 * missed
 
 
 def test_costs_of_combinations_of_parameters_are_exact(arm):
