@@ -26,12 +26,12 @@ _LOOKED_AT = 200
 """Leanest starts that are looked at to find one within the budget, at most."""
 _FEWEST, _MOST = 12, 60
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
-_WORK = 75_000
+_WORK = 30_000
 """Operations times torques, of all of these: time grows a little faster."""
-_IMPROVED = (10, 5)
-"""Ends of descents from which the search goes on: from many for a while, from the best of them for longer."""
-_CLOSELY = 3
-"""Best ends of all, from which it goes on longest, with more samples."""
+_IMPROVED = 8
+"""Ends of descents from which the search goes on, for half of the rounds."""
+_CLOSELY = 2
+"""Best ends of these, from which it goes on for all of them, with more samples."""
 _SAME = 6
 """Digits of the sums of squared errors, over those allowed, of ends that are taken for the same."""
 _LEANEST = 12
@@ -152,8 +152,8 @@ def simplified(
 ) -> tuple[list[Simplified], list[Simplified]]:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
-    Starts are gone down from in their leanest formulations; from the best ends terms are put back
-    and others left out instead.
+    Starts are gone down from, each in the formulation that is leanest for it; from the best ends terms are put
+    back and others left out instead.
 
     Args:
         lean: Programs of reduced models.
@@ -200,7 +200,7 @@ def simplified(
         begins += [way] if way.end.fit.within else []
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
-    total = len(begins) + sum(_IMPROVED) + _CLOSELY
+    total = len(begins) + _IMPROVED + _CLOSELY
 
     def tell(operations: int) -> None:
         ended.append(operations)
@@ -212,8 +212,8 @@ def simplified(
         tell(way.end.count)
         return way
 
-    def improved(way: _Way, rounds: int) -> _Way:
-        way = replace(way, end=way.search.improved(way.end, rounds, way.note))
+    def improved(way: _Way, times: int) -> _Way:
+        way = replace(way, end=way.search.improved(way.end, times, way.note))
         tell(min(way.visited))
         return way
 
@@ -229,13 +229,10 @@ def simplified(
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:
         try:
-            best = list(pool.map(descended, begins))
-            for k, number in enumerate(_IMPROVED):
-                share = rounds >> len(_IMPROVED) - k
-                best = list(
-                    pool.map(improved, _leanest_ends(best, number), itertools.repeat(share))
-                )
-            close = list(pool.map(refined, _leanest_ends(best, _CLOSELY)))
+            ends = _leanest_ends(pool.map(descended, begins), _IMPROVED)
+            half = itertools.repeat(rounds // 2)
+            better = _leanest_ends(pool.map(improved, ends, half), _CLOSELY)
+            close = list(pool.map(refined, better))
         except BaseException:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
