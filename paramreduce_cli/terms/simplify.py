@@ -23,7 +23,7 @@ from paramreduce_cli.terms.starts import Start, promising
 from paramreduce_cli.terms.tape import Remains, Tape
 
 _LOOKED_AT = 200
-"""Leanest starts that are looked at to find one within the budget, at most."""
+"""Starts that are looked at to find the smallest one within the budget, at most."""
 _FEWEST, _MOST = 12, 60
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
 _WORK = 30_000
@@ -35,7 +35,7 @@ _CLOSELY = 2
 _SAME = 6
 """Digits of the sums of squared errors, over those allowed, of ends that are taken for the same."""
 _LEANEST = 12
-"""Programs that are looked at closely, the leanest of each search."""
+"""Programs that are judged, the leanest of all searches."""
 _LOOKS = 3
 """Times that parameters and the mass matrices that accelerations are found with take turns."""
 _ON_THE_WAY = 16
@@ -157,8 +157,8 @@ def simplified(
 
     Args:
         lean: Programs of reduced models.
-        starts: Subsets to go down from, the leanest first; how many depends on their size.
-        looked_at: Samples.
+        starts: Subsets, the smallest first; how many are gone down from depends on their operations.
+        looked_at: Samples for most of the search.
         closely: More samples, for the best of what was found.
         poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
@@ -192,19 +192,21 @@ def simplified(
         return Search(fitting, seed)
 
     ways = map(begun, starts[:_LOOKED_AT])
-    leanest = next((way.start for way in ways if way.end.fit.within), None)
-    if leanest is None:
+    smallest = next((way.start for way in ways if way.end.fit.within), None)
+    if smallest is None:
         return [], []
     begins: list[_Way] = []
-    for way in map(begun, promising(starts, leanest.model.n)):
-        begins += [way] if way.end.fit.within else []
+    for way in map(begun, promising(starts, smallest.model.n)):
+        if not way.end.fit.within:
+            continue
+        begins.append(way)
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
     total = len(begins) + _IMPROVED + _CLOSELY
 
     def tell(operations: int) -> None:
         ended.append(operations)
-        progress(min(1.0, len(ended) / total), f"{min(ended)} operations")
+        progress(len(ended) / total, f"{min(ended)} operations")
 
     def descended(way: _Way) -> _Way:
         way.note(way.end)
@@ -247,7 +249,7 @@ def simplified(
 
 def _affordable(ways: Sequence[_Way], samples: TermSamples) -> int:
     """How many programs such as some are gone down from."""
-    work = np.mean([way.operations_start for way in ways]) * samples.tau.shape[0] if ways else 1
+    work = np.mean([way.operations_start for way in ways]) * samples.tau.shape[0]
     return int(np.clip(_WORK / work, _FEWEST, _MOST))
 
 

@@ -31,7 +31,7 @@ class Start:
 def starts_within(
     torque_error: float, lean: LeanModels, model: Model, reduction: Reduction, *, direct: bool
 ) -> list[Start]:
-    """Subsets within the budget on the estimation set, those of the fewest operations first.
+    """Subsets within the budget on the estimation set, the smallest first, and the leaner ones of a size.
 
     Args:
         torque_error: Allowed on the estimation set.
