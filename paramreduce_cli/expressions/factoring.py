@@ -1,91 +1,21 @@
 """Fewer operations by the laws of sums and products.
 
-Chains of sums and of products are taken apart into sums and products of many terms, factors
-common to terms of a sum are taken out of it, pairs that several sums (or products) share are
-computed once [Breuer1969], and all is put together again. Results differ by rounding only.
+Chains of sums and of products are taken apart into sums and products of many terms; what these have in common is
+computed once, as far as the laws and rewriting find it, and all is put together again. Results differ by rounding only.
 """
 
-import heapq
-from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import combinations
+from collections import Counter
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.rewriting import rewrite
+from paramreduce_cli.expressions.rows import COST, PRODUCT, SUM, Rows, rows_of, terms_of
 
-_HARDLY = 1000
-"""One operation in so many: what less than that is saved by ends the factoring."""
-_CLOSE = 0.002
-"""Share of the operations by which a way of writing may be behind after one pass and still catch up."""
-
-
-class _Terms:
-    """Sums and products of many terms, by the number of their value.
-
-    Terms are signed references as in a graph; new sums and products get numbers after those of the
-    graph's nodes.
-    """
-
-    def __init__(self, graph: Graph, outputs: Sequence[int]) -> None:
-        self._graph = graph
-        self.reached = graph.reached(list(outputs))
-        self.outputs = list(outputs)
-        self.sums: dict[int, list[int]] = {}
-        self.products: dict[int, list[int]] = {}
-        self._next = len(graph.nodes)
-        uses = Counter(value >> 1 for value in self.outputs)
-        for number in self.reached:
-            uses.update(value >> 1 for value in self._graph.nodes[number].operands)
-        for number in self.reached:
-            node = self._graph.nodes[number]
-            table = self._table(node.operation)
-            if table is None:
-                continue
-            terms = []
-            for value in node.operands:
-                below = value >> 1
-                if below in table and uses[below] == 1:
-                    terms += [term ^ (value & 1) for term in table.pop(below)]
-                else:
-                    terms.append(value)
-            table[number] = terms
-
-    def _table(self, operation: str) -> dict[int, list[int]] | None:
-        return {"+": self.sums, "*": self.products}.get(operation)
-
-    def new(self, table: dict[int, list[int]], terms: list[int]) -> int:
-        """The value of a new sum or product."""
-        number = self._next
-        self._next += 1
-        table[number] = terms
-        return 2 * number
-
-    def uses(self) -> Counter[int]:
-        """How often every number is referred to."""
-        result = Counter(value >> 1 for value in self.outputs)
-        for table in (self.sums, self.products):
-            for terms in table.values():
-                result.update(value >> 1 for value in terms)
-        for number in self.reached:
-            node = self._graph.nodes[number]
-            if self._table(node.operation) is None:
-                result.update(value >> 1 for value in node.operands)
-        return result
-
-
-def factored(graph: Graph, outputs: Sequence[int], target: Graph) -> list[int]:
-    """Build values again with fewer operations.
-
-    Args:
-        graph: Where the values are; one in which signs are free.
-        outputs: The values.
-        target: Where they are built.
-    """
-    terms = _Terms(graph, outputs)
-    _take_out_factors(terms)
-    _share_pairs(terms, terms.products)
-    _share_pairs(terms, terms.sums)
-    return _Assembly(graph, terms, target).built(outputs)
+_CLOSE = {0.0: 0.01, 0.5: 0.003}
+"""After so many rewritings per operation, the share of them by which a way of writing may be behind and go on."""
+_TRIES = 1
+"""Rewritings per operation that are tried at a time; when none of them saves anything, it ends."""
 
 
 class Written(NamedTuple):
@@ -99,135 +29,94 @@ class Written(NamedTuple):
         """Operations that they take."""
         return self.graph.count(self.outputs)
 
-    def factored(self) -> "Written":
-        """The same values in a graph of their own, factored once."""
+    def rewritten_count(self, tries: int) -> int:
+        """Operations that are left when the laws have been applied, and so many rewritings tried."""
+        rows = self.taken_apart()
+        rewrite(rows, tries)
+        return int(rows.counters[COST])
+
+    def rewritten(self, tries: float) -> "Written":
+        """The same values after the laws have been applied, and so many rewritings per operation tried."""
+        rows = self.taken_apart()
+        rewrite(rows, int(tries * rows.counters[COST]))
+        return self.put_together(rows)
+
+    def taken_apart(self) -> Rows:
+        """Sums and products of many terms, by the numbers of the nodes."""
+        nodes, reached = self.graph.nodes, self.graph.reached(self.outputs)
+        uses = Counter(value >> 1 for value in self.outputs)
+        for number in reached:
+            uses.update(value >> 1 for value in nodes[number].operands)
+        tables: dict[str, dict[int, list[int]]] = {"+": {}, "*": {}}
+        pinned = {value >> 1 for value in self.outputs}
+        calls = 0
+        for number in reached:
+            operation, operands, _ = nodes[number]
+            table = tables.get(operation)
+            if table is None:
+                pinned.update(value >> 1 for value in operands)
+                calls += len(operands) > 0
+                continue
+            terms = table[number] = []
+            for value in operands:
+                below = value >> 1
+                if below in table and uses[below] == 1:
+                    terms += [term ^ (value & 1) for term in table.pop(below)]
+                else:
+                    terms.append(value)
+        return rows_of(tables["+"], tables["*"], pinned, len(nodes), calls)
+
+    def put_together(self, rows: Rows) -> "Written":
+        """The same values in a graph of their own.
+
+        Args:
+            rows: What became of :meth:`taken_apart`.
+        """
         target = Graph()
-        return Written(target, factored(self.graph, self.outputs, target))
+        sums, products = terms_of(rows, SUM), terms_of(rows, PRODUCT)
+        return Written(target, _Assembly(self.graph, sums, products, target).built(self.outputs))
 
 
 def least(ways: Iterable[Written]) -> Written:
-    """Factor values until it saves hardly anything.
+    """Write values with fewer operations.
 
     Args:
-        ways: The same values, written in one or several ways; those that are far behind after one pass
-            are dropped.
+        ways: The same values, written in one or several ways; those that are far behind before they are
+            rewritten are dropped.
 
     Returns:
-        What takes the fewest operations of all that were tried to the end.
+        What takes the fewest operations.
     """
-    once = [_once_more(way.n_operations, way) for way in ways]
-    best = min(count for count, _, _ in once)
-    close = [one for one in once if one[0] <= (1 + _CLOSE) * best + 1]
-    return min((_to_the_end(*one) for one in close), key=lambda one: one[0])[1]
+    apart = [(way, way.taken_apart()) for way in ways]
+    for tries, share in _CLOSE.items():
+        for _, rows in apart:
+            rewrite(rows, int(tries * rows.counters[COST]))
+        close = (1 + share) * min(rows.counters[COST] for _, rows in apart)
+        apart = [(way, rows) for way, rows in apart if rows.counters[COST] <= close]
+    for _, rows in apart:
+        _rewrite_to_the_end(rows)
+    return min((way.put_together(rows) for way, rows in apart), key=lambda way: way.n_operations)
 
 
-def _to_the_end(count: int, way: Written, saved: int) -> tuple[int, Written]:
-    while saved > count // _HARDLY:
-        count, way, saved = _once_more(count, way)
-    return count, way
-
-
-def _once_more(count: int, way: Written) -> tuple[int, Written, int]:
-    """After one more pass, if that saves anything, and what it has saved."""
-    changed = way.factored()
-    after = changed.n_operations
-    return (after, changed, count - after) if after < count else (count, way, 0)
-
-
-def _take_out_factors(terms: _Terms) -> None:
-    uses = terms.uses()
-    pending = sorted(terms.sums, reverse=True)
-    while pending:
-        number = pending.pop()
-        while (new := _take_out_one(terms, number, uses)) is not None:
-            pending.append(new)
-
-
-def _take_out_one(terms: _Terms, number: int, uses: Counter[int]) -> int | None:
-    """Take the most frequent factor out of a sum; the number of the sum it multiplies."""
-    total = terms.sums[number]
-    single = [v for v in total if v >> 1 in terms.products and uses[v >> 1] == 1]
-    counts = Counter(f for v in single for f in set(terms.products[v >> 1]))
-    factor, count = min(counts.items(), key=lambda item: (-item[1], item[0]), default=(0, 0))
-    if count < 2:
-        return None
-    inner, left = [], []
-    for value in total:
-        if value in single and factor in terms.products[value >> 1]:
-            rest = list(terms.products.pop(value >> 1))
-            rest.remove(factor)
-            product = rest[0] if len(rest) == 1 else terms.new(terms.products, rest)
-            uses[product >> 1] = max(uses[product >> 1], 1)
-            inner.append(product ^ (value & 1))
-        else:
-            left.append(value)
-    bracket = terms.new(terms.sums, inner)
-    uses[factor >> 1] -= count - 1
-    uses[bracket >> 1] = 1
-    if not left:
-        del terms.sums[number]
-        terms.products[number] = [factor, bracket]
-        return None
-    product = terms.new(terms.products, [factor, bracket])
-    uses[product >> 1] = 1
-    terms.sums[number] = [*left, product]
-    return bracket >> 1
-
-
-def _pairs(values: Sequence[int]) -> Iterator[tuple[int, int]]:
-    """All pairs of terms, up to a common sign."""
-    for a, b in combinations(sorted(values), 2):
-        yield (a & ~1, b ^ (a & 1))
-
-
-def _share_pairs(terms: _Terms, table: dict[int, list[int]]) -> None:
-    """Compute pairs once that come up in several sums, or in several products."""
-    where: dict[tuple[int, int], set[int]] = defaultdict(set)
-    for number, values in table.items():
-        for pair in _pairs(values):
-            where[pair].add(number)
-    heap = [(-len(owners), pair) for pair, owners in where.items() if len(owners) > 1]
-    heapq.heapify(heap)
-    while heap:
-        count, pair = heapq.heappop(heap)
-        owners = where[pair]
-        if len(owners) != -count:
-            if len(owners) > 1:
-                heapq.heappush(heap, (-len(owners), pair))
-            continue
-        whole = min((n for n in owners if len(table[n]) == len(pair)), default=None)
-        shared = terms.new(table, list(pair)) if whole is None else 2 * whole
-        sign = 0 if whole is None else min(table[whole]) & 1
-        for number in sorted(owners):
-            if number == whole:
-                continue
-            values = table[number]
-            for old in _pairs(values):
-                where[old].discard(number)
-            flip = _take_pair(values, pair)
-            values.append(shared ^ sign ^ flip)
-            for new in _pairs(values):
-                where[new].add(number)
-                if len(where[new]) > 1:
-                    heapq.heappush(heap, (-len(where[new]), new))
-
-
-def _take_pair(values: list[int], pair: tuple[int, int]) -> int:
-    """Remove a pair of terms; the sign with which it was there."""
-    for flip in (0, 1):
-        a, b = pair[0] ^ flip, pair[1] ^ flip
-        if a in values and b in values and (a != b or values.count(a) > 1):
-            values.remove(a)
-            values.remove(b)
-            return flip
-    raise AssertionError("the pair is not there")
+def _rewrite_to_the_end(rows: Rows) -> None:
+    saved = 1
+    while saved:
+        count = int(rows.counters[COST])
+        rewrite(rows, _TRIES * count)
+        saved = count - int(rows.counters[COST])
 
 
 class _Assembly:
     """Builds terms in a graph."""
 
-    def __init__(self, source: Graph, terms: _Terms, target: Graph) -> None:
-        self._source, self._terms, self._target = source, terms, target
+    def __init__(
+        self,
+        source: Graph,
+        sums: Mapping[int, Sequence[int]],
+        products: Mapping[int, Sequence[int]],
+        target: Graph,
+    ) -> None:
+        self._source, self._sums, self._products, self._target = source, sums, products, target
         self._built: dict[int, int] = {}
 
     def built(self, values: Sequence[int]) -> list[int]:
@@ -249,14 +138,17 @@ class _Assembly:
         return [negate(built[v >> 1]) if v & 1 else built[v >> 1] for v in values]
 
     def _operands(self, number: int) -> Sequence[int]:
-        terms = self._terms.sums.get(number) or self._terms.products.get(number)
+        terms = self._sums.get(number) or self._products.get(number)
         return terms or self._source.nodes[number].operands
 
     def _number(self, number: int) -> int:
         graph = self._target
-        for table, join in ((self._terms.sums, graph.add), (self._terms.products, graph.multiply)):
-            if number in table:
-                return _joined(self._known(table[number]), join)
+        if number in self._sums:
+            return _joined(self._known(self._sums[number]), graph.add)
+        if number in self._products:
+            factors = self._known(self._products[number])
+            factors.sort(key=lambda value: graph.number(value) is None)  # so that numbers meet
+            return _joined(factors, graph.multiply)
         node = self._source.nodes[number]
         if node.operation == "constant":
             return graph.constant(node.number)

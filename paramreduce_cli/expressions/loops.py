@@ -56,6 +56,12 @@ def _whole(path: str) -> bytes:
     return content[:-_DIGEST]
 
 
+def _stamps(source: Path) -> tuple[tuple[str, float, int], ...]:
+    """Of all files beside one: what a compiled function calls is compiled with it, and may be in any of them."""
+    stats = [(file, file.stat()) for file in sorted(source.parent.glob("*.py"))]
+    return tuple((file.name, stat.st_mtime, stat.st_size) for file, stat in stats)
+
+
 def compiled(**options: Any) -> Callable[[Loop], Loop]:
     """Have a function compiled when it is first called, and kept.
 
@@ -68,7 +74,9 @@ def compiled(**options: Any) -> Callable[[Loop], Loop]:
         if hasattr(
             dispatcher, "_cache"
         ):  # not where NUMBA_DISABLE_JIT leaves functions as they are
-            dispatcher._cache._cache_file.__class__ = _CheckedCache
+            file = dispatcher._cache._cache_file
+            file.__class__ = _CheckedCache
+            file._source_stamp = (file._source_stamp, _stamps(Path(function.__code__.co_filename)))
         return dispatcher
 
     return made

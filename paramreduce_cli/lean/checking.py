@@ -8,8 +8,8 @@ from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import from_data
-from paramreduce_cli.lean.search import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism

@@ -52,7 +52,7 @@ class Counts:
     @cached_property
     def _lean(self) -> LeanModels:
         model = self._model
-        return LeanModels(model.mechanism, model.formulations, independent=self._independent)
+        return LeanModels(model, independent=self._independent)
 
     def estimate(self, kept: BoolArray) -> int:
         """Of the lean inverse dynamics, nearly; for criteria, which ask for thousands of models.

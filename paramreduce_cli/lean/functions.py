@@ -36,7 +36,7 @@ class LeanFunctions:
         mechanism = model.mechanism
         self._simplified = simplified
         self._mechanism = mechanism
-        self._models = LeanModels(mechanism, model.formulations, independent=True)
+        self._models = LeanModels(model, independent=True)
         self._reduced = reduced.restricted(model.affecting)
         self._constant = constant
         q, z = mechanism.n_q, mechanism.n_dof
@@ -124,9 +124,12 @@ class LeanFunctions:
             return graph.input(first[position])
 
         outputs = Program.of_stored(simplified.program).rebuilt(graph, substitute)
-        if self._mechanism.loops is not None and not simplified.projected:
+        to_project = self._mechanism.loops is not None and not simplified.projected
+        if to_project:
             outputs = project(self._mechanism, graph, outputs)
-        return Program.of_graph(*least([Written(graph, outputs)]))
+        if to_project or self._constant:
+            return Program.of_graph(*least([Written(graph, outputs)]))
+        return Program.of_graph(graph, outputs)
 
     def _function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]

@@ -12,17 +12,19 @@ import numpy as np
 from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
-from paramreduce_cli.lean.search import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.tree import lean_tree
-from paramreduce_cli.records import BoolArray, Formulations, IntArray, Mechanism, ReducedModel
+from paramreduce_cli.records import BoolArray, IntArray, Mechanism, Model, ReducedModel
 
 if TYPE_CHECKING:
     from paramreduce_cli.expressions.live import LiveCount
 
-_NEAR = 1.03
+_NEAR = 1.02
 """Estimates further apart than that are not the wrong way round."""
+_AT_FIRST = 3.0
+"""Rewritings that are tried on every formulation, per operation."""
 
 
 @dataclass
@@ -55,17 +57,16 @@ class LeanModels:
     coordinates are asked for, the dependent rows of R, row by row, and of b.
 
     Args:
-        mechanism: The mechanism.
-        formulations: To choose from.
+        model: Of the robot, with formulations to choose from.
         independent: Whether d_z and [M_zz | delta_z] are meant, with R and b handed in, instead of
             d_q and [M_qq | delta_q]; on an open tree they are the same.
     """
 
-    def __init__(
-        self, mechanism: Mechanism, formulations: Formulations, *, independent: bool = False
-    ) -> None:
+    def __init__(self, model: Model, *, independent: bool = False) -> None:
+        mechanism = model.mechanism
         self._mechanism = mechanism
-        self._formulations = formulations
+        self._formulations = model.formulations
+        self._useless = frozenset(np.flatnonzero(~model.affecting).tolist())
         self._tree = lean_tree(mechanism)
         self._projected = independent and mechanism.loops is not None
         self.n_parameters = mechanism.n_parameters
@@ -87,10 +88,12 @@ class LeanModels:
         programs = []
         for some in choices:
             graph = Graph()
-            outputs = build(self._tree, [from_data(data) for data in some], graph, ())
+            at_joints = [from_data(data) for data in some]
+            outputs = build(self._tree, at_joints, graph, self._useless)
             if self._projected:
                 outputs = project(self._mechanism, graph, outputs)
-            programs.append(Program.of_graph(graph, outputs))
+            # What is rewritten once as a whole is a better start for all that is left of it.
+            programs.append(Program.of_graph(*Written(graph, outputs).rewritten(_AT_FIRST)))
         return _Variants(programs)
 
     def inverse(self, model: ReducedModel, *, constant: bool = False) -> Program:

@@ -17,6 +17,8 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
+from paramreduce_cli.lean.annealing import annealed
+from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import (
     JointFormulation,
     Place,
@@ -24,10 +26,6 @@ from paramreduce_cli.lean.choices import (
     far_reaching,
     to_data,
 )
-from paramreduce_cli.lean.direct import mass_matrix
-from paramreduce_cli.lean.drives import with_drives, with_rotors
-from paramreduce_cli.lean.inverse import torques
-from paramreduce_cli.lean.kinematics import Kinematics
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.tree import Joint, Tree, lean_tree
 from paramreduce_cli.records import (
@@ -40,9 +38,6 @@ from paramreduce_cli.records import (
     Progress,
     Rigid,
 )
-
-Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], list[int]]
-"""Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
 
 Options = Callable[[JointFormulation, Joint], list[JointFormulation]]
 """Gives the alternatives to a choice at a joint."""
@@ -73,26 +68,6 @@ _DIRECT_STARTS = (_COMPOSITE, replace(_COMPOSITE, aligned=True), _AT_REST, *_INV
 they suit odd sets of few parameters."""
 
 
-def inverse_outputs(
-    tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
-) -> list[int]:
-    """Torques, (n_q,)."""
-    kinematics = Kinematics(tree, choices, graph, dropped=dropped)
-    found = with_drives(tree, kinematics.symbols, torques(kinematics), moving=True)
-    return [torque.value for torque in found]
-
-
-def direct_outputs(
-    tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
-) -> list[int]:
-    """The lower triangle of M, row by row, then delta."""
-    kinematics = Kinematics(tree, choices, graph, moving=False, dropped=dropped)
-    symbols = kinematics.symbols
-    M = with_rotors(tree, symbols, mass_matrix(kinematics))
-    bias = with_drives(tree, symbols, torques(kinematics), moving=False)
-    return [entry.value for row in [*M, bias] for entry in row]
-
-
 _found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
 
@@ -102,6 +77,9 @@ def formulations(
     affecting: BoolArray,
     base: IntArray,
     progress: Callable[[Progress], None] = lambda _: None,
+    *,
+    looks: int = 0,
+    seed: int = 0,
 ) -> Formulations:
     """Search the formulations of a mechanism.
 
@@ -109,7 +87,9 @@ def formulations(
         mechanism: Its tree is what counts.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
-        progress: Told when one of the six searches has ended.
+        progress: Told when one of the six searches has ended, and of each look.
+        looks: Formulations that are looked at beyond that, for all and for the base parameters.
+        seed: Of these.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.
@@ -129,6 +109,17 @@ def formulations(
         progress(Progress("search for formulations", next(ended), 6))
         return choices
 
+    looked = itertools.count(1)
+
+    def better(
+        build: Build, start: list[JointFormulation], dropped: set[int]
+    ) -> list[JointFormulation]:
+        choices = start
+        for found in annealed(tree, build, start, dropped, looks, seed):
+            progress(Progress("look at formulations", next(looked), 4 * looks))
+            choices = found
+        return choices
+
     def searched(
         build: Build, starts: tuple[JointFormulation, ...]
     ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
@@ -136,7 +127,8 @@ def formulations(
         full = best(build, same, useless)
         of_base = best(build, full, regrouped)
         of_few = best(build, same, minor)
-        found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
+        further = [better(build, full, useless), better(build, of_base, regrouped)] if looks else []
+        found = dict.fromkeys(map(tuple, [full, of_base, of_few, *further, same, *others]))
         return tuple(tuple(map(to_data, one)) for one in found)
 
     found = Formulations(

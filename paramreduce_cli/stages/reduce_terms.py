@@ -94,7 +94,7 @@ def _searched(
         sampling.estimation_file is not None and sampling.torques == "measured"
     )
     projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
-    lean = LeanModels(model.mechanism, model.formulations, independent=projected)
+    lean = LeanModels(model, independent=projected)
     direct = name == "direct"
     starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
     judge = Judge(

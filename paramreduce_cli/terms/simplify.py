@@ -202,7 +202,7 @@ def simplified(
         begins.append(way)
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
-    total = len(begins) + _IMPROVED + _CLOSELY
+    total = len(begins) + _IMPROVED + 3 * _CLOSELY
 
     def tell(operations: int) -> None:
         ended.append(operations)
@@ -228,6 +228,16 @@ def simplified(
                 return improved(replace(closer, end=end), rounds)
         return closer
 
+    def gone_on(way: _Way) -> _Way:
+        """From the leanest program as it is rewritten: it has other terms, and some may go again."""
+        for _, passed in sorted(way.visited.items())[:1]:
+            tape = Tape(way.simplified(passed).program)
+            search = searched(way.start, tape, closely)
+            way = replace(way, search=search, tape=tape, end=search.start(passed.beta), visited={})
+            if way.end.fit.within:
+                return improved(descended(way), rounds // 2)
+        return replace(way, visited={})
+
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:
         try:
@@ -235,6 +245,7 @@ def simplified(
             half = itertools.repeat(rounds // 2)
             better = _leanest_ends(pool.map(improved, ends, half), _CLOSELY)
             close = list(pool.map(refined, better))
+            close += list(pool.map(gone_on, close))
         except BaseException:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)

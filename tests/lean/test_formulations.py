@@ -13,9 +13,10 @@ from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
+from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.lean.search import direct_outputs, formulations, inverse_outputs
+from paramreduce_cli.lean.search import formulations
 from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.plain import PlainDynamics
@@ -104,7 +105,7 @@ def test_operations_of_the_leanest_formulations(name, kept, inverse, direct, req
     names = model.mechanism.parameter_names
     columns = {"full": np.flatnonzero(model.affecting), "base": np.sort(model.base.columns)}
     kept = columns[kept] if kept in columns else np.sort([names.index(k) for k in kept.split()])
-    lean, reduced = LeanModels(model.mechanism, model.formulations), whole(model.mechanism, kept)
+    lean, reduced = LeanModels(model), whole(model.mechanism, kept)
     assert lean.inverse(reduced).n_operations == inverse
     assert lean.direct(reduced).n_operations == direct
 
@@ -130,7 +131,7 @@ def test_a_wrong_formulation_is_an_error(puma, monkeypatch):
 
 def test_tied_and_known_parameters_take_less(puma):
     kept = np.flatnonzero(puma.affecting)
-    lean = LeanModels(puma.mechanism, puma.formulations)
+    lean = LeanModels(puma)
     reduced = whole(puma.mechanism, kept, kept / 7)
     count = lean.inverse(reduced).n_operations
     position = reduced.position.copy()
@@ -142,7 +143,7 @@ def test_tied_and_known_parameters_take_less(puma):
 
 def test_estimates_are_near_the_counts(puma):
     rng = np.random.default_rng(2)
-    lean = LeanModels(puma.mechanism, puma.formulations)
+    lean = LeanModels(puma)
     for n in (6, 12, 18, 30, 45):
         kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
         count = lean.inverse(whole(puma.mechanism, kept)).n_operations
@@ -150,10 +151,17 @@ def test_estimates_are_near_the_counts(puma):
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])
-def test_lean_models_never_take_more_than_plain_recursion(seed):
+def test_lean_models_never_take_more_than_plain_recursion(seed, puma):
     mechanism = random_tree(seed)
     default = tuple(to_data(JointFormulation()) for _ in range(mechanism.n_q))
-    lean = LeanModels(mechanism, Formulations((default,), (default,)))
+    lean = LeanModels(
+        dataclasses.replace(
+            puma,
+            mechanism=mechanism,
+            affecting=np.ones(mechanism.n_parameters, dtype=np.bool_),
+            formulations=Formulations((default,), (default,)),
+        )
+    )
     plain = PlainDynamics(mechanism)
     rng = np.random.default_rng(seed)
     for n in (0, 1, 3, 8, 20, mechanism.n_parameters):
@@ -166,13 +174,16 @@ def test_lean_models_never_take_more_than_plain_recursion(seed):
 
 
 @pytest.mark.parametrize("name", ["standard", "tree"])
-def test_lean_models_take_less_than_textbooks(name):
+def test_lean_models_take_less_than_textbooks(name, puma):
     mechanism = MECHANISMS[name]()
     rng = np.random.default_rng(0)
     K = Dynamics(mechanism, once=True).regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
     affecting = np.abs(K).max(axis=(0, 1)) > 1e-9
     kept = np.flatnonzero(affecting)
-    lean = LeanModels(mechanism, formulations(mechanism, affecting, kept))
+    found = formulations(mechanism, affecting, kept)
+    lean = LeanModels(
+        dataclasses.replace(puma, mechanism=mechanism, affecting=affecting, formulations=found)
+    )
     inverse, direct = textbook.count(mechanism, kept)
     assert lean.inverse(whole(mechanism, kept)).n_operations <= 0.85 * inverse
     assert lean.direct(whole(mechanism, kept)).n_operations <= 0.6 * direct

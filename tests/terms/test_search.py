@@ -34,7 +34,7 @@ def states(model, count, seed):
 
 def fitting_of(model, direct, budget, count=60, reduced=None):
     reduced = reduced or base_model(model)
-    lean = LeanModels(model.mechanism, model.formulations)
+    lean = LeanModels(model)
     program = (lean.direct if direct else lean.inverse)(reduced)
     start, place = lean.n_parameters, reduced.position
     numbered = program.renumbered(lambda k: k - start + reduced.n if k >= start else int(place[k]))

@@ -1,0 +1,103 @@
+"""Rewrite sums and products at random places, as far as it saves operations, compiled by Numba.
+
+What factoring has settled is a dead end of its own order: a sum that was split elsewhere, or a factor that was not
+taken out, may let more be shared. So at a few places at a time a shared sum or product is written out, or a factor is
+distributed over a sum; what comes of it is settled again, and kept if it takes no more operations.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from paramreduce_cli.expressions.laws import insert, settle
+from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.rows import (
+    COST,
+    FAILED,
+    KIND,
+    LENGTH,
+    NONE,
+    PRODUCT,
+    SUM,
+    TIDY,
+    Rows,
+    dice,
+    keep,
+    new,
+    put,
+    undo,
+    wait,
+)
+
+_AT_MOST = 6
+"""Places at which it is rewritten at once."""
+_LOOKS = 10_000
+"""At places, until one is found where something can be rewritten."""
+
+
+@compiled(nogil=True)
+def rewrite(rows: Rows, tries: int) -> None:
+    """Save operations.
+
+    Args:
+        rows: Changed.
+        tries: How often something else is tried, after the laws have been applied.
+    """
+    for k in range(tries + 1):
+        cost = rows.counters[COST]
+        if k > 0:
+            for _ in range(1 + dice(rows) % _AT_MOST):
+                _rewrite_somewhere(rows)
+        settle(rows, dice(rows) % 2 == 0)
+        if rows.counters[FAILED] or rows.counters[COST] > cost:
+            undo(rows)
+        else:
+            keep(rows)
+
+
+@compiled(nogil=True)
+def _rewrite_somewhere(rows: Rows) -> None:
+    for _ in range(_LOOKS):
+        n = dice(rows) % rows.numbers.shape[0]
+        if rows.numbers[n, KIND] == NONE or rows.counters[FAILED]:
+            continue
+        place = dice(rows) % rows.numbers[n, LENGTH]
+        held = rows.numbers[rows.terms[n, place] >> 1, KIND]
+        if held == rows.numbers[n, KIND]:
+            insert(rows, n, place)
+            return
+        if held == SUM:
+            _distribute(rows, n, place, dice(rows) % 2 == 0)
+            return
+
+
+@compiled(nogil=True)
+def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
+    """Make a product with a sum a sum of products.
+
+    Args:
+        rows: Changed.
+        n: The product.
+        place: Of the sum among its factors.
+        joined: Whether products in the sum are written out.
+    """
+    width = rows.terms.shape[1]
+    total, row = np.empty(width, dtype=np.int64), np.empty(2 * width, dtype=np.int64)
+    factor = rows.terms[n, place]
+    terms, length = factor >> 1, rows.numbers[factor >> 1, LENGTH]
+    for i in range(length):
+        value = rows.terms[terms, i]
+        below, k = value >> 1, 1
+        row[0] = 2 * below
+        if joined and rows.numbers[below, KIND] == PRODUCT:
+            k = rows.numbers[below, LENGTH]
+            for j in range(k):
+                row[j] = rows.terms[below, j]
+        for j in range(rows.numbers[n, LENGTH]):
+            if j != place:
+                row[k] = rows.terms[n, j]
+                k += 1
+        total[i] = new(rows, PRODUCT, row[:k]) ^ ((value ^ factor) & 1)
+        wait(rows, TIDY, below)
+    if not rows.counters[FAILED]:
+        put(rows, n, SUM, total[:length])
