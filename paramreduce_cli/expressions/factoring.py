@@ -35,10 +35,10 @@ class Written(NamedTuple):
         rewrite(rows, tries)
         return int(rows.counters[COST])
 
-    def rewritten(self, tries: float) -> "Written":
-        """The same values after the laws have been applied, and so many rewritings per operation tried."""
+    def settled(self) -> "Written":
+        """The same values after the laws have been applied."""
         rows = self.taken_apart()
-        rewrite(rows, int(tries * rows.counters[COST]))
+        rewrite(rows, 0)
         return self.put_together(rows)
 
     def taken_apart(self) -> Rows:

@@ -23,8 +23,6 @@ if TYPE_CHECKING:
 
 _NEAR = 1.02
 """Estimates further apart than that are not the wrong way round."""
-_AT_FIRST = 3.0
-"""Rewritings that are tried on every formulation, per operation."""
 
 
 @dataclass
@@ -92,8 +90,7 @@ class LeanModels:
             outputs = build(self._tree, at_joints, graph, self._useless)
             if self._projected:
                 outputs = project(self._mechanism, graph, outputs)
-            # What is rewritten once as a whole is a better start for all that is left of it.
-            programs.append(Program.of_graph(*Written(graph, outputs).rewritten(_AT_FIRST)))
+            programs.append(Program.of_graph(*Written(graph, outputs).settled()))
         return _Variants(programs)
 
     def inverse(self, model: ReducedModel, *, constant: bool = False) -> Program:
