@@ -12,9 +12,9 @@ from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.rewriting import rewrite
 from paramreduce_cli.expressions.rows import COST, PRODUCT, SUM, Rows, rows_of, terms_of
 
-_CLOSE = {0.0: 0.01, 0.5: 0.003}
+_CLOSE = {0.0: 0.01, 1.0: 0.003}
 """After so many rewritings per operation, the share of them by which a way of writing may be behind and go on."""
-_TRIES = 1
+_TRIES = 2
 """Rewritings per operation that are tried at a time; when none of them saves anything, it ends."""
 
 

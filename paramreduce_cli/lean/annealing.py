@@ -21,7 +21,7 @@ _AT_ONCE = (1, 1, 2, 3)
 """Joints at which something is changed, each as likely as the others."""
 _FAR = 25
 """Operations by which a formulation may exceed the first as it is built, to be rewritten at all."""
-_QUICK, _THOROUGH = 250, 4000
+_QUICK, _THOROUGH = 600, 4000
 """Rewritings that are tried for every formulation, and for those that come out close to the best."""
 _CLOSE = 4
 """Operations that close means."""

@@ -95,9 +95,9 @@ FEW_OPERATIONS = "m_P mz_P Ixx_P Iyy_P Izz_P m_1 m_2 m_3 m_4 m_5 m_6 mz_1 Iyy_2 
 @pytest.mark.parametrize(
     ("name", "kept", "inverse", "direct"),
     [
-        ("puma", "full", 484, 566), ("puma", "base", 447, 534), ("puma", PAPERS_PUMA, 315, 411),
-        ("hexaglide", "full", 545, 462), ("hexaglide", "base", 521, 438),
-        ("hexaglide", PAPERS_HEXAGLIDE, 217, 177), ("hexaglide", FEW_OPERATIONS, 144, 112),
+        ("puma", "full", 480, 546), ("puma", "base", 445, 513), ("puma", PAPERS_PUMA, 315, 393),
+        ("hexaglide", "full", 532, 445), ("hexaglide", "base", 508, 421),
+        ("hexaglide", PAPERS_HEXAGLIDE, 216, 170), ("hexaglide", FEW_OPERATIONS, 143, 105),
     ],
 )  # fmt: skip
 def test_operations_of_the_leanest_formulations(name, kept, inverse, direct, request):
