@@ -156,13 +156,18 @@ def _most_shared(rows: Rows, n: int, counts: IntArray) -> tuple[int, int]:
         counts: Room for numbers of rows, (width, width)
     """
     kind, length = rows.numbers[n, KIND], rows.numbers[n, LENGTH]
+    shared = 0
+    for k in range(length):
+        shared += rows.numbers[rows.terms[n, k] >> 1, USES] > 1
+    if shared < 2:
+        return -1, -1
     for j in range(length):
         for k in range(length):
             counts[j, k] = 0
     best, first, second = 0, -1, -1
     for k in range(length):
         value = rows.terms[n, k]
-        if _place(rows, n, value, 0) < k:
+        if rows.numbers[value >> 1, USES] == 1 or _place(rows, n, value, 0) < k:
             continue
         slot = rows.numbers[value >> 1, HEAD]
         while slot != END:
@@ -284,7 +289,11 @@ def _is_own(rows: Rows, value: int) -> bool:
 @compiled(nogil=True)
 def _most_frequent_factor(rows: Rows, n: int) -> int:
     """Of the products in a sum; negative if no two of them have one in common."""
-    result, most = -1, 1
+    result, most, own = -1, 1, 0
+    for k in range(rows.numbers[n, LENGTH]):
+        own += _is_own(rows, rows.terms[n, k])
+    if own < 2:
+        return result
     for change in (1, -1):
         for k in range(rows.numbers[n, LENGTH]):
             if not _is_own(rows, rows.terms[n, k]):
