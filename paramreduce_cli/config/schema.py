@@ -45,10 +45,8 @@ class ModelSection(Section):
     """Names of the independent parameters; if left out they are taken in the order Izz Ixx Ixy Ixz Iyz mx my Iyy mz m."""
     rank_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
     """Singular values below this share of the largest one count as zero."""
-    formulations: Annotated[Whole, Field(ge=0, le=1_000_000)] = 0
-    """How many lean formulations of each function are looked at beyond those that one change after the other leads to: 1000 take some minutes for six joints and save about one operation in a hundred."""
     seed: Seed = 0
-    """Of the random states on which the rank is decided, and of these formulations."""
+    """Of the random states on which the rank is decided."""
 
 
 class TrajectoriesSection(Section):

@@ -29,12 +29,6 @@ class Written(NamedTuple):
         """Operations that they take."""
         return self.graph.count(self.outputs)
 
-    def rewritten_count(self, tries: int) -> int:
-        """Operations that are left when the laws have been applied, and so many rewritings tried."""
-        rows = self.taken_apart()
-        rewrite(rows, tries)
-        return int(rows.counters[COST])
-
     def settled(self) -> "Written":
         """The same values after the laws have been applied."""
         rows = self.taken_apart()

@@ -17,7 +17,6 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.annealing import annealed
 from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import (
     JointFormulation,
@@ -77,9 +76,6 @@ def formulations(
     affecting: BoolArray,
     base: IntArray,
     progress: Callable[[Progress], None] = lambda _: None,
-    *,
-    looks: int = 0,
-    seed: int = 0,
 ) -> Formulations:
     """Search the formulations of a mechanism.
 
@@ -87,9 +83,7 @@ def formulations(
         mechanism: Its tree is what counts.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
-        progress: Told when one of the six searches has ended, and of each look.
-        looks: Formulations that are looked at beyond that, for all and for the base parameters.
-        seed: Of these.
+        progress: Told when one of the six searches has ended.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.
@@ -109,17 +103,6 @@ def formulations(
         progress(Progress("search for formulations", next(ended), 6))
         return choices
 
-    looked = itertools.count(1)
-
-    def better(
-        build: Build, start: list[JointFormulation], dropped: set[int]
-    ) -> list[JointFormulation]:
-        choices = start
-        for found in annealed(tree, build, start, dropped, looks, seed):
-            progress(Progress("look at formulations", next(looked), 4 * looks))
-            choices = found
-        return choices
-
     def searched(
         build: Build, starts: tuple[JointFormulation, ...]
     ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
@@ -127,8 +110,7 @@ def formulations(
         full = best(build, same, useless)
         of_base = best(build, full, regrouped)
         of_few = best(build, same, minor)
-        further = [better(build, full, useless), better(build, of_base, regrouped)] if looks else []
-        found = dict.fromkeys(map(tuple, [full, of_base, of_few, *further, same, *others]))
+        found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
         return tuple(tuple(map(to_data, one)) for one in found)
 
     found = Formulations(
