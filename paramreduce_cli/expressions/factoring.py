@@ -15,7 +15,11 @@ from paramreduce_cli.expressions.rows import COST, PRODUCT, SUM, Rows, rows_of, 
 _CLOSE = {0.0: 0.01, 1.0: 0.003}
 """After so many rewritings per operation, the share of them by which a way of writing may be behind and go on."""
 _TRIES = 2
-"""Rewritings per operation that are tried at a time; when none of them saves anything, it ends."""
+"""Rewritings per operation that are tried at a time; when they save hardly anything, it ends."""
+_HARDLY = 1000
+"""One operation in so many: what less than that is saved by ends it."""
+_LONG = 1000
+"""Operations, from which on fewer are tried, as each takes longer and there are more places to save something."""
 
 
 class Written(NamedTuple):
@@ -84,7 +88,7 @@ def least(ways: Iterable[Written]) -> Written:
     apart = [(way, way.taken_apart()) for way in ways]
     for tries, share in _CLOSE.items():
         for _, rows in apart:
-            rewrite(rows, int(tries * rows.counters[COST]))
+            rewrite(rows, int(tries * _places(rows)))
         close = (1 + share) * min(rows.counters[COST] for _, rows in apart)
         apart = [(way, rows) for way, rows in apart if rows.counters[COST] <= close]
     for _, rows in apart:
@@ -93,11 +97,16 @@ def least(ways: Iterable[Written]) -> Written:
 
 
 def _rewrite_to_the_end(rows: Rows) -> None:
-    saved = 1
-    while saved:
-        count = int(rows.counters[COST])
-        rewrite(rows, _TRIES * count)
+    count = saved = int(rows.counters[COST])
+    while saved > count // _HARDLY:
+        rewrite(rows, _TRIES * _places(rows))
         saved = count - int(rows.counters[COST])
+        count -= saved
+
+
+def _places(rows: Rows) -> int:
+    count = int(rows.counters[COST])
+    return min(count, _LONG**2 // max(count, 1))
 
 
 class _Assembly:
