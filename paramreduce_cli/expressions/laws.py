@@ -300,10 +300,8 @@ def _most_frequent_factor(rows: Rows, n: int) -> int:
                 continue
             product = rows.terms[n, k] >> 1
             for i in range(rows.numbers[product, LENGTH]):
-                value, again = rows.terms[product, i], False
-                for j in range(i):
-                    again |= rows.terms[product, j] == value
-                if again:
+                value = rows.terms[product, i]
+                if _place(rows, product, value, 0) < i:
                     continue
                 rows.numbers[value >> 1, COUNT] += change
                 count = rows.numbers[value >> 1, COUNT]

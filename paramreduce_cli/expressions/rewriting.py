@@ -58,8 +58,10 @@ def rewrite(rows: Rows, tries: int) -> None:
 @compiled(nogil=True)
 def _rewrite_somewhere(rows: Rows) -> None:
     for _ in range(_LOOKS):
+        if rows.counters[FAILED]:
+            return
         n = dice(rows) % rows.numbers.shape[0]
-        if rows.numbers[n, KIND] == NONE or rows.counters[FAILED]:
+        if rows.numbers[n, KIND] == NONE:
             continue
         place = dice(rows) % rows.numbers[n, LENGTH]
         held = rows.numbers[rows.terms[n, place] >> 1, KIND]

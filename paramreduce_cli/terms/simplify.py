@@ -230,13 +230,13 @@ def simplified(
 
     def gone_on(way: _Way) -> _Way:
         """From the leanest program as it is rewritten: it has other terms, and some may go again."""
-        for _, passed in sorted(way.visited.items())[:1]:
-            tape = Tape(way.simplified(passed).program)
-            search = searched(way.start, tape, closely)
-            way = replace(way, search=search, tape=tape, end=search.start(passed.beta), visited={})
-            if way.end.fit.within:
-                return improved(descended(way), rounds // 2)
-        return replace(way, visited={})
+        if not way.visited:
+            return way
+        passed = way.visited[min(way.visited)]
+        tape = Tape(way.simplified(passed).program)
+        search = searched(way.start, tape, closely)
+        way = replace(way, search=search, tape=tape, end=search.start(passed.beta), visited={})
+        return improved(descended(way), rounds // 2) if way.end.fit.within else way
 
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:

@@ -77,3 +77,26 @@ def test_all_loops_of_the_package_are_kept_that_way():
                 found += 1
                 assert isinstance(loop._cache._cache_file, _CheckedCache), loop
     assert found > 20
+
+
+def test_a_change_in_a_file_beside_is_noticed(tmp_path):
+    (tmp_path / "inner_loop.py").write_text(
+        "from paramreduce_cli.expressions.loops import compiled\n"
+        "@compiled()\ndef inner(a):\n    return a + 1\n"
+    )
+    (tmp_path / "outer_loop.py").write_text(
+        "from paramreduce_cli.expressions.loops import compiled\nfrom inner_loop import inner\n"
+        "@compiled()\ndef outer(a):\n    return 2 * inner(a)\n"
+    )
+
+    def said():
+        program = "import outer_loop; print(outer_loop.outer(3))"
+        command = [sys.executable, "-c", program]
+        return subprocess.run(
+            command, cwd=tmp_path, capture_output=True, text=True, check=True
+        ).stdout.strip()
+
+    assert said() == "8"
+    inner = tmp_path / "inner_loop.py"
+    inner.write_text(inner.read_text().replace("a + 1", "a + 20"))
+    assert said() == "46"

@@ -63,7 +63,7 @@ def test_counts_and_chains_are_those_of_the_rows(made):
     assert all(value % 2 == 0 for row in products.values() for value in row)
 
 
-def test_where_there_is_no_room_everything_stays(monkeypatch):
+def test_where_there_is_no_room_everything_stays():
     graph = Graph()
     a, b, c, d = (graph.input(k) for k in range(4))
     total = graph.add(graph.multiply(a, b), graph.multiply(c, d))
