@@ -6,9 +6,6 @@ factor common to terms of a sum is taken out. Only rows that wait are looked at.
 
 from __future__ import annotations
 
-import numpy as np
-
-from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.expressions.rows import (
     AFTER,
     COST,
@@ -39,11 +36,11 @@ from paramreduce_cli.expressions.rows import (
     put,
     remove,
     wait,
+    within,
 )
-from paramreduce_cli.records import IntArray
 
 
-@compiled(nogil=True)
+@within
 def settle(rows: Rows, products_first: bool) -> None:
     """Apply all laws until none saves an operation.
 
@@ -68,7 +65,7 @@ def settle(rows: Rows, products_first: bool) -> None:
         tidy(rows)
 
 
-@compiled(nogil=True)
+@within
 def tidy(rows: Rows) -> None:
     """Drop rows that nothing uses, and take those that one other row uses into it where both are sums, or products."""
     width = rows.terms.shape[1]
@@ -97,7 +94,7 @@ def tidy(rows: Rows) -> None:
                 wait(rows, TIDY, held)
 
 
-@compiled(nogil=True)
+@within
 def _resolve(rows: Rows, n: int) -> None:
     """Have others hold a row's only term in its place; products hold none that is negative."""
     width = rows.terms.shape[1]
@@ -112,13 +109,12 @@ def _resolve(rows: Rows, n: int) -> None:
             slot = rows.numbers[n, HEAD]
 
 
-@compiled(nogil=True)
+@within
 def insert(rows: Rows, holder: int, place: int) -> None:
     """Put the terms of what is at a place of a row there instead."""
     kind, value = rows.numbers[holder, KIND], rows.terms[holder, place]
     held = value >> 1
-    row = np.empty(2 * rows.terms.shape[1], dtype=np.int64)
-    length = 0
+    row, length = rows.room[0], 0
     for k in range(rows.numbers[holder, LENGTH]):
         if k != place:
             row[length] = rows.terms[holder, k]
@@ -129,32 +125,25 @@ def insert(rows: Rows, holder: int, place: int) -> None:
     put(rows, holder, kind, row[:length])
 
 
-@compiled(nogil=True)
+@within
 def share(rows: Rows, kind: int) -> None:
     """Compute pairs once that rows of a kind have in common."""
-    width = rows.terms.shape[1]
-    counts = np.empty((width, width), dtype=np.int64)
     which = SHARE_SUM if kind == SUM else SHARE_PRODUCT
     while True:
         n = next_waiting(rows, which)
         if n < 0:
             break
         while rows.numbers[n, KIND] == kind and not rows.counters[FAILED]:
-            first, second = _most_shared(rows, n, counts)
+            first, second = _most_shared(rows, n)
             if first < 0:
                 break
             _compute_once(rows, kind, rows.terms[n, first], rows.terms[n, second])
 
 
-@compiled(nogil=True)
-def _most_shared(rows: Rows, n: int, counts: IntArray) -> tuple[int, int]:
-    """Places of the two terms of a row that most others of its kind have too; negative if none has.
-
-    Args:
-        rows: All of them.
-        n: The row.
-        counts: Room for numbers of rows, (width, width)
-    """
+@within
+def _most_shared(rows: Rows, n: int) -> tuple[int, int]:
+    """Places of the two terms of a row that most others of its kind have too; negative if none has."""
+    counts = rows.pairs
     kind, length = rows.numbers[n, KIND], rows.numbers[n, LENGTH]
     shared = 0
     for k in range(length):
@@ -196,7 +185,7 @@ def _most_shared(rows: Rows, n: int, counts: IntArray) -> tuple[int, int]:
     return first, second
 
 
-@compiled(nogil=True)
+@within
 def _place(rows: Rows, n: int, value: int, start: int) -> int:
     """Where a row has a term, from a place on; END if it has not."""
     for k in range(start, rows.numbers[n, LENGTH]):
@@ -205,7 +194,7 @@ def _place(rows: Rows, n: int, value: int, start: int) -> int:
     return END
 
 
-@compiled(nogil=True)
+@within
 def _sign_of_pair(rows: Rows, n: int, a: int, b: int) -> int:
     """The sign with which a row has a pair of terms; negative if it does not have it."""
     for sign in range(2):
@@ -220,23 +209,21 @@ def _sign_of_pair(rows: Rows, n: int, a: int, b: int) -> int:
     return -1
 
 
-@compiled(nogil=True)
+@within
 def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
     """Have all rows of a kind refer to one row for a pair of terms."""
-    width = rows.terms.shape[1]
     rarer = a if rows.numbers[a >> 1, USES] <= rows.numbers[b >> 1, USES] else b
-    holders = np.empty(rows.numbers[rarer >> 1, USES], dtype=np.int64)
+    row, holders = rows.room[0], rows.room[1]
     found, shared, slot = 0, -1, rows.numbers[rarer >> 1, HEAD]
     while slot >= 0:
         n = rows.links[slot, ROW]
         sign = _sign_of_pair(rows, n, a, b) if rows.numbers[n, KIND] == kind else -1
         if sign >= 0 and rows.numbers[n, LENGTH] == 2 and shared < 0:
             shared = 2 * n + sign
-        elif sign >= 0:
+        elif sign >= 0 and found < holders.size:
             holders[found] = n
             found += 1
         slot = rows.links[slot, AFTER]
-    row = np.empty(width + 1, dtype=np.int64)
     if shared < 0:
         row[0], row[1] = a, b
         shared = new(rows, kind, row[:2])
@@ -259,7 +246,7 @@ def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
         put(rows, n, kind, row[: length + 1])
 
 
-@compiled(nogil=True)
+@within
 def factor(rows: Rows) -> None:
     """Take factors common to terms of a sum out of it, the most frequent first."""
     while True:
@@ -275,7 +262,7 @@ def factor(rows: Rows) -> None:
             _take_out(rows, n, common)
 
 
-@compiled(nogil=True)
+@within
 def _is_own(rows: Rows, value: int) -> bool:
     """Whether a term is a product that nothing else uses."""
     n = value >> 1
@@ -286,7 +273,7 @@ def _is_own(rows: Rows, value: int) -> bool:
     )
 
 
-@compiled(nogil=True)
+@within
 def _most_frequent_factor(rows: Rows, n: int) -> int:
     """Of the products in a sum; negative if no two of them have one in common."""
     result, most, own = -1, 1, 0
@@ -310,13 +297,9 @@ def _most_frequent_factor(rows: Rows, n: int) -> int:
     return result
 
 
-@compiled(nogil=True)
+@within
 def _take_out(rows: Rows, n: int, common: int) -> None:
-    width = rows.terms.shape[1]
-    rest = np.empty(width, dtype=np.int64)
-    inner = np.empty(width, dtype=np.int64)
-    left = np.empty(width, dtype=np.int64)
-    divided = np.empty(width, dtype=np.int64)
+    rest, inner, left, divided = rows.room[0], rows.room[1], rows.room[2], rows.room[3]
     n_inner, n_left = 0, 0
     for k in range(rows.numbers[n, LENGTH]):
         value, length, has = rows.terms[n, k], 0, False

@@ -70,7 +70,7 @@ def compiled(**options: Any) -> Callable[[Loop], Loop]:
     """
 
     def made(function: Loop) -> Loop:
-        dispatcher: Any = numba.njit(cache=True, **options)(function)
+        dispatcher: Any = numba.njit(cache=True, no_cfunc_wrapper=True, **options)(function)
         if hasattr(
             dispatcher, "_cache"
         ):  # not where NUMBA_DISABLE_JIT leaves functions as they are

@@ -7,10 +7,7 @@ distributed over a sum; what comes of it is settled again, and kept if it takes 
 
 from __future__ import annotations
 
-import numpy as np
-
 from paramreduce_cli.expressions.laws import insert, settle
-from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.expressions.rows import (
     COST,
     FAILED,
@@ -24,9 +21,11 @@ from paramreduce_cli.expressions.rows import (
     dice,
     keep,
     new,
+    on_rows,
     put,
     undo,
     wait,
+    within,
 )
 
 _AT_MOST = 6
@@ -35,7 +34,7 @@ _LOOKS = 10_000
 """At places, until one is found where something can be rewritten."""
 
 
-@compiled(nogil=True)
+@on_rows
 def rewrite(rows: Rows, tries: int) -> None:
     """Save operations.
 
@@ -55,7 +54,7 @@ def rewrite(rows: Rows, tries: int) -> None:
             keep(rows)
 
 
-@compiled(nogil=True)
+@within
 def _rewrite_somewhere(rows: Rows) -> None:
     for _ in range(_LOOKS):
         if rows.counters[FAILED]:
@@ -73,7 +72,7 @@ def _rewrite_somewhere(rows: Rows) -> None:
             return
 
 
-@compiled(nogil=True)
+@within
 def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
     """Make a product with a sum a sum of products.
 
@@ -83,8 +82,7 @@ def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
         place: Of the sum among its factors.
         joined: Whether products in the sum are written out.
     """
-    width = rows.terms.shape[1]
-    total, row = np.empty(width, dtype=np.int64), np.empty(2 * width, dtype=np.int64)
+    row, total = rows.room[0], rows.room[1]
     factor = rows.terms[n, place]
     terms, length = factor >> 1, rows.numbers[factor >> 1, LENGTH]
     for i in range(length):

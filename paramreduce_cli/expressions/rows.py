@@ -32,6 +32,11 @@ COST, SAVED, LAST, DICE, FAILED, WAITING = range(6)
 last on, how many wait on each list."""
 END = -1
 
+on_rows = compiled(nogil=True, _nrt=False)
+"""For functions of rows: they make no arrays, so that none need be counted at each call, which takes half of their time."""
+within = compiled(nogil=True, _nrt=False, no_cpython_wrapper=True)
+"""The same where only other such functions call them: nothing is compiled for calls from Python."""
+
 
 class Rows(NamedTuple):
     """All rows of some values; few arrays, as each takes the compiler's time."""
@@ -50,6 +55,10 @@ class Rows(NamedTuple):
     """(size, width)"""
     counters: IntArray
     """(WAITING + lists,)"""
+    room: IntArray
+    """For rows that are being made, (4, 2 * size + 2 * width)"""
+    pairs: IntArray
+    """For counts of pairs of terms, (width, width)"""
 
 
 def rows_of(
@@ -84,6 +93,8 @@ def rows_of(
         saved=zeros(size, 3),
         saved_terms=zeros(size, width),
         counters=zeros(WAITING + lists),
+        room=zeros(4, 2 * (size + width)),
+        pairs=zeros(width, width),
     )
     rows.numbers[:, [HEAD, HIT]] = END
     rows.numbers[list(pinned), PINNED] = True
@@ -102,7 +113,7 @@ def terms_of(rows: Rows, kind: int) -> dict[int, list[int]]:
     return {n: rows.terms[n, : rows.numbers[n, LENGTH]].tolist() for n in numbers}
 
 
-@compiled(nogil=True)
+@within
 def dice(rows: Rows) -> int:
     """A random number, the same on every machine."""
     state = (rows.counters[DICE] * 1103515245 + 12345) & 0x7FFFFFFFFFFF
@@ -110,7 +121,7 @@ def dice(rows: Rows) -> int:
     return state >> 16
 
 
-@compiled(nogil=True)
+@within
 def wait(rows: Rows, which: int, number: int) -> None:
     """Put a number on a list, once."""
     if not rows.numbers[number, WAITS + which]:
@@ -119,7 +130,7 @@ def wait(rows: Rows, which: int, number: int) -> None:
         rows.counters[WAITING + which] += 1
 
 
-@compiled(nogil=True)
+@within
 def next_waiting(rows: Rows, which: int) -> int:
     """Take the last number off a list; negative if it is empty, or if something has failed."""
     if rows.counters[WAITING + which] == 0 or rows.counters[FAILED]:
@@ -130,7 +141,7 @@ def next_waiting(rows: Rows, which: int) -> int:
     return number
 
 
-@compiled(nogil=True)
+@within
 def _replace(rows: Rows, number: int, kind: int, row: IntArray) -> None:
     width, length = rows.terms.shape[1], row.size
     for k in range(rows.numbers[number, LENGTH]):
@@ -162,7 +173,7 @@ def _replace(rows: Rows, number: int, kind: int, row: IntArray) -> None:
         rows.counters[COST] += length - 1
 
 
-@compiled(nogil=True)
+@within
 def _cancelled(row: IntArray) -> int:
     """Take terms out with their opposites; how many are left."""
     left = 0
@@ -180,7 +191,7 @@ def _cancelled(row: IntArray) -> int:
     return left
 
 
-@compiled(nogil=True)
+@on_rows
 def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
     """Give a number another row; it fails where the row is too long.
 
@@ -191,9 +202,10 @@ def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
         row: Its terms; of a sum, opposites vanish, and if none is left it is zero. Changed.
     """
     if kind == SUM:
-        row = row[: _cancelled(row)]
-        if row.size == 0:
-            row = np.zeros(1, dtype=np.int64)
+        length = _cancelled(row)
+        if length == 0:
+            row[0], length = 0, 1
+        row = row[:length]
     if row.size > rows.terms.shape[1]:
         rows.counters[FAILED] = 1
         return
@@ -215,13 +227,13 @@ def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
         wait(rows, FACTOR, number)
 
 
-@compiled(nogil=True)
+@within
 def remove(rows: Rows, number: int) -> None:
     """Take a number's row away."""
     put(rows, number, NONE, rows.terms[number, :0])
 
 
-@compiled(nogil=True)
+@within
 def new(rows: Rows, kind: int, row: IntArray) -> int:
     """A reference to a new number with a row; it fails where none is left."""
     number = rows.counters[LAST]
@@ -236,7 +248,7 @@ def new(rows: Rows, kind: int, row: IntArray) -> int:
     return 0
 
 
-@compiled(nogil=True)
+@on_rows
 def keep(rows: Rows) -> None:
     """Make this what :func:`undo` returns to."""
     for k in range(rows.counters[SAVED]):
@@ -244,7 +256,7 @@ def keep(rows: Rows) -> None:
     rows.counters[SAVED] = 0
 
 
-@compiled(nogil=True)
+@within
 def undo(rows: Rows) -> None:
     """Return to what was kept; nothing waits then."""
     for k in range(rows.counters[SAVED]):
