@@ -32,10 +32,10 @@ COST, SAVED, LAST, DICE, FAILED, WAITING = range(6)
 last on, how many wait on each list."""
 END = -1
 
-on_rows = compiled(nogil=True, _nrt=False)
-"""For functions of rows: they make no arrays, so that none need be counted at each call, which takes half of their time."""
-within = compiled(nogil=True, _nrt=False, no_cpython_wrapper=True)
-"""The same where only other such functions call them: nothing is compiled for calls from Python."""
+on_rows = compiled(makes_arrays=False)
+"""For functions of rows that are called from Python, too."""
+within = compiled(within=True, makes_arrays=False)
+"""For all others."""
 
 
 class Rows(NamedTuple):

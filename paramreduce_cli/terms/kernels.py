@@ -24,7 +24,7 @@ NUMBER = -1
 """What a node stands for that is a number."""
 
 
-@compiled(nogil=True)
+@compiled()
 def needed(
     codes: IntArray, operands: IntArray, outputs: IntArray, kept: BoolArray, source: IntArray
 ) -> BoolArray:
@@ -46,7 +46,7 @@ def needed(
     return used
 
 
-@compiled(nogil=True)
+@compiled(within=True)
 def _made(
     k: int,
     codes: IntArray,
@@ -89,7 +89,7 @@ def _made(
                 result[i] = np.sign(x)
 
 
-@compiled(nogil=True)
+@compiled()
 def values(
     codes: IntArray,
     operands: IntArray,
@@ -115,7 +115,7 @@ def values(
     return v
 
 
-@compiled(nogil=True)
+@compiled()
 def own_values(
     codes: IntArray,
     operands: IntArray,
@@ -131,7 +131,7 @@ def own_values(
     return own
 
 
-@compiled(nogil=True)
+@compiled()
 def adjoints(
     codes: IntArray,
     operands: IntArray,
@@ -204,7 +204,7 @@ def adjoints(
     return found
 
 
-@compiled(nogil=True)
+@compiled()
 def effects(
     operands: IntArray,
     kept: BoolArray,
@@ -243,7 +243,7 @@ def effects(
     return result
 
 
-@compiled(nogil=True)
+@compiled()
 def combinations(
     codes: IntArray,
     operands: IntArray,
@@ -306,7 +306,7 @@ def combinations(
     return found, coefficients
 
 
-@compiled(nogil=True)
+@compiled()
 def count(
     codes: IntArray,
     operands: IntArray,
@@ -365,7 +365,7 @@ def count(
     return found
 
 
-@compiled(nogil=True)
+@compiled()
 def counts(
     codes: IntArray,
     operands: IntArray,
@@ -392,7 +392,7 @@ def counts(
     return result
 
 
-@compiled(nogil=True)
+@compiled()
 def counts_standing(
     codes: IntArray,
     operands: IntArray,

@@ -42,7 +42,7 @@ def roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
         return np.ascontiguousarray(R.transpose(1, 2, 0))
 
 
-@compiled(nogil=True)
+@compiled()
 def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
     """Upper triangles times vectors, sample by sample.
 
@@ -63,7 +63,7 @@ def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
     return result
 
 
-@compiled(nogil=True)
+@compiled(within=True)
 def _factored(a: FloatArray) -> bool:
     """The lower triangle by Cholesky, in place; whether there is one."""
     n = a.shape[0]
@@ -82,7 +82,7 @@ def _factored(a: FloatArray) -> bool:
     return True
 
 
-@compiled(nogil=True)
+@compiled()
 def _positive_definite(matrices: FloatArray) -> bool:
     lower = np.empty(matrices.shape[1:])
     for s in range(matrices.shape[0]):
@@ -92,7 +92,7 @@ def _positive_definite(matrices: FloatArray) -> bool:
     return True
 
 
-@compiled(nogil=True)
+@compiled()
 def _inverses(matrices: FloatArray) -> tuple[FloatArray, bool]:
     m, n, _ = matrices.shape
     result = np.zeros((m, n, n))

@@ -137,7 +137,7 @@ def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float,
     return float(torque), float(acceleration)
 
 
-@compiled(nogil=True)
+@compiled()
 def _projected(
     entries: FloatArray, rows: IntArray, columns: IntArray, tangent: FloatArray
 ) -> FloatArray:

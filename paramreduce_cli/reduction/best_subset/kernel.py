@@ -22,7 +22,7 @@ A node is three arrays:
 * ``errors``: INSIDE and BOUND.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 
@@ -53,11 +53,12 @@ FREE, NULLITY, INCLUDED, BRANCH, MARK, NEAR, FIRST = 0, 1, 2, 3, 4, 5, 6
 INSIDE, BOUND = 0, 1
 LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
 DONE, PAUSED = 0, 1
+# What is handed on is not written as a plain number: for each of those Numba compiles a function anew.
+_NO_COLUMN = cast("int", np.int64(-1))
+_INCLUDED, _EXCLUDED = cast("tuple[bool, bool]", (np.bool_(True), np.bool_(False)))
 
-_compiled = compiled(nogil=True, _nrt=False)
-"""Without reference counts, whose atomic steps for the arrays of Data and State took seven tenths
-of the time. Such functions make no array: all that they see belong to who called them from Python."""
-_making_arrays = compiled(_nrt=True)
+_within = compiled(within=True, makes_arrays=False)
+_making_arrays = compiled(within=True)
 
 
 class Data(NamedTuple):
@@ -110,7 +111,7 @@ class State(NamedTuple):
     """Room to work in, (n_columns,)."""
 
 
-@_compiled
+@_within
 def _position(numbers: IntArray, column: int) -> int:
     for j in range(numbers[FREE]):
         if numbers[FIRST + j] == column:
@@ -118,7 +119,7 @@ def _position(numbers: IntArray, column: int) -> int:
     return -1
 
 
-@_compiled
+@_within
 def _drop(sheet: FloatArray, numbers: IntArray, j: int) -> None:
     """Put the last free column in place of column j."""
     n, last = sheet.shape[1], numbers[FREE] - 1
@@ -135,7 +136,7 @@ def _drop(sheet: FloatArray, numbers: IntArray, j: int) -> None:
         sheet[row, j] = sheet[row, last]
 
 
-@_compiled
+@_within
 def _sweep(sheet: FloatArray, start: int, row: int, j: int, own: FloatArray) -> None:
     """Take column j out of the matrix and the vector of one form; its own entries are not used again.
 
@@ -157,7 +158,7 @@ def _sweep(sheet: FloatArray, start: int, row: int, j: int, own: FloatArray) -> 
         line[k] -= step * own[k]
 
 
-@_compiled
+@_within
 def _share(sheet: FloatArray, nullity: int, j: int) -> float:
     """Squared share of a column in the null space of all included and free columns."""
     start, share = 2 * sheet.shape[1], 0.0
@@ -166,7 +167,7 @@ def _share(sheet: FloatArray, nullity: int, j: int) -> float:
     return share
 
 
-@_compiled
+@_within
 def _exclude(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
@@ -276,7 +277,7 @@ def _span(s: State, data: Data, count: int) -> None:
     s.progress[SPANNED] = max(s.progress[SPANNED], count)
 
 
-@_compiled
+@_within
 def _include(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
@@ -307,7 +308,7 @@ def _calculate_anew(
     errors[INSIDE] = np.dot(left, left)
 
 
-@_compiled
+@_within
 def _decide(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int,
     include: bool,
@@ -328,7 +329,7 @@ def _decide(
             _exclude(sheet, numbers, errors, s, data, j)
 
 
-@_compiled
+@_within
 def _branch(s: State, data: Data, unit: int) -> None:
     """Keep the node for later and go on with a copy of it that includes a unit."""
     level = s.progress[LEVEL]
@@ -350,7 +351,7 @@ def _branch(s: State, data: Data, unit: int) -> None:
         s.numbers[level + 1, k] = numbers[k]
     s.errors[level + 1, INSIDE] = s.errors[level, INSIDE]
     s.errors[level + 1, BOUND] = s.errors[level, BOUND]
-    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, True)
+    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, _INCLUDED)
 
 
 @_making_arrays
@@ -366,7 +367,7 @@ def _parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
     return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
 
 
-@_compiled
+@_within
 def _exclude_parallel(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
 ) -> None:
@@ -381,11 +382,11 @@ def _exclude_parallel(
         if j == own or not near or data.size[data.unit[column]] > 1:
             continue
         if _parallel(s, data, numbers[INCLUDED], data.first[unit], column):
-            _decide(sheet, numbers, errors, s, data, data.unit[column], False)
+            _decide(sheet, numbers, errors, s, data, data.unit[column], _EXCLUDED)
             own = _position(numbers, data.first[unit])
 
 
-@_compiled
+@compiled(makes_arrays=False)
 def go_back(s: State, data: Data) -> None:
     """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
@@ -397,10 +398,10 @@ def go_back(s: State, data: Data) -> None:
     unit = numbers[BRANCH]
     if data.size[unit] == 1:
         _exclude_parallel(sheet, numbers, errors, s, data, unit)
-    _decide(sheet, numbers, errors, s, data, unit, False)
+    _decide(sheet, numbers, errors, s, data, unit, _EXCLUDED)
 
 
-@_compiled
+@_within
 def _threshold(best: float, factor: float, uncertainty: float) -> float:
     wanted: float = best * factor
     return wanted + 2 * np.sqrt(wanted) * uncertainty
@@ -431,7 +432,7 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
         s.subset[:] = subset
 
 
-@_compiled
+@_within
 def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
@@ -441,7 +442,7 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
     while True:
         threshold = _threshold(s.best[0], data.factor, data.uncertainty)
         if errors[INSIDE] < threshold + data.slack:
-            _offer(s, data, numbers[INCLUDED], -1, -1)
+            _offer(s, data, numbers[INCLUDED], _NO_COLUMN, _NO_COLUMN)
             threshold = _threshold(s.best[0], data.factor, data.uncertainty)
         places = data.places - numbers[INCLUDED]
         if errors[BOUND] >= threshold or places == 0 or numbers[FREE] == 0:
@@ -451,16 +452,16 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
             sheet, numbers, data.unit, data.size, places, room
         )
         if useless >= 0:
-            _decide(sheet, numbers, errors, s, data, useless, False)
+            _decide(sheet, numbers, errors, s, data, useless, _EXCLUDED)
         elif needed > places:
             return False
         elif must < 0:
             return True
         else:
-            _decide(sheet, numbers, errors, s, data, must, True)
+            _decide(sheet, numbers, errors, s, data, must, _INCLUDED)
 
 
-@_compiled
+@_within
 def _needed(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
     """Whether the bound rises by at least ``room`` when a column is excluded."""
     own = sheet[sheet.shape[0] - 1, j]
@@ -469,7 +470,7 @@ def _needed(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
     return _share(sheet, nullity, j) <= APART
 
 
-@_compiled
+@_within
 def _needed_and_useless(
     sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
 ) -> tuple[int, int, int]:
@@ -490,7 +491,7 @@ def _needed_and_useless(
     return needed, must, -1
 
 
-@_compiled
+@_within
 def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data) -> None:
     """Try every free column in the last place."""
     row = sheet.shape[0] - 2
@@ -498,11 +499,11 @@ def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, d
     for j in range(numbers[FREE]):
         part = abs(sheet[row, j]) + ROUND_OFF
         if part * part > (inside - limit) * (sheet[j, j] - ROUND_OFF):
-            _offer(s, data, numbers[INCLUDED], numbers[FIRST + j], -1)
+            _offer(s, data, numbers[INCLUDED], numbers[FIRST + j], _NO_COLUMN)
             limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
-@_compiled
+@_within
 def _last_two_places(
     sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
 ) -> None:
@@ -514,7 +515,7 @@ def _last_two_places(
         step = moments[i] / own[i]
         left = inside - moments[i] * step
         if left < limit:  # every pair may be dependent
-            _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], -1)
+            _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], _NO_COLUMN)
             limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
         if _any_explains(sheet[i, :i], own[:i], moments[:i], own[i], step, left - limit):
             for j in range(i):
@@ -523,7 +524,7 @@ def _last_two_places(
                     limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
-@_compiled
+@_within
 def _explains(
     shared: float, own: float, moment: float, beside: float, step: float, gap: float
 ) -> bool:
@@ -533,7 +534,7 @@ def _explains(
     return bool((rest > GONE) & (part * part > gap * (rest - ROUND_OFF)))
 
 
-@_compiled
+@_within
 def _any_explains(
     shared: FloatArray, own: FloatArray, moments: FloatArray, beside: float, step: float, gap: float
 ) -> bool:
@@ -544,7 +545,7 @@ def _any_explains(
     return found
 
 
-@_compiled
+@_within
 def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
     """The free column to branch on: that of the largest product of what including it explains and
     what excluding it costs the bound; by the latter alone an arm's searches take two thirds more nodes.
@@ -560,7 +561,7 @@ def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
     return int(chosen)
 
 
-@_compiled
+@compiled(makes_arrays=False)
 def search(s: State, data: Data, most: int) -> tuple[int, int]:
     """Go on for at most so many nodes.
 
@@ -591,7 +592,7 @@ def search(s: State, data: Data, most: int) -> tuple[int, int]:
     return PAUSED, most
 
 
-@_making_arrays
+@compiled()
 def repeat(s: State, data: Data, log: IntArray) -> None:
     """Go the way that another search has logged."""
     for k in range(log.size):
