@@ -122,6 +122,15 @@ def dice(rows: Rows) -> int:
 
 
 @within
+def place_of(rows: Rows, n: int, value: int, start: int) -> int:
+    """Where a row has a term, from a place on; END if it has not."""
+    for k in range(start, rows.numbers[n, LENGTH]):
+        if rows.terms[n, k] == value:
+            return k
+    return END
+
+
+@within
 def wait(rows: Rows, which: int, number: int) -> None:
     """Put a number on a list, once."""
     if not rows.numbers[number, WAITS + which]:
