@@ -4,131 +4,28 @@ One joint after the other, from the tips inwards, the best alternative is taken 
 anything. What is counted is the part of the tree around the joint, carried by whatever is before it,
 so that the work grows with the number of joints; only what wrenches meet that are handed on from far
 beyond is decided on the whole. Subtrees on the base share nothing, so each is searched by itself, and equal ones once.
-What is best depends on the parameters that are kept; :func:`formulations` searches for all, for
-the base parameters and for the few that matter most: masses, first moments and the moments of
-inertia about the joints' own axes.
 """
 
-import itertools
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
-from paramreduce_cli.lean.choices import (
-    JointFormulation,
-    Place,
-    alternatives,
-    far_reaching,
-    to_data,
-)
-from paramreduce_cli.lean.motion import Rates
-from paramreduce_cli.lean.tree import Joint, Tree, lean_tree
-from paramreduce_cli.records import (
-    BASE,
-    BoolArray,
-    Formulations,
-    IntArray,
-    Kind,
-    Mechanism,
-    Progress,
-    Rigid,
-)
+from paramreduce_cli.lean.building import Build
+from paramreduce_cli.lean.choices import JointFormulation, alternatives, far_reaching
+from paramreduce_cli.lean.tree import Joint, Tree
+from paramreduce_cli.records import BASE, Rigid
 
 Options = Callable[[JointFormulation, Joint], list[JointFormulation]]
 """Gives the alternatives to a choice at a joint."""
 
-_FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
-_MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)
-_INVERSE_STARTS = (
-    JointFormulation(),
-    JointFormulation(aligned=True),
-    JointFormulation(mass=Place.REST, axial=Place.REST),
-    JointFormulation(aligned=True, radial=Place.REST, rates=Rates.DIRECT),
-)
 _BEFORE = 3
 """Joints before one that are looked at for most of its choices, and those just beyond: what these
 change further away is the same for all alternatives, or nearly."""
 _LOOKS = 4
 """At a joint, at most: what is best here and what is best there may take turns."""
-_AT_REST = JointFormulation(
-    aligned=True, rates=Rates.DIRECT, radial=Place.REST, polar=Place.REST, tilt=Place.REST,
-    plane=Place.REST,
-)  # fmt: skip
-_COMPOSITE = JointFormulation(
-    radial=Place.BEFORE, polar=Place.BEFORE, tilt=Place.BEFORE, plane=Place.BEFORE
-)
-"""The bias from the composite bodies that the mass matrix is made of."""
-_DIRECT_STARTS = (_COMPOSITE, replace(_COMPOSITE, aligned=True), _AT_REST, *_INVERSE_STARTS)
-"""The same at all joints: the search starts from the first, and all stay beside what it finds, as
-they suit odd sets of few parameters."""
-
-
 _found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
-
-
-def formulations(
-    mechanism: Mechanism,
-    affecting: BoolArray,
-    base: IntArray,
-    progress: Callable[[Progress], None] = lambda _: None,
-) -> Formulations:
-    """Search the formulations of a mechanism.
-
-    Args:
-        mechanism: Its tree is what counts.
-        affecting: Parameters that change the torques at all, (n_parameters,).
-        base: Indices of the base parameters.
-        progress: Told when one of the six searches has ended.
-
-    Returns:
-        Choices for the inverse and for the direct dynamics, each different set once.
-    """
-    tree = lean_tree(mechanism)
-    everything = set(range(affecting.size))
-    useless = everything - set(affecting.nonzero()[0].tolist())
-    regrouped = everything - set(base.tolist())
-    minor = useless | (everything - _main_parameters(tree))
-
-    ended = itertools.count(1)
-
-    def best(
-        build: Build, start: list[JointFormulation], dropped: set[int]
-    ) -> list[JointFormulation]:
-        choices = best_choices(tree, build, start, dropped)
-        progress(Progress("search for formulations", next(ended), 6))
-        return choices
-
-    def searched(
-        build: Build, starts: tuple[JointFormulation, ...]
-    ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
-        same, *others = ([start] * len(tree.joints) for start in starts)
-        full = best(build, same, useless)
-        of_base = best(build, full, regrouped)
-        of_few = best(build, same, minor)
-        found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
-        return tuple(tuple(map(to_data, one)) for one in found)
-
-    found = Formulations(
-        searched(inverse_outputs, _INVERSE_STARTS), searched(direct_outputs, _DIRECT_STARTS)
-    )
-    forget()
-    return found
-
-
-def _main_parameters(tree: Tree) -> set[int]:
-    """Positions of masses, first moments and the moments of inertia about the joints' axes."""
-    result = set()
-    for joint in tree.joints:
-        for rigid in joint.rigid:
-            axis = np.abs((joint.described_to_axis @ rigid.frame)[2, :3])
-            kinds = (*_FIRST_MOMENTS, _MOMENTS[int(np.argmax(axis))])
-            result |= {rigid.columns[kind] for kind in kinds}
-    return result
 
 
 def best_choices(

@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.config.schema import ModelSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.lean.checking import check_formulations
-from paramreduce_cli.lean.search import formulations
+from paramreduce_cli.lean.formulations import formulations
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters, regrouping
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled

@@ -1,12 +1,14 @@
 """reduce-terms: functions of reduced models with terms left out."""
 
 import warnings
+from dataclasses import replace
 
 import numpy as np
 
 from paramreduce_cli.config.schema import SamplingSection
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.lean.formulations import formulations_for
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
     UNSHARED,
@@ -35,6 +37,8 @@ _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
 _PARTS = 4
 """Of a log's training part, which are fitted to and watched by turns."""
+_SUITED = 2
+"""Starts for which formulations are searched, the smallest ones."""
 _FITTED = 1000
 """Samples of the estimation set to which the parameters of what is left are fitted."""
 
@@ -97,6 +101,9 @@ def _searched(
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
     starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
+    smallest = [start.model.kept for start in starts[:_SUITED]]
+    suited = replace(model, formulations=formulations_for(model, smallest, direct=direct))
+    lean = LeanModels(suited, independent=projected)
     judge = Judge(
         model, samples, reduction.nominal_torque, direct=direct,
         projected=projected, measured=measured,

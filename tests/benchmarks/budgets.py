@@ -18,7 +18,7 @@ import rich.table
 import yaml
 
 from paramreduce_cli.artifacts.store import load_file
-from paramreduce_cli.lean import search
+from paramreduce_cli.lean.formulations import formulations
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import ProofStatus, Reduction
@@ -171,7 +171,7 @@ def of_searches():
         W = K.reshape(-1, K.shape[2])
         base = base_parameters(W, mechanism.preference_order, 1e-8)
         started = time.process_time()
-        search.formulations(mechanism, affecting_columns(W), base.columns)
+        formulations(mechanism, affecting_columns(W), base.columns)
         yield f"search for formulations, {n} joints", time.process_time() - started, limit, "CPU s"
 
 

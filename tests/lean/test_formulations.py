@@ -15,8 +15,8 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
 from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
+from paramreduce_cli.lean.formulations import formulations, formulations_for
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.lean.search import formulations
 from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.plain import PlainDynamics
@@ -218,3 +218,27 @@ def test_the_textbook_oracle_is_the_same_dynamics(name):
     found = ca.Function("d", symbols, [textbook.torques(mechanism, *symbols, mechanism.gravity)])
     expected = Dynamics(mechanism, once=True).inverse(q[None], dq[None], ddq[None], phi)[0]
     assert found(q, dq, ddq, phi).full().ravel() == pytest.approx(expected, rel=1e-12, abs=1e-11)
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_formulations_for_some_parameters_are_the_same_dynamics_and_take_no_more(puma, direct):
+    """Three parameters of the wrist and two before it, for which none of the model's own was searched."""
+    names, kind = puma.mechanism.parameter_names, "direct" if direct else "inverse"
+    kept = np.sort([names.index(k) for k in ("Iyy_2", "mx_3", "my_5", "Izz_5", "Ixz_6")])
+    found = formulations_for(puma, [kept], direct=direct)
+    known = getattr(puma.formulations, kind)
+    new = [one for one in getattr(found, kind) if one not in known]
+    assert getattr(found, kind)[: len(known)] == known
+    assert new
+    for choices in new:
+        errors = compared(puma.mechanism, list(map(from_data, choices)), np.random.default_rng(0))
+        assert max(errors) < 1e-12
+    tree = lean_tree(puma.mechanism)
+    build = direct_outputs if direct else inverse_outputs
+    dropped = set(range(len(names))) - set(kept.tolist())
+
+    def count(choices):
+        graph = Graph()
+        return graph.count(build(tree, list(map(from_data, choices)), graph, dropped))
+
+    assert min(map(count, new)) < min(map(count, known))
