@@ -118,7 +118,7 @@ def _beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int
 
 @within
 def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
-    """Have all rows of a kind refer to one row for a pair of terms."""
+    """Have all rows of a kind refer to one row for a pair of terms; as many of them as there is room for."""
     rarer = a if rows.numbers[a >> 1, USES] <= rows.numbers[b >> 1, USES] else b
     row, holders = rows.room[0], rows.room[1]
     found, shared, slot = 0, END, rows.numbers[rarer >> 1, HEAD]

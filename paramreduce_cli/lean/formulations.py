@@ -108,6 +108,9 @@ def formulations_for(model: Model, subsets: Iterable[IntArray], *, direct: bool)
         model: Of the robot, with formulations.
         subsets: Indices of the parameters that are not zero, of each.
         direct: Whether they are for the direct dynamics, not for the inverse.
+
+    Returns:
+        Those of the model first, each different set once.
     """
     tree = lean_tree(model.mechanism)
     everything = set(range(model.affecting.size))

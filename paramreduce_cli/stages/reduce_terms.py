@@ -37,7 +37,7 @@ _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
 _PARTS = 4
 """Of a log's training part, which are fitted to and watched by turns."""
-_SUITED = 2
+_SMALLEST = 2
 """Starts for which formulations are searched, the smallest ones."""
 _FITTED = 1000
 """Samples of the estimation set to which the parameters of what is left are fitted."""
@@ -101,7 +101,7 @@ def _searched(
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
     starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
-    smallest = [start.model.kept for start in starts[:_SUITED]]
+    smallest = [start.model.kept for start in starts[:_SMALLEST]]
     suited = replace(model, formulations=formulations_for(model, smallest, direct=direct))
     lean = LeanModels(suited, independent=projected)
     judge = Judge(

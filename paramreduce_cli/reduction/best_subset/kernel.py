@@ -55,7 +55,7 @@ LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
 DONE, PAUSED = 0, 1
 # What is handed on is not written as a plain number: for each of those Numba compiles a function anew.
 _NO_COLUMN = cast("int", np.int64(-1))
-_INCLUDED, _EXCLUDED = cast("tuple[bool, bool]", (np.bool_(True), np.bool_(False)))
+_INCLUDE, _EXCLUDE = cast("tuple[bool, bool]", (np.bool_(True), np.bool_(False)))
 
 _within = compiled(within=True, makes_arrays=False)
 _making_arrays = compiled(within=True)
@@ -351,7 +351,7 @@ def _branch(s: State, data: Data, unit: int) -> None:
         s.numbers[level + 1, k] = numbers[k]
     s.errors[level + 1, INSIDE] = s.errors[level, INSIDE]
     s.errors[level + 1, BOUND] = s.errors[level, BOUND]
-    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, _INCLUDED)
+    _decide(deeper, s.numbers[level + 1], s.errors[level + 1], s, data, unit, _INCLUDE)
 
 
 @_making_arrays
@@ -382,7 +382,7 @@ def _exclude_parallel(
         if j == own or not near or data.size[data.unit[column]] > 1:
             continue
         if _parallel(s, data, numbers[INCLUDED], data.first[unit], column):
-            _decide(sheet, numbers, errors, s, data, data.unit[column], _EXCLUDED)
+            _decide(sheet, numbers, errors, s, data, data.unit[column], _EXCLUDE)
             own = _position(numbers, data.first[unit])
 
 
@@ -398,7 +398,7 @@ def go_back(s: State, data: Data) -> None:
     unit = numbers[BRANCH]
     if data.size[unit] == 1:
         _exclude_parallel(sheet, numbers, errors, s, data, unit)
-    _decide(sheet, numbers, errors, s, data, unit, _EXCLUDED)
+    _decide(sheet, numbers, errors, s, data, unit, _EXCLUDE)
 
 
 @_within
@@ -452,13 +452,13 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
             sheet, numbers, data.unit, data.size, places, room
         )
         if useless >= 0:
-            _decide(sheet, numbers, errors, s, data, useless, _EXCLUDED)
+            _decide(sheet, numbers, errors, s, data, useless, _EXCLUDE)
         elif needed > places:
             return False
         elif must < 0:
             return True
         else:
-            _decide(sheet, numbers, errors, s, data, must, _INCLUDED)
+            _decide(sheet, numbers, errors, s, data, must, _INCLUDE)
 
 
 @_within
