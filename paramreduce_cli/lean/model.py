@@ -93,23 +93,29 @@ class LeanModels:
             programs.append(Program.of_graph(*Written(graph, outputs).settled()))
         return _Variants(programs)
 
-    def inverse(self, model: ReducedModel, *, constant: bool = False) -> Program:
+    def inverse(
+        self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
+    ) -> Program:
         """The inverse dynamics of a model; the torques, (n_q,) or (n_dof,).
 
         Args:
             model: Which parameters are kept, and which have one value.
             constant: Whether their values are known, and so part of the program.
+            rewritten: Whether it is rewritten as far as that saves operations.
         """
-        return self._leanest(self._inverse, model, constant)
+        return self._leanest(self._inverse, model, constant, rewritten)
 
-    def direct(self, model: ReducedModel, *, constant: bool = False) -> Program:
+    def direct(
+        self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
+    ) -> Program:
         """[M | delta] of a model: the lower triangle of M, row by row, then delta.
 
         Args:
             model: Which parameters are kept, and which have one value.
             constant: Whether their values are known, and so part of the program.
+            rewritten: Whether it is rewritten as far as that saves operations.
         """
-        return self._leanest(self._direct, model, constant)
+        return self._leanest(self._direct, model, constant, rewritten)
 
     def estimate(self, kept: IntArray, *, direct: bool = False) -> int:
         """Operations, nearly: quick enough to compare thousands of subsets.
@@ -126,12 +132,16 @@ class LeanModels:
         zero[kept] = False
         return zero
 
-    def _leanest(self, variants: _Variants, model: ReducedModel, constant: bool) -> Program:
+    def _leanest(
+        self, variants: _Variants, model: ReducedModel, constant: bool, rewritten: bool
+    ) -> Program:
         """The formulation with the fewest operations."""
         promising = variants.promising(self._dropped(model.kept))
-        return Program.of_graph(
-            *least(self._written(program, model, constant) for program in promising)
-        )
+        ways = (self._written(program, model, constant) for program in promising)
+        if rewritten:
+            return Program.of_graph(*least(ways))
+        settled = [way.settled() for way in ways]
+        return Program.of_graph(*min(settled, key=lambda way: way.n_operations))
 
     def _written(self, program: Program, model: ReducedModel, constant: bool) -> Written:
         """A formulation for a model, without what is zero then."""

@@ -25,9 +25,10 @@ from paramreduce_cli.records import (
     TermModel,
     TermReduction,
 )
+from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Judge
-from paramreduce_cli.terms.simplify import LookedAt, Simplified, simplified
+from paramreduce_cli.terms.simplify import LookedAt, simplified
 from paramreduce_cli.terms.starts import starts_within
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
@@ -118,7 +119,7 @@ def _searched(
     )  # fmt: skip
     fitted = judge.thinned(samples.estimation, _FITTED)
     way = [one.refitted(fitted, budget) for one in front]
-    records = (_record(one.refitted(fitted, budget), judge, budget, way) for one in found)
+    records = (_record(one.refitted(fitted, budget), judge, budget, way, lean) for one in found)
     return next((record for record in records if record is not None), None)
 
 
@@ -157,7 +158,7 @@ def _say_missing(names: list[str], others: bool) -> None:
 
 
 def _record(
-    one: Simplified, judge: Judge, budget: Budget, way: list[Simplified]
+    one: Simplified, judge: Judge, budget: Budget, way: list[Simplified], lean: LeanModels
 ) -> TermModel | None:
     """A program with what it is worth and those on the way to it; None if it is not within the budget."""
     estimation, validation = judge.errors(one)
@@ -170,6 +171,7 @@ def _record(
         return None
     model, program = one.compact()
     random, largest = judge.random(one)
+    whole = (lean.direct if judge.direct else lean.inverse)(one.start.model)
     return TermModel(
         heuristic=one.start.heuristic,
         n_start=one.start.model.n,
@@ -179,7 +181,7 @@ def _record(
         program=program.stored(),
         projected=judge.projected,
         operations=program.n_operations,
-        operations_start=one.operations_start,
+        operations_start=whole.n_operations,
         torque_error_estimation=estimation[0],
         torque_error_validation=validation[0],
         acceleration_error_estimation=estimation[1],

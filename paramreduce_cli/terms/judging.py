@@ -12,8 +12,8 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import thinned_blocks
 from paramreduce_cli.records import Block, FloatArray, Model, Samples, SampleSet
+from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.samples import TermSamples, errors_over, term_samples
-from paramreduce_cli.terms.simplify import Simplified
 
 _TORQUES = 1000
 """Random states on which torques are compared with those of the full model."""

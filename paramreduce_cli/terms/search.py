@@ -58,10 +58,10 @@ class Search:
 
     def __init__(self, fitting: Fitting, seed: int) -> None:
         self._fitting = fitting
-        self._tape = fitting.tape
-        self._candidates = self._tape.candidates()
+        self.tape = fitting.tape
+        self._candidates = self.tape.candidates()
         self._droppable: BoolArray = self._candidates[:, 1] != ITSELF
-        self._itself = np.zeros(self._tape.size, dtype=np.int64)
+        self._itself = np.zeros(self.tape.size, dtype=np.int64)
         for number, (k, what) in enumerate(self._candidates.tolist()):
             if what == ITSELF:
                 self._itself[k] = number
@@ -69,7 +69,7 @@ class Search:
 
     def start(self, beta: FloatArray) -> Step:
         """With all terms."""
-        return self._step(self._fitting.fit(self._tape.everything(), beta, looks=2))
+        return self._step(self._fitting.fit(self.tape.everything(), beta, looks=2))
 
     def descended(
         self,
@@ -77,19 +77,21 @@ class Search:
         visit: Callable[[Step], None] = lambda _: None,
         noise: float = 0.0,
         held: IntArray | None = None,
+        until: int = 0,
     ) -> Step:
-        """Leave terms out until any more would exceed the budget.
+        """Leave terms out until any more would exceed the budget, or few enough operations are left.
 
         Args:
             step: Where to start.
             visit: Told of every program on the way.
             noise: Of the logarithm of what terms seem to cost.
             held: Terms that stay.
+            until: Operations that are few enough.
         """
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
         if held is not None:
             weights[held] = np.inf
-        while True:
+        while step.count > until:
             following = self._next(step, weights, _TRIED) or self._stand_in(step, weights)
             if following is None and noise == 0:
                 following = self._next(step, weights, _TRIED_LAST)
@@ -97,6 +99,7 @@ class Search:
                 return step
             step = following
             visit(step)
+        return step
 
     def improved(self, step: Step, rounds: int, visit: Callable[[Step], None]) -> Step:
         """Put terms back and leave others out instead, so many times."""
@@ -123,7 +126,7 @@ class Search:
             left: Of the program.
             beta: Values to start from.
         """
-        return self._step(self._mended(self._fitting.fit(left, beta, looks=2), [], self._tape.size))
+        return self._step(self._mended(self._fitting.fit(left, beta, looks=2), [], self.tape.size))
 
     def _mended(self, fit: Fit, back: list[int], most: int) -> Fit:
         """With terms put back until errors are allowed, so many at most; note their numbers."""
@@ -193,7 +196,7 @@ class Search:
         """The program with one node that stands for another one, None if all are too dear."""
         fit = step.fit
         ways, values, pulls = self._fitting.stand_ins(fit)
-        counts = self._tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
+        counts = self.tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero((counts < step.count) & np.isfinite(own))
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
@@ -211,11 +214,11 @@ class Search:
         left = step.fit.left
         # That a node is itself is no term to be left out: see stand-ins.
         numbers = np.flatnonzero(allowed & self._droppable & left.has(self._candidates))
-        saved = step.count - self._tape.counts(left, self._candidates[numbers])
+        saved = step.count - self.tape.counts(left, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
     def _step(self, fit: Fit) -> Step:
-        return Step(fit, self._tape.count(fit.left))
+        return Step(fit, self.tape.count(fit.left))
 
     def _with(self, fit: Fit, flipped: IntArray) -> Fit:
         """Fitted with some terms the other way round."""
@@ -223,7 +226,7 @@ class Search:
 
     def _costs(self, fit: Fit, live: IntArray) -> Costs:
         """What leaving each term out costs."""
-        combinations = self._tape.combinations(fit.left, live, self._fitting.n)
+        combinations = self.tape.combinations(fit.left, live, self._fitting.n)
         return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
 
     def _some_back(self, step: Step) -> tuple[Step, IntArray]:
@@ -256,7 +259,7 @@ class Search:
         if not numbers.size:
             return fit
         terms = self._candidates[numbers]
-        dearer = self._tape.counts(fit.left, terms) - self._tape.count(fit.left)
+        dearer = self.tape.counts(fit.left, terms) - self.tape.count(fit.left)
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.explained(G)
