@@ -102,14 +102,10 @@ class Descent:
 
     @classmethod
     def begun(
-        cls,
-        start: Start,
-        program: Program,
-        searching: Callable[[Tape], Search],
-        stop: threading.Event,
+        cls, start: Start, tape: Tape, searching: Callable[[Tape], Search], stop: threading.Event
     ) -> Descent:
         """With all terms of a program, whose first inputs are the parameters of the start."""
-        search = searching(Tape(program))
+        search = searching(tape)
         descent = cls(start, searching, stop, search, search.start(start.model.values), {})
         descent._note(descent.end)
         return descent
@@ -124,21 +120,24 @@ class Descent:
         """The less the better; the same for ends that are the same."""
         return self.fewest, round(self.end.fit.strain, _SAME)
 
-    def down(self) -> Descent:
+    def down(self, noise: float = 0.0) -> Descent:
         """Leave terms out until no more can go, also of what comes of rewriting.
 
         A rewritten program has other terms than before, and shares more of what they are made of. It
         is rewritten early, too: which terms are cheap to do without hangs on what the others share.
+
+        Args:
+            noise: Of the logarithm of what terms seem to cost, until no more can go with it.
         """
         descent = self
         while True:
             before = descent.fewest
             until = int(_LEG * descent.end.count)
-            end = descent.search.descended(descent.end, descent._note, until=until)
+            end = descent.search.descended(descent.end, descent._note, noise, until=until)
             descent = replace(descent, end=end)
             rewritten = descent._rewritten()
             if rewritten is None or rewritten.fewest == before:
-                return descent
+                return descent.down() if noise else descent
             descent = rewritten
 
     def improved(self, rounds: int) -> Descent:

@@ -32,8 +32,8 @@ _MISJUDGED = 2.0
 """Times that which they may cost indeed."""
 _BACK = (1, 8)
 """Terms that are put back before others are left out."""
-_NOISE = 0.3
-"""Of the logarithm of what terms seem to cost, when others have been put back."""
+NOISE = 0.3
+"""Of the logarithm of what terms seem to cost, where something else is to be tried."""
 _WORSE = 0.2
 """Probability with which the search goes on from a program with one operation more."""
 _SPREAD = 4.0
@@ -108,7 +108,7 @@ class Search:
             some, held = self._some_back(now) if round_ % 2 == 0 else self._one_out(now)
             if not some.fit.within:
                 continue
-            found = self.descended(some, visit, _NOISE, held)
+            found = self.descended(some, visit, NOISE, held)
             if found.count <= now.count + int(self._rng.random() < _WORSE):
                 now = found
             if found.count < best.count or (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import itertools
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -15,7 +16,7 @@ from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.terms.descent import Descent, Simplified, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.search import Search
+from paramreduce_cli.terms.search import NOISE, Search
 from paramreduce_cli.terms.starts import Start, promising
 from paramreduce_cli.terms.tape import Tape
 
@@ -25,8 +26,10 @@ _FEWEST, _MOST = 12, 60
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
 _WORK = 60_000
 """Operations times torques, of all of these: time grows a little faster."""
+_AGAIN = 4
+"""Starts with the leanest ends, which are gone down from again."""
 _CLOSELY = 4
-"""Leanest ends of descents, gone on from with more samples, for half of the rounds."""
+"""Leanest ends of all descents, gone on from with more samples, for half of the rounds."""
 _LAST = 2
 """Leanest ends of these, gone on from for the other half."""
 _LEANEST = 12
@@ -59,8 +62,8 @@ def simplified(
 ) -> tuple[list[Simplified], list[Simplified]]:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
-    Starts are gone down from, each in the formulation that is leanest for it; from the best ends terms are put
-    back and others left out instead.
+    Starts are gone down from, each in the formulation that is leanest for it, the best ones several times with
+    noise in the choice; from the best ends terms are put back and others left out instead.
 
     Args:
         lean: Programs of reduced models.
@@ -70,8 +73,8 @@ def simplified(
         poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
         direct: Whether [M | delta] is meant, not torques.
-        rounds: How often terms are put back.
-        seed: Of what is put back.
+        rounds: How often the best starts are gone down from again, and terms are put back.
+        seed: Of all choices.
         jobs: Threads; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
@@ -82,16 +85,16 @@ def simplified(
     stop = threading.Event()
     ended: list[int] = []
 
-    def searching(start: Start, some: LookedAt) -> Callable[[Tape], Search]:
+    def searching(start: Start, some: LookedAt, turn: int = 0) -> Callable[[Tape], Search]:
         def made(tape: Tape) -> Search:
             fitting = Fitting(tape, start.model.n, some.samples, budget, some.watched, poses)
-            return Search(fitting, seed)
+            return Search(fitting, seed + turn)
 
         return made
 
     def begun(start: Start) -> Descent:
-        program = _program(lean, start, direct=direct)
-        return Descent.begun(start, program, searching(start, looked_at), stop)
+        tape = Tape(_program(lean, start, direct=direct))
+        return Descent.begun(start, tape, searching(start, looked_at), stop)
 
     every = map(begun, starts[:_LOOKED_AT])
     smallest = next((one.start for one in every if one.end.fit.within), None)
@@ -104,7 +107,8 @@ def simplified(
         begins.append(one)
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
-    total = len(begins) + _CLOSELY + _LAST
+    tapes = {one.start: one.search.tape for one in begins}
+    total = len(begins) + rounds + _CLOSELY + _LAST
 
     def told(descent: Descent) -> Descent:
         ended.append(descent.fewest)
@@ -113,6 +117,10 @@ def simplified(
 
     def down(descent: Descent) -> Descent:
         return told(descent.down())
+
+    def again(start: Start, turn: int) -> Descent:
+        made = searching(start, looked_at, turn)
+        return told(Descent.begun(start, tapes[start], made, stop).down(NOISE))
 
     def improved(descent: Descent) -> Descent:
         return told(descent.improved(rounds // 2))
@@ -124,8 +132,10 @@ def simplified(
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:
         try:
-            ends = leanest(pool.map(down, begins), _CLOSELY)
-            close = [one for one in pool.map(refined, ends) if one is not None]
+            ends = list(pool.map(down, begins))
+            best = itertools.cycle([one.start for one in leanest(ends, _AGAIN)])
+            ends += pool.map(again, best, range(1, rounds + 1))
+            close = [one for one in pool.map(refined, leanest(ends, _CLOSELY)) if one is not None]
             close += list(pool.map(improved, leanest(close, _LAST)))
         except BaseException:
             stop.set()
@@ -136,7 +146,7 @@ def simplified(
     )
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
-    return found, front(begins + close)
+    return found, front(ends + close)
 
 
 def _program(lean: LeanModels, start: Start, *, direct: bool) -> Program:

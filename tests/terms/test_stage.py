@@ -107,9 +107,9 @@ def test_a_function_for_which_nothing_is_found_stops_no_run(tmp_path, monkeypatc
     record = reduce_terms._record
 
     def none_for(*functions):
-        def found(one, judge, budget, way):
+        def found(one, judge, *others):
             name = "direct" if judge.direct else "inverse"
-            return None if name in functions else record(one, judge, budget, way)
+            return None if name in functions else record(one, judge, *others)
 
         monkeypatch.setattr(reduce_terms, "_record", found)
 
