@@ -21,6 +21,6 @@ class TermsSection(Section):
     acceleration_error: Annotated[Number, Field(gt=0)] | None = None
     """The same of accelerations, a share, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
     rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 14
-    """How often the best subsets are gone down from again, with noise in the choice of terms; and how often terms are put back and others left out instead, from the best programs."""
+    """How often the best subsets are gone down from again, with noise in the choice of terms."""
     seed: Annotated[Whole, Field(ge=0)] = 0
-    """Of what is chosen."""
+    """Of this noise."""

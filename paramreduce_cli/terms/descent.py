@@ -140,11 +140,6 @@ class Descent:
                 return descent.down() if noise else descent
             descent = rewritten
 
-    def improved(self, rounds: int) -> Descent:
-        """Put terms back and leave others out instead, so many times, then down."""
-        end = self.search.improved(self.end, rounds, self._note)
-        return replace(self, end=end).down()
-
     def on(self, searching: Callable[[Tape], Search]) -> Descent | None:
         """Down on other samples, from the leanest program within the budget there, or made to be.
 

@@ -1,4 +1,4 @@
-"""Which terms to leave out: down greedily, then some back in and down again, round by round.
+"""Which terms to leave out, greedily.
 
 Where no term can go any more, a node may still stand for a multiple of another one, or for a number.
 """
@@ -30,14 +30,8 @@ _RISE, _LEAST = 3.0, 1e-8
 budget's at least."""
 _MISJUDGED = 2.0
 """Times that which they may cost indeed."""
-_BACK = (1, 8)
-"""Terms that are put back before others are left out."""
 NOISE = 0.3
 """Of the logarithm of what terms seem to cost, where something else is to be tried."""
-_WORSE = 0.2
-"""Probability with which the search goes on from a program with one operation more."""
-_SPREAD = 4.0
-"""Of the choice of terms to put back: how far down the list it reaches."""
 
 
 @dataclass(frozen=True)
@@ -53,7 +47,7 @@ class Search:
 
     Args:
         fitting: Fits the program.
-        seed: Of what is put back.
+        seed: Of noise in the choice.
     """
 
     def __init__(self, fitting: Fitting, seed: int) -> None:
@@ -76,7 +70,6 @@ class Search:
         step: Step,
         visit: Callable[[Step], None] = lambda _: None,
         noise: float = 0.0,
-        held: IntArray | None = None,
         until: int = 0,
     ) -> Step:
         """Leave terms out until any more would exceed the budget, or few enough operations are left.
@@ -85,12 +78,9 @@ class Search:
             step: Where to start.
             visit: Told of every program on the way.
             noise: Of the logarithm of what terms seem to cost.
-            held: Terms that stay.
             until: Operations that are few enough.
         """
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
-        if held is not None:
-            weights[held] = np.inf
         while step.count > until:
             following = self._next(step, weights, _TRIED) or self._stand_in(step, weights)
             if following is None and noise == 0:
@@ -101,24 +91,6 @@ class Search:
             visit(step)
         return step
 
-    def improved(self, step: Step, rounds: int, visit: Callable[[Step], None]) -> Step:
-        """Put terms back and leave others out instead, so many times."""
-        best = now = step
-        for round_ in range(rounds):
-            some, held = self._some_back(now) if round_ % 2 == 0 else self._one_out(now)
-            if not some.fit.within:
-                continue
-            found = self.descended(some, visit, NOISE, held)
-            if found.count <= now.count + int(self._rng.random() < _WORSE):
-                now = found
-            if found.count < best.count or (
-                found.count == best.count and found.fit.strain < best.fit.strain
-            ):
-                best = found
-            if now.count > best.count + 2:
-                now = best
-        return self.descended(best, visit)
-
     def mended(self, left: Remains, beta: FloatArray) -> Step:
         """What is left of a program, with as many terms put back as errors need to be allowed, if that is enough.
 
@@ -126,21 +98,20 @@ class Search:
             left: Of the program.
             beta: Values to start from.
         """
-        return self._step(self._mended(self._fitting.fit(left, beta, looks=2), [], self.tape.size))
-
-    def _mended(self, fit: Fit, back: list[int], most: int) -> Fit:
-        """With terms put back until errors are allowed, so many at most; note their numbers."""
-        for _ in range(most):
-            changed = fit if fit.within else self._one_back(fit, back, 0.0)
-            if changed is fit:
+        fit = self._fitting.fit(left, beta, looks=2)
+        back: list[int] = []
+        while not fit.within:
+            number = self._most_helpful(fit, back)
+            if number is None:
                 break
-            fit = changed
-        return fit
+            back.append(number)
+            fit = self._with(fit, self._candidates[number][None])
+        return self._step(fit)
 
     def _next(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
         """The program with the cheapest terms left out, None if all are too dear."""
         fit = step.fit
-        numbers, saved = self._useful(step, np.isfinite(weights))
+        numbers, saved = self._useful(step)
         if not numbers.size:
             return None
         live, saved = self._candidates[numbers], saved / weights[numbers]
@@ -198,7 +169,7 @@ class Search:
         ways, values, pulls = self._fitting.stand_ins(fit)
         counts = self.tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
-        useful = np.flatnonzero((counts < step.count) & np.isfinite(own))
+        useful = np.flatnonzero(counts < step.count)
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
         none = np.zeros((len(useful), self._fitting.n))
         again = fit.linear.costs(ways.changes(values, pulls), fit.beta, none).again
@@ -209,11 +180,11 @@ class Search:
                 tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
 
-    def _useful(self, step: Step, allowed: BoolArray) -> tuple[IntArray, FloatArray]:
+    def _useful(self, step: Step) -> tuple[IntArray, FloatArray]:
         """Numbers of terms without which there are fewer operations, and how many fewer."""
         left = step.fit.left
         # That a node is itself is no term to be left out: see stand-ins.
-        numbers = np.flatnonzero(allowed & self._droppable & left.has(self._candidates))
+        numbers = np.flatnonzero(self._droppable & left.has(self._candidates))
         saved = step.count - self.tape.counts(left, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
@@ -229,48 +200,15 @@ class Search:
         combinations = self.tape.combinations(fit.left, live, self._fitting.n)
         return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
 
-    def _some_back(self, step: Step) -> tuple[Step, IntArray]:
-        """The program with some terms that help much for what they cost, and their numbers."""
-        fit = step.fit
-        back: list[int] = []
-        for _ in range(int(self._rng.integers(*_BACK))):
-            fit = self._one_back(fit, back, _SPREAD)
-        return self._step(fit), np.array(back, dtype=np.int64)
-
-    def _one_out(self, step: Step) -> tuple[Step, IntArray]:
-        """The program without one term that it cannot spare, mended by others, and the numbers of these."""
-        everything = np.ones(len(self._candidates), dtype=np.bool_)
-        numbers, saved = self._useful(step, everything)
-        if not numbers.size:
-            return step, np.zeros(0, np.int64)
-        again = self._costs(step.fit, self._candidates[numbers]).again
-        order = np.argsort(again / saved, kind="stable")
-        out = int(numbers[order[self._drawn(order.size, 2 * _SPREAD)]])
-        fit = self._with(step.fit, self._candidates[out][None])
-        back: list[int] = [out]
-        fit = self._mended(fit, back, _BACK[1])
-        return self._step(fit), np.array(back[1:], dtype=np.int64)
-
-    def _one_back(self, fit: Fit, back: list[int], spread: float) -> Fit:
-        """Put back one of the terms that help most for what they cost, none of some; note its number."""
+    def _most_helpful(self, fit: Fit, but: list[int]) -> int | None:
+        """The number of the term to put back that helps most for what it costs, none of some; None if none helps."""
         gone = ~fit.left.has(self._candidates)
-        gone[back] = False
+        gone[but] = False
         numbers = np.flatnonzero(gone)
-        if not numbers.size:
-            return fit
         terms = self._candidates[numbers]
         dearer = self.tape.counts(fit.left, terms) - self.tape.count(fit.left)
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.explained(G)
-        helps = np.flatnonzero(gain > 0)
-        if not helps.size:
-            return fit
-        order = helps[np.argsort(-gain[helps] / np.maximum(dearer[helps], 0.5), kind="stable")]
-        place = order[self._drawn(order.size, spread)]
-        back.append(int(numbers[place]))
-        return self._with(fit, terms[place][None])
-
-    def _drawn(self, size: int, spread: float) -> int:
-        """A place in a list, near its head."""
-        return min(int(self._rng.exponential(spread)), size - 1) if spread else 0
+        worth = gain / np.maximum(dearer, 0.5)
+        return int(numbers[np.argmax(worth)]) if np.any(gain > 0) else None

@@ -29,9 +29,7 @@ _WORK = 60_000
 _AGAIN = 4
 """Starts with the leanest ends, which are gone down from again."""
 _CLOSELY = 4
-"""Leanest ends of all descents, gone on from with more samples, for half of the rounds."""
-_LAST = 2
-"""Leanest ends of these, gone on from for the other half."""
+"""Leanest ends of all descents, gone on from with more samples."""
 _LEANEST = 12
 """Programs that are judged, the leanest of all searches."""
 
@@ -62,8 +60,8 @@ def simplified(
 ) -> tuple[list[Simplified], list[Simplified]]:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
-    Starts are gone down from, each in the formulation that is leanest for it, the best ones several times with
-    noise in the choice; from the best ends terms are put back and others left out instead.
+    Starts are gone down from, each in the formulation that is leanest for it, the best ones again and again with
+    noise in the choice; from the best ends it goes on with more samples.
 
     Args:
         lean: Programs of reduced models.
@@ -73,8 +71,8 @@ def simplified(
         poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
         direct: Whether [M | delta] is meant, not torques.
-        rounds: How often the best starts are gone down from again, and terms are put back.
-        seed: Of all choices.
+        rounds: How often the best starts are gone down from again, in all.
+        seed: Of the noise.
         jobs: Threads; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
@@ -108,7 +106,7 @@ def simplified(
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
     tapes = {one.start: one.search.tape for one in begins}
-    total = len(begins) + rounds + _CLOSELY + _LAST
+    total = len(begins) + rounds + _CLOSELY
 
     def told(descent: Descent) -> Descent:
         ended.append(descent.fewest)
@@ -122,12 +120,9 @@ def simplified(
         made = searching(start, looked_at, turn)
         return told(Descent.begun(start, tapes[start], made, stop).down(NOISE))
 
-    def improved(descent: Descent) -> Descent:
-        return told(descent.improved(rounds // 2))
-
     def refined(descent: Descent) -> Descent | None:
         closer = descent.on(searching(descent.start, closely))
-        return None if closer is None else improved(closer)
+        return None if closer is None else told(closer)
 
     # Threads, as nearly all time is spent in compiled code that lets others run.
     with ThreadPoolExecutor(jobs) as pool:
@@ -136,7 +131,6 @@ def simplified(
             best = itertools.cycle([one.start for one in leanest(ends, _AGAIN)])
             ends += pool.map(again, best, range(1, rounds + 1))
             close = [one for one in pool.map(refined, leanest(ends, _CLOSELY)) if one is not None]
-            close += list(pool.map(improved, leanest(close, _LAST)))
         except BaseException:
             stop.set()
             pool.shutdown(wait=True, cancel_futures=True)
