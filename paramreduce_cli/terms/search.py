@@ -205,6 +205,8 @@ class Search:
         gone = ~fit.left.has(self._candidates)
         gone[but] = False
         numbers = np.flatnonzero(gone)
+        if not numbers.size:
+            return None
         terms = self._candidates[numbers]
         dearer = self.tape.counts(fit.left, terms) - self.tape.count(fit.left)
         G = self._fitting.effects(fit, terms)

@@ -1,0 +1,110 @@
+"""From one start down: what is passed on the way keeps to what is said of it."""
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import model_of
+
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.records import Block
+from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.terms.descent import Descent, front, leanest
+from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.samples import term_samples
+from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.simplify import _program
+from paramreduce_cli.terms.starts import Start
+from paramreduce_cli.terms.tape import Tape
+
+BUDGET = Budget(0.03, np.inf)
+
+
+@pytest.fixture(scope="module")
+def arm():
+    return model_of("puma560")
+
+
+def samples(model, count, seed):
+    rng = np.random.default_rng(seed)
+    q, dq, ddq = rng.uniform(-1.5, 1.5, (3, count, 6))
+    tau = Dynamics(model.mechanism, once=True).inverse(q, dq, ddq, model.values)
+    block = Block(0, np.zeros(count), q, dq, ddq, tau, q, dq, ddq, np.zeros((0, model.values.size)))
+    nominal = np.sqrt(np.mean(tau**2, axis=0))
+    return term_samples(
+        model.mechanism, [block], nominal, np.ones(6), direct=False, projected=False
+    )
+
+
+@pytest.fixture(scope="module")
+def begun(arm):
+    base = base_model(arm)
+    start = Start("base", base, 0.0, 0)
+
+    def made(seed=0, some=None, budget=BUDGET):
+        looked_at = samples(arm, 100, 0) if some is None else some
+
+        def searching(tape):
+            return Search(Fitting(tape, base.n, looked_at, budget), seed)
+
+        tape = Tape(_program(LeanModels(arm), start, direct=False))
+        return Descent.begun(start, tape, searching, threading.Event())
+
+    return made
+
+
+def test_programs_on_the_way_have_the_errors_and_operations_that_are_said(arm, begun):
+    descent = begun().down()
+    assert descent.fewest < 0.7 * max(descent.visited)
+    looked_at = samples(arm, 100, 0)
+    for count, passed in descent.visited.items():
+        one = descent.simplified(passed)
+        assert one.program.n_operations <= count
+        error, _ = looked_at.errors(one.outputs(looked_at.states))
+        assert error == pytest.approx(passed.excess * BUDGET.torque, rel=1e-6, abs=1e-12)
+        assert error <= BUDGET.torque
+
+
+def test_rewriting_on_the_way_is_no_worse_than_one_descent(begun):
+    one = begun()
+    assert one.down().fewest <= one.search.descended(one.end).count
+
+
+def test_noise_finds_other_ends_and_the_same_seed_the_same(begun):
+    ends = [begun(seed).down(NOISE) for seed in (1, 1, 2, 3, 4)]
+    assert ends[0].rank == ends[1].rank
+    assert len({one.rank for one in ends}) > 1
+    best = leanest(ends, 2)
+    assert best[0].rank == min(one.rank for one in ends)
+    assert best[0].rank != best[1].rank
+
+
+def test_on_other_samples_the_leanest_that_keeps_to_the_budget_is_gone_on_from(arm, begun):
+    descent = begun().down()
+    other = samples(arm, 200, 5)
+
+    def closer(budget):
+        return lambda tape: Search(Fitting(tape, descent.start.model.n, other, budget), 0)
+
+    found = descent.on(closer(BUDGET))
+    one = found.simplified(found.visited[found.fewest])
+    assert other.errors(one.outputs(other.states))[0] <= BUDGET.torque
+    assert descent.on(closer(Budget(1e-14, np.inf))) is None
+
+
+def test_a_front_has_programs_that_no_leaner_one_beats(begun):
+    descents = [begun(seed).down(NOISE) for seed in (1, 2)]
+    programs = front(descents)
+    assert 3 <= len(programs) <= 16
+    counts = [one.program.n_operations for one in programs]
+    assert counts == sorted(counts)
+
+
+def test_it_ends_at_once_where_it_is_to_stop(begun):
+    descent = begun()
+    stopped = replace(descent, stop=threading.Event())
+    stopped.stop.set()
+    with pytest.raises(KeyboardInterrupt):
+        stopped.down()
