@@ -136,7 +136,7 @@ class Descent:
             end = descent.search.descended(descent.end, descent._note, noise, until=until)
             descent = replace(descent, end=end)
             rewritten = descent._rewritten()
-            if rewritten is None or rewritten.fewest == before:
+            if rewritten.fewest == before:
                 return descent.down() if noise else descent
             descent = rewritten
 
@@ -158,13 +158,16 @@ class Descent:
                 break
         return min(tried, key=lambda one: one.rank, default=None)
 
-    def _rewritten(self) -> Descent | None:
-        """Among the terms of the leanest program as it is rewritten; None if rounding takes it out of the budget."""
+    def _rewritten(self) -> Descent:
+        """Among the terms of the leanest program as it is rewritten; as it was if that takes it out of the budget.
+
+        Mass matrices are taken anew, which is enough for what is at the edge of it.
+        """
         passed = self.visited[self.fewest]
         search = self.searching(Tape(self.simplified(passed).program))
         end = search.start(passed.beta)
         if not end.fit.within:
-            return None
+            return self
         descent = replace(self, search=search, end=end)
         descent._note(end)
         return descent
@@ -196,14 +199,14 @@ def leanest(descents: Iterable[Descent], number: int) -> list[Descent]:
 
 def front(descents: Iterable[Descent]) -> list[Simplified]:
     """Programs on the way that no leaner one beats, some of them, evenly spread."""
-    passed = [
-        (count, one.cost, k, descent)
-        for k, descent in enumerate(descents)
-        for count, one in descent.visited.items()
+    entries = [
+        (count, passed.cost, descent)
+        for descent in descents
+        for count, passed in descent.visited.items()
     ]
     kept: list[tuple[int, Descent]] = []
     least_cost = np.inf
-    for count, cost, _, descent in sorted(passed, key=lambda entry: entry[:3]):
+    for count, cost, descent in sorted(entries, key=lambda entry: entry[:2]):
         if cost < least_cost:
             least_cost = cost
             kept.append((count, descent))

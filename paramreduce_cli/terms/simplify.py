@@ -11,7 +11,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.terms.descent import Descent, Simplified, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
@@ -91,7 +90,7 @@ def simplified(
         return made
 
     def begun(start: Start) -> Descent:
-        tape = Tape(_program(lean, start, direct=direct))
+        tape = Tape(start.program(lean, direct=direct))
         return Descent.begun(start, tape, searching(start, looked_at), stop)
 
     every = map(begun, starts[:_LOOKED_AT])
@@ -141,16 +140,6 @@ def simplified(
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
     return found, front(ends + close)
-
-
-def _program(lean: LeanModels, start: Start, *, direct: bool) -> Program:
-    """Of a start; its first inputs are the parameters of the model, not all standard ones.
-
-    It is not rewritten yet, as its terms are not those that are left in the end.
-    """
-    program = (lean.direct if direct else lean.inverse)(start.model, rewritten=False)
-    n, n_standard, place = start.model.n, lean.n_parameters, start.model.position
-    return program.renumbered(lambda k: k - n_standard + n if k >= n_standard else int(place[k]))
 
 
 def _affordable(descents: Sequence[Descent], samples: TermSamples) -> int:

@@ -7,6 +7,7 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
+from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import Model, ReducedModel, Reduction
 
@@ -26,6 +27,17 @@ class Start:
     """On the estimation set."""
     cost: int
     """Operations, nearly."""
+
+    def program(self, lean: LeanModels, *, direct: bool) -> Program:
+        """With all terms; its first inputs are the parameters of the model, not all standard ones.
+
+        It is not rewritten yet, as its terms are not those that are left in the end.
+        """
+        program = (lean.direct if direct else lean.inverse)(self.model, rewritten=False)
+        n, n_standard, place = self.model.n, lean.n_parameters, self.model.position
+        return program.renumbered(
+            lambda k: k - n_standard + n if k >= n_standard else int(place[k])
+        )
 
 
 def starts_within(

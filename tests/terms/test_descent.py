@@ -6,16 +6,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import model_of
+from terms.test_search import states
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import Block
 from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.terms.descent import Descent, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
-from paramreduce_cli.terms.simplify import _program
 from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Tape
 
@@ -28,11 +26,8 @@ def arm():
 
 
 def samples(model, count, seed):
-    rng = np.random.default_rng(seed)
-    q, dq, ddq = rng.uniform(-1.5, 1.5, (3, count, 6))
-    tau = Dynamics(model.mechanism, once=True).inverse(q, dq, ddq, model.values)
-    block = Block(0, np.zeros(count), q, dq, ddq, tau, q, dq, ddq, np.zeros((0, model.values.size)))
-    nominal = np.sqrt(np.mean(tau**2, axis=0))
+    block = states(model, count, seed)
+    nominal = np.sqrt(np.mean(block.tau**2, axis=0))
     return term_samples(
         model.mechanism, [block], nominal, np.ones(6), direct=False, projected=False
     )
@@ -42,14 +37,13 @@ def samples(model, count, seed):
 def begun(arm):
     base = base_model(arm)
     start = Start("base", base, 0.0, 0)
+    tape = Tape(start.program(LeanModels(arm), direct=False))
+    looked_at = samples(arm, 100, 0)
 
-    def made(seed=0, some=None, budget=BUDGET):
-        looked_at = samples(arm, 100, 0) if some is None else some
-
+    def made(seed=0):
         def searching(tape):
-            return Search(Fitting(tape, base.n, looked_at, budget), seed)
+            return Search(Fitting(tape, base.n, looked_at, BUDGET), seed)
 
-        tape = Tape(_program(LeanModels(arm), start, direct=False))
         return Descent.begun(start, tape, searching, threading.Event())
 
     return made
@@ -94,12 +88,15 @@ def test_on_other_samples_the_leanest_that_keeps_to_the_budget_is_gone_on_from(a
     assert descent.on(closer(Budget(1e-14, np.inf))) is None
 
 
-def test_a_front_has_programs_that_no_leaner_one_beats(begun):
+def test_a_front_has_programs_that_no_leaner_one_beats(arm, begun):
     descents = [begun(seed).down(NOISE) for seed in (1, 2)]
     programs = front(descents)
     assert 3 <= len(programs) <= 16
     counts = [one.program.n_operations for one in programs]
     assert counts == sorted(counts)
+    looked_at = samples(arm, 100, 0)
+    errors = [looked_at.errors(one.outputs(looked_at.states))[0] for one in programs]
+    assert np.all(np.diff(errors) < 0)
 
 
 def test_it_ends_at_once_where_it_is_to_stop(begun):

@@ -15,6 +15,7 @@ from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Tape
 
 NOMINAL = np.array([20.0, 5.0])
@@ -27,22 +28,19 @@ def arm():
 
 def states(model, count, seed):
     rng = np.random.default_rng(seed)
-    q, dq, ddq = rng.uniform(-2, 2, (3, count, 2))
+    q, dq, ddq = rng.uniform(-2, 2, (3, count, model.mechanism.n_dof))
     tau = Dynamics(model.mechanism).inverse(q, dq, ddq, model.values)
     return Block(0, np.zeros(count), q, dq, ddq, tau, q, dq, ddq, np.zeros((0, model.values.size)))
 
 
 def fitting_of(model, direct, budget, count=60, reduced=None):
     reduced = reduced or base_model(model)
-    lean = LeanModels(model)
-    program = (lean.direct if direct else lean.inverse)(reduced)
-    start, place = lean.n_parameters, reduced.position
-    numbered = program.renumbered(lambda k: k - start + reduced.n if k >= start else int(place[k]))
+    program = Start("base", reduced, 0.0, 0).program(LeanModels(model), direct=direct)
     samples = term_samples(
         model.mechanism, [states(model, count, 0)], NOMINAL, np.array([1.0, 2.0]),
         direct=direct, projected=False,
     )  # fmt: skip
-    return Fitting(Tape(numbered), reduced.n, samples, budget), reduced, samples
+    return Fitting(Tape(program), reduced.n, samples, budget), reduced, samples
 
 
 def predicted(fitting, fit, samples, direct):
