@@ -15,12 +15,20 @@ import numpy as np
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
 from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
-from paramreduce_cli.lean.choices import JointFormulation, Place, from_data, to_data
+from paramreduce_cli.lean.choices import (
+    JointFormulation,
+    Place,
+    alternatives,
+    far_reaching,
+    from_data,
+    to_data,
+)
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.search import best_choices
 from paramreduce_cli.lean.tree import Tree, lean_tree
 from paramreduce_cli.records import (
     BoolArray,
+    Formulation,
     Formulations,
     IntArray,
     Kind,
@@ -39,6 +47,8 @@ _INVERSE_STARTS = (
 )
 _SUITED = 2
 """Formulations from which one that suits a subset of parameters is searched: those that are leanest for it."""
+_VARIED = 2
+"""Choices that are varied at once, at most."""
 _AT_REST = JointFormulation(
     aligned=True, rates=Rates.DIRECT, radial=Place.REST, polar=Place.REST, tilt=Place.REST,
     plane=Place.REST,
@@ -84,9 +94,7 @@ def formulations(
         progress(Progress("search for formulations", next(ended), 6))
         return choices
 
-    def searched(
-        build: Build, starts: tuple[JointFormulation, ...]
-    ) -> tuple[tuple[dict[str, str | bool], ...], ...]:
+    def searched(build: Build, starts: tuple[JointFormulation, ...]) -> tuple[Formulation, ...]:
         same, *others = ([start] * len(tree.joints) for start in starts)
         full = best(build, same, useless)
         of_base = best(build, full, regrouped)
@@ -130,6 +138,24 @@ def formulations_for(model: Model, subsets: Iterable[IntArray], *, direct: bool)
     forget()
     data = tuple(tuple(map(to_data, choices)) for choices in found)
     return replace(model.formulations, **{"direct" if direct else "inverse": data})
+
+
+def varied(formulation: Formulation, mechanism: Mechanism, rng: np.random.Generator) -> Formulation:
+    """A formulation in which one or two choices are other ones, at random.
+
+    Args:
+        formulation: Of the mechanism.
+        mechanism: Whose joints they are of.
+        rng: Where chance comes from.
+    """
+    tree = lean_tree(mechanism)
+    choices = list(map(from_data, formulation))
+    for _ in range(rng.integers(1, _VARIED, endpoint=True)):
+        k = int(rng.integers(len(choices)))
+        joint = tree.joints[k]
+        others = alternatives(choices[k], joint) + far_reaching(choices[k], joint)
+        choices[k] = others[rng.integers(len(others))]
+    return tuple(map(to_data, choices))
 
 
 def _main_parameters(tree: Tree) -> set[int]:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import from_data
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.lean.tree import lean_tree
-from paramreduce_cli.records import BoolArray, IntArray, Mechanism, Model, ReducedModel
+from paramreduce_cli.records import BoolArray, Formulation, IntArray, Mechanism, Model, ReducedModel
 
 if TYPE_CHECKING:
     from paramreduce_cli.expressions.live import LiveCount
@@ -29,6 +29,7 @@ _NEAR = 1.02
 class _Variants:
     """The same model in all formulations."""
 
+    formulations: tuple[Formulation, ...]
     programs: list[Program]
 
     @cached_property
@@ -41,11 +42,11 @@ class _Variants:
         """Operations of each, nearly, with some parameters zero."""
         return [count(zero) for count in self._counts]
 
-    def promising(self, zero: BoolArray) -> list[Program]:
-        """Those that may turn out to be the leanest."""
+    def promising(self, zero: BoolArray) -> list[int]:
+        """Numbers of those that may turn out to be the leanest."""
         estimates = self.estimates(zero)
         most = _NEAR * min(estimates)
-        return [p for p, count in zip(self.programs, estimates, strict=True) if count <= most]
+        return [k for k, count in enumerate(estimates) if count <= most]
 
 
 class LeanModels:
@@ -62,8 +63,7 @@ class LeanModels:
 
     def __init__(self, model: Model, *, independent: bool = False) -> None:
         mechanism = model.mechanism
-        self._mechanism = mechanism
-        self._formulations = model.formulations
+        self._model, self.mechanism = model, mechanism
         self._useless = frozenset(np.flatnonzero(~model.affecting).tolist())
         self._tree = lean_tree(mechanism)
         self._projected = independent and mechanism.loops is not None
@@ -71,27 +71,27 @@ class LeanModels:
 
     @cached_property
     def _inverse(self) -> _Variants:
-        return self._variants(inverse_outputs, self._formulations.inverse, projected_inverse)
+        return self._variants(inverse_outputs, self._model.formulations.inverse, projected_inverse)
 
     @cached_property
     def _direct(self) -> _Variants:
-        return self._variants(direct_outputs, self._formulations.direct, projected_direct)
+        return self._variants(direct_outputs, self._model.formulations.direct, projected_direct)
 
     def _variants(
         self,
         build: Build,
-        choices: tuple[tuple[Mapping[str, str | bool], ...], ...],
+        formulations: tuple[Formulation, ...],
         project: Callable[[Mechanism, Graph, Sequence[int]], list[int]],
     ) -> _Variants:
         programs = []
-        for some in choices:
+        for formulation in formulations:
             graph = Graph()
-            at_joints = [from_data(data) for data in some]
+            at_joints = [from_data(data) for data in formulation]
             outputs = build(self._tree, at_joints, graph, self._useless)
             if self._projected:
-                outputs = project(self._mechanism, graph, outputs)
+                outputs = project(self.mechanism, graph, outputs)
             programs.append(Program.of_graph(*Written(graph, outputs).settled()))
-        return _Variants(programs)
+        return _Variants(formulations, programs)
 
     def inverse(
         self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
@@ -117,6 +117,21 @@ class LeanModels:
         """
         return self._leanest(self._direct, model, constant, rewritten)
 
+    def formulation(self, model: ReducedModel, *, direct: bool = False) -> Formulation:
+        """The one with the fewest operations before they are rewritten."""
+        variants = self._direct if direct else self._inverse
+        _, number = self._settled(variants, model, constant=False)
+        return variants.formulations[number]
+
+    def alone(self, formulation: Formulation, *, direct: bool = False) -> LeanModels:
+        """The same in one formulation of the inverse or of the direct dynamics."""
+        known = self._model.formulations
+        if direct:
+            found = replace(known, direct=(formulation,))
+        else:
+            found = replace(known, inverse=(formulation,))
+        return LeanModels(replace(self._model, formulations=found), independent=self._projected)
+
     def estimate(self, kept: IntArray, *, direct: bool = False) -> int:
         """Operations, nearly: quick enough to compare thousands of subsets.
 
@@ -136,12 +151,24 @@ class LeanModels:
         self, variants: _Variants, model: ReducedModel, constant: bool, rewritten: bool
     ) -> Program:
         """The formulation with the fewest operations."""
-        promising = variants.promising(self._dropped(model.kept))
-        ways = (self._written(program, model, constant) for program in promising)
-        if rewritten:
-            return Program.of_graph(*least(ways))
-        settled = [way.settled() for way in ways]
-        return Program.of_graph(*min(settled, key=lambda way: way.n_operations))
+        if not rewritten:
+            return Program.of_graph(*self._settled(variants, model, constant)[0])
+        return Program.of_graph(*least(self._promising(variants, model, constant).values()))
+
+    def _settled(
+        self, variants: _Variants, model: ReducedModel, constant: bool
+    ) -> tuple[Written, int]:
+        """The same before it is rewritten, and its number."""
+        ways = self._promising(variants, model, constant)
+        settled = [(way.settled(), number) for number, way in ways.items()]
+        return min(settled, key=lambda way: way[0].n_operations)
+
+    def _promising(
+        self, variants: _Variants, model: ReducedModel, constant: bool
+    ) -> dict[int, Written]:
+        """What may turn out to be the leanest, by number of the formulation."""
+        numbers = variants.promising(self._dropped(model.kept))
+        return {k: self._written(variants.programs[k], model, constant) for k in numbers}
 
     def _written(self, program: Program, model: ReducedModel, constant: bool) -> Written:
         """A formulation for a model, without what is zero then."""

@@ -31,7 +31,13 @@ from paramreduce_cli.records.mechanism import (
     Payload,
     Rigid,
 )
-from paramreduce_cli.records.model import BaseParameters, CountedDynamics, Formulations, Model
+from paramreduce_cli.records.model import (
+    BaseParameters,
+    CountedDynamics,
+    Formulation,
+    Formulations,
+    Model,
+)
 from paramreduce_cli.records.parameters import (
     DRIVE,
     INERTIAL,

@@ -26,12 +26,16 @@ class BaseParameters:
     """Each base parameter in terms of standard ones, for people."""
 
 
+Formulation = tuple[Mapping[str, str | bool], ...]
+"""What is chosen at every joint."""
+
+
 @dataclass(frozen=True)
 class Formulations:
-    """Lean ways to write a mechanism's dynamics: for each, what is chosen at every joint."""
+    """Lean ways to write a mechanism's dynamics."""
 
-    inverse: tuple[tuple[Mapping[str, str | bool], ...], ...]
-    direct: tuple[tuple[Mapping[str, str | bool], ...], ...]
+    inverse: tuple[Formulation, ...]
+    direct: tuple[Formulation, ...]
 
 
 @dataclass(frozen=True)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import heapq
-import itertools
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from paramreduce_cli.terms.descent import Descent, Simplified, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import NOISE, Search
-from paramreduce_cli.terms.starts import Start, promising
+from paramreduce_cli.terms.starts import Start, near, promising
 from paramreduce_cli.terms.tape import Tape
 
 _LOOKED_AT = 200
@@ -25,8 +25,12 @@ _FEWEST, _MOST = 12, 60
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
 _WORK = 60_000
 """Operations times torques, of all of these: time grows a little faster."""
-_AGAIN = 4
-"""Starts with the leanest ends, which are gone down from again."""
+_BEST = 4
+"""Starts with the leanest ends, near which others are gone down from."""
+_AT_ONCE = 8
+"""Of these, before the best are looked for again."""
+_NOISY = 0.5
+"""How often there is noise in the choice of terms then."""
 _CLOSELY = 4
 """Leanest ends of all descents, gone on from with more samples."""
 _LEANEST = 12
@@ -59,8 +63,8 @@ def simplified(
 ) -> tuple[list[Simplified], list[Simplified]]:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
-    Starts are gone down from, each in the formulation that is leanest for it, the best ones again and again with
-    noise in the choice; from the best ends it goes on with more samples.
+    Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
+    formulations are changed at random; from the best ends it goes on with more samples.
 
     Args:
         lean: Programs of reduced models.
@@ -70,8 +74,8 @@ def simplified(
         poses: States at which mass matrices must be positive definite.
         budget: Errors that are allowed.
         direct: Whether [M | delta] is meant, not torques.
-        rounds: How often the best starts are gone down from again, in all.
-        seed: Of the noise.
+        rounds: How many starts near the best ones are gone down from.
+        seed: Of what is random.
         jobs: Threads; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
@@ -89,9 +93,9 @@ def simplified(
 
         return made
 
-    def begun(start: Start) -> Descent:
+    def begun(start: Start, turn: int = 0) -> Descent:
         tape = Tape(start.program(lean, direct=direct))
-        return Descent.begun(start, tape, searching(start, looked_at), stop)
+        return Descent.begun(start, tape, searching(start, looked_at, turn), stop)
 
     every = map(begun, starts[:_LOOKED_AT])
     smallest = next((one.start for one in every if one.end.fit.within), None)
@@ -104,7 +108,6 @@ def simplified(
         begins.append(one)
         if len(begins) >= _affordable(begins, looked_at.samples):
             break
-    tapes = {one.start: one.search.tape for one in begins}
     total = len(begins) + rounds + _CLOSELY
 
     def told(descent: Descent) -> Descent:
@@ -115,9 +118,11 @@ def simplified(
     def down(descent: Descent) -> Descent:
         return told(descent.down())
 
-    def again(start: Start, turn: int) -> Descent:
-        made = searching(start, looked_at, turn)
-        return told(Descent.begun(start, tapes[start], made, stop).down(NOISE))
+    def nearby(best: list[Start], turn: int) -> Descent | None:
+        rng = np.random.default_rng([seed, turn])
+        one = begun(near(best[turn % len(best)], best, lean, rng, direct=direct), turn)
+        # The functions are the same, but at the edge of the budget rounding may tell.
+        return told(one.down(NOISE * (rng.random() < _NOISY))) if one.end.fit.within else None
 
     def refined(descent: Descent) -> Descent | None:
         closer = descent.on(searching(descent.start, closely))
@@ -127,8 +132,10 @@ def simplified(
     with ThreadPoolExecutor(jobs) as pool:
         try:
             ends = list(pool.map(down, begins))
-            best = itertools.cycle([one.start for one in leanest(ends, _AGAIN)])
-            ends += pool.map(again, best, range(1, rounds + 1))
+            for first in range(0, rounds, _AT_ONCE):
+                turns = range(first, min(first + _AT_ONCE, rounds))
+                best = [one.start for one in leanest(ends, _BEST)]
+                ends += filter(None, pool.map(partial(nearby, best), turns))
             close = [one for one in pool.map(refined, leanest(ends, _CLOSELY)) if one is not None]
         except BaseException:
             stop.set()

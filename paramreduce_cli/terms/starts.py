@@ -1,20 +1,23 @@
 """Subsets of parameters from which terms are left out."""
 
 from collections import defaultdict
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 
 import numpy as np
 
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.lean.formulations import varied
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.records import Model, ReducedModel, Reduction
+from paramreduce_cli.records import Formulation, Model, ReducedModel, Reduction
 
 _NEAR = 8
 """Parameters more than the smallest subset has, up to which all subsets are starts."""
 _FAR = (12, 16, 20)
 """Parameters more, of which the leanest and the most exact subset are."""
+_OTHER = 0.2
+"""How often another subset is gone down from in a formulation that suits one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,12 +30,16 @@ class Start:
     """On the estimation set."""
     cost: int
     """Operations, nearly."""
+    formulation: Formulation | None = None
+    """In which it is written, none for whichever is the leanest."""
 
     def program(self, lean: LeanModels, *, direct: bool) -> Program:
         """With all terms; its first inputs are the parameters of the model, not all standard ones.
 
         It is not rewritten yet, as its terms are not those that are left in the end.
         """
+        if self.formulation is not None:
+            lean = lean.alone(self.formulation, direct=direct)
         program = (lean.direct if direct else lean.inverse)(self.model, rewritten=False)
         n, n_standard, place = self.model.n, lean.n_parameters, self.model.position
         return program.renumbered(
@@ -84,3 +91,27 @@ def promising(starts: list[Start], smallest: int) -> Iterator[Start]:
         if n - smallest in _FAR
     ]
     return (start for start in chain(*zip_longest(*near, *far)) if start is not None)
+
+
+def near(
+    start: Start,
+    others: Sequence[Start],
+    lean: LeanModels,
+    rng: np.random.Generator,
+    *,
+    direct: bool,
+) -> Start:
+    """A start like another one, its formulation changed at one or two places, sometimes its subset too.
+
+    Which formulation takes the fewest operations once terms are left out cannot be told before.
+
+    Args:
+        start: To be changed.
+        others: Whose subsets may take the place of its own.
+        lean: Formulations of all starts that have none of their own.
+        rng: Where chance comes from.
+        direct: Whether [M | delta] is meant, not torques.
+    """
+    formulation = start.formulation or lean.formulation(start.model, direct=direct)
+    subset = others[int(rng.integers(len(others)))] if rng.random() < _OTHER else start
+    return replace(subset, formulation=varied(formulation, lean.mechanism, rng))
