@@ -47,6 +47,8 @@ _INVERSE_STARTS = (
 )
 _SUITED = 2
 """Formulations from which one that suits a subset of parameters is searched: those that are leanest for it."""
+_CROSSED = 0.5
+"""How often a formulation is varied by what another one has at some joints."""
 _VARIED = 2
 """Choices that are varied at once, at most."""
 _AT_REST = JointFormulation(
@@ -140,21 +142,31 @@ def formulations_for(model: Model, subsets: Iterable[IntArray], *, direct: bool)
     return replace(model.formulations, **{"direct" if direct else "inverse": data})
 
 
-def varied(formulation: Formulation, mechanism: Mechanism, rng: np.random.Generator) -> Formulation:
-    """A formulation in which one or two choices are other ones, at random.
+def varied(
+    formulation: Formulation,
+    others: Sequence[Formulation],
+    mechanism: Mechanism,
+    rng: np.random.Generator,
+) -> Formulation:
+    """A formulation with one or two other choices at random, or as another one is at joints in a row.
 
     Args:
         formulation: Of the mechanism.
+        others: Which have what goes well together.
         mechanism: Whose joints they are of.
         rng: Where chance comes from.
     """
+    if rng.random() < _CROSSED:
+        other = others[int(rng.integers(len(others)))]
+        first, last = np.sort(rng.integers(len(formulation), size=2))
+        return (*formulation[:first], *other[first : last + 1], *formulation[last + 1 :])
     tree = lean_tree(mechanism)
     choices = list(map(from_data, formulation))
     for _ in range(rng.integers(1, _VARIED, endpoint=True)):
         k = int(rng.integers(len(choices)))
         joint = tree.joints[k]
-        others = alternatives(choices[k], joint) + far_reaching(choices[k], joint)
-        choices[k] = others[rng.integers(len(others))]
+        alike = alternatives(choices[k], joint) + far_reaching(choices[k], joint)
+        choices[k] = alike[int(rng.integers(len(alike)))]
     return tuple(map(to_data, choices))
 
 

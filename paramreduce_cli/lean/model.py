@@ -71,11 +71,11 @@ class LeanModels:
 
     @cached_property
     def _inverse(self) -> _Variants:
-        return self._variants(inverse_outputs, self._model.formulations.inverse, projected_inverse)
+        return self._variants(inverse_outputs, self.formulations(), projected_inverse)
 
     @cached_property
     def _direct(self) -> _Variants:
-        return self._variants(direct_outputs, self._model.formulations.direct, projected_direct)
+        return self._variants(direct_outputs, self.formulations(direct=True), projected_direct)
 
     def _variants(
         self,
@@ -122,6 +122,11 @@ class LeanModels:
         variants = self._direct if direct else self._inverse
         _, number = self._settled(variants, model, constant=False)
         return variants.formulations[number]
+
+    def formulations(self, *, direct: bool = False) -> tuple[Formulation, ...]:
+        """All that there are."""
+        known = self._model.formulations
+        return known.direct if direct else known.inverse
 
     def alone(self, formulation: Formulation, *, direct: bool = False) -> LeanModels:
         """The same in one formulation of the inverse or of the direct dynamics."""

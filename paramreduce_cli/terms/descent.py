@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,6 +26,8 @@ _SAME = 6
 """Digits of the sums of squared errors, over those allowed, of ends that are taken for the same."""
 _LOOKS = 3
 """Times that parameters and the mass matrices that accelerations are found with take turns."""
+_LIKELY = 2.0
+"""Operations more than the leanest has, with which a descent is drawn a third as often."""
 _ON_THE_WAY = 16
 """Programs of a front."""
 
@@ -195,6 +197,13 @@ def leanest(descents: Iterable[Descent], number: int) -> list[Descent]:
     """Those with the leanest different ends, so many at most."""
     different = {descent.rank: descent for descent in descents}
     return [different[rank] for rank in sorted(different)[:number]]
+
+
+def drawn(descents: Sequence[Descent], rng: np.random.Generator) -> Descent:
+    """One of them at random, the likelier the leaner."""
+    fewest = np.array([one.fewest for one in descents])
+    weights = np.exp((fewest.min() - fewest) / _LIKELY)
+    return descents[int(rng.choice(len(descents), p=weights / weights.sum()))]
 
 
 def front(descents: Iterable[Descent]) -> list[Simplified]:

@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.terms.descent import Descent, Simplified, front, leanest
+from paramreduce_cli.terms.descent import Descent, Simplified, drawn, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import NOISE, Search
@@ -21,14 +21,15 @@ from paramreduce_cli.terms.tape import Tape
 
 _LOOKED_AT = 200
 """Starts that are looked at to find the smallest one within the budget, at most."""
-_FEWEST, _MOST = 12, 60
+_FEWEST, _MOST = 12, 30
 """Programs that are gone down from, as many as :data:`_WORK` allows."""
-_WORK = 60_000
+_WORK = 40_000
 """Operations times torques, of all of these: time grows a little faster."""
 _BEST = 4
-"""Starts with the leanest ends, near which others are gone down from."""
+"""Starts with the leanest ends, near which others are gone down from; as often one is drawn, or none would be
+come by that is not better at once."""
 _AT_ONCE = 8
-"""Of these, before the best are looked for again."""
+"""Of these others, before the best are looked for again."""
 _NOISY = 0.5
 """How often there is noise in the choice of terms then."""
 _CLOSELY = 4
@@ -118,9 +119,12 @@ def simplified(
     def down(descent: Descent) -> Descent:
         return told(descent.down())
 
-    def nearby(best: list[Start], turn: int) -> Descent | None:
+    def nearby(ends: list[Descent], turn: int) -> Descent | None:
         rng = np.random.default_rng([seed, turn])
-        one = begun(near(best[turn % len(best)], best, lean, rng, direct=direct), turn)
+        best = leanest(ends, _BEST)
+        parent = best[turn // 2 % len(best)] if turn % 2 else drawn(ends, rng)
+        others = [one.start for one in best]
+        one = begun(near(parent.start, others, lean, rng, direct=direct), turn)
         # The functions are the same, but at the edge of the budget rounding may tell.
         return told(one.down(NOISE * (rng.random() < _NOISY))) if one.end.fit.within else None
 
@@ -134,8 +138,7 @@ def simplified(
             ends = list(pool.map(down, begins))
             for first in range(0, rounds, _AT_ONCE):
                 turns = range(first, min(first + _AT_ONCE, rounds))
-                best = [one.start for one in leanest(ends, _BEST)]
-                ends += filter(None, pool.map(partial(nearby, best), turns))
+                ends += [one for one in pool.map(partial(nearby, ends), turns) if one is not None]
             close = [one for one in pool.map(refined, leanest(ends, _CLOSELY)) if one is not None]
         except BaseException:
             stop.set()

@@ -101,17 +101,19 @@ def near(
     *,
     direct: bool,
 ) -> Start:
-    """A start like another one, its formulation changed at one or two places, sometimes its subset too.
+    """A start like another one, its formulation varied, sometimes its subset another one too.
 
     Which formulation takes the fewest operations once terms are left out cannot be told before.
 
     Args:
         start: To be changed.
-        others: Whose subsets may take the place of its own.
-        lean: Formulations of all starts that have none of their own.
+        others: Whose subsets may take the place of its own, and whose formulations are looked at.
+        lean: Has more of these, and one for every start that has none of its own.
         rng: Where chance comes from.
         direct: Whether [M | delta] is meant, not torques.
     """
     formulation = start.formulation or lean.formulation(start.model, direct=direct)
+    known = [*lean.formulations(direct=direct), *(o.formulation for o in others if o.formulation)]
+    found = varied(formulation, known, lean.mechanism, rng)
     subset = others[int(rng.integers(len(others)))] if rng.random() < _OTHER else start
-    return replace(subset, formulation=varied(formulation, lean.mechanism, rng))
+    return replace(subset, formulation=found)

@@ -15,7 +15,7 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
 from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
-from paramreduce_cli.lean.formulations import formulations, formulations_for
+from paramreduce_cli.lean.formulations import formulations, formulations_for, varied
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -242,3 +242,36 @@ def test_formulations_for_some_parameters_are_the_same_dynamics_and_take_no_more
         return graph.count(build(tree, list(map(from_data, choices)), graph, dropped))
 
     assert min(map(count, new)) < min(map(count, known))
+
+
+def test_varied_formulations_have_one_or_two_other_choices_or_joints_of_another_one(puma):
+    one, *others = puma.formulations.inverse
+    kinds = {"choices": 0, "joints": 0}
+    for seed in range(60):
+        found = varied(one, others, puma.mechanism, np.random.default_rng(seed))
+        assert found == varied(one, others, puma.mechanism, np.random.default_rng(seed))
+        assert tuple(to_data(from_data(choices)) for choices in found) == found
+        changed = [k for k in range(6) if found[k] != one[k]]
+        taken = any(
+            all(found[k] == (other[k] if first <= k <= last else one[k]) for k in range(6))
+            for other in others
+            for first in range(6)
+            for last in range(first, 6)
+        )
+        assert taken or 1 <= len(changed) <= 2
+        kinds["joints" if taken else "choices"] += 1
+    assert min(kinds.values()) > 10
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_the_leanest_formulation_alone_takes_what_the_leanest_of_all_does(puma, direct):
+    def operations(lean):
+        function = lean.direct if direct else lean.inverse
+        return function(reduced, rewritten=False).n_operations
+
+    lean, reduced = LeanModels(puma), whole(puma.mechanism, np.sort(puma.base.columns))
+    known = lean.formulations(direct=direct)
+    found = lean.formulation(reduced, direct=direct)
+    assert found in known
+    each = [operations(lean.alone(one, direct=direct)) for one in known]
+    assert each[known.index(found)] == min(each) == operations(lean)

@@ -1,7 +1,9 @@
 """From one start down: what is passed on the way keeps to what is said of it."""
 
 import threading
+from collections import Counter
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from terms.test_search import states
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.reduction.models import base_model
-from paramreduce_cli.terms.descent import Descent, front, leanest
+from paramreduce_cli.terms.descent import Descent, drawn, front, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
@@ -73,6 +75,15 @@ def test_noise_finds_other_ends_and_the_same_seed_the_same(begun):
     best = leanest(ends, 2)
     assert best[0].rank == min(one.rank for one in ends)
     assert best[0].rank != best[1].rank
+
+
+def test_leaner_ends_are_drawn_more_often():
+    ends = [SimpleNamespace(fewest=fewest) for fewest in (104, 100, 102)]
+    rng = np.random.default_rng(0)
+    times = Counter(drawn(ends, rng).fewest for _ in range(2000))
+    # Each e times as often as the one of two operations more.
+    assert times[100] / times[102] == pytest.approx(np.e, rel=0.2)
+    assert times[102] / times[104] == pytest.approx(np.e, rel=0.2)
 
 
 def test_on_other_samples_the_leanest_that_keeps_to_the_budget_is_gone_on_from(arm, begun):

@@ -1,8 +1,14 @@
-"""In which order subsets are gone down from."""
+"""Which subsets are gone down from, and in which formulations."""
 
 from types import SimpleNamespace
 
-from paramreduce_cli.terms.starts import Start, promising
+import numpy as np
+import pytest
+from conftest import model_of
+
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.terms.starts import Start, near, promising
 
 
 def start(n, cost, error):
@@ -22,3 +28,34 @@ def test_the_leanest_of_every_size_come_first_and_of_far_sizes_the_most_exact_on
 def test_a_subset_that_is_both_the_leanest_and_the_most_exact_is_one_start():
     starts = [start(10, 100, 0.009), start(22, 230, 0.001), start(22, 240, 0.002)]
     assert [one.cost for one in promising(starts, 10)] == [100, 230]
+
+
+@pytest.mark.parametrize("direct", [False, True])
+def test_starts_near_one_are_the_same_function_written_otherwise(direct):
+    model = model_of("puma560")
+    lean, base = LeanModels(model), base_model(model)
+    one = Start("base", base, 0.0, 0)
+    states = np.random.default_rng(0).normal(size=(18, 20))
+    inputs = [*np.broadcast_to(base.values[:, None], (base.n, 20)), *states]
+
+    def outputs(some):
+        return np.array(some.program(lean, direct=direct).evaluated(inputs))
+
+    expected, formulations, at = outputs(one), [], one
+    for seed in range(8):
+        at = near(at, [one, at], lean, np.random.default_rng(seed), direct=direct)
+        formulations.append(at.formulation)
+        assert outputs(at) == pytest.approx(expected, rel=1e-9, abs=1e-9)
+    assert formulations[-1] != lean.formulation(base, direct=direct)
+    assert len({repr(one) for one in formulations}) > 4
+
+
+def test_another_subset_may_take_the_place_of_one():
+    model = model_of("puma560")
+    lean, base = LeanModels(model), base_model(model)
+    one, other = (Start(name, base, 0.0, 0) for name in ("one", "other"))
+    found = [
+        near(one, [other], lean, np.random.default_rng(seed), direct=False).heuristic
+        for seed in range(30)
+    ]
+    assert 0 < found.count("other") < found.count("one")
