@@ -47,7 +47,7 @@ _INVERSE_STARTS = (
 )
 _SUITED = 2
 """Formulations from which one that suits a subset of parameters is searched: those that are leanest for it."""
-_CROSSED = 0.5
+_CROSSED = 0.4
 """How often a formulation is varied by what another one has at some joints."""
 _VARIED = 2
 """Choices that are varied at once, at most."""

@@ -26,13 +26,14 @@ _FEWEST, _MOST = 12, 30
 _WORK = 40_000
 """Operations times torques, of all of these: time grows a little faster."""
 _BEST = 4
-"""Starts with the leanest ends, near which others are gone down from; as often one is drawn, or none would be
-come by that is not better at once."""
+"""Starts with the leanest ends, near which others are gone down from."""
+_DRAWN = 0.25
+"""How often this is done near one of all, so that what is no better at once is gone on from too."""
 _AT_ONCE = 8
 """Of these others, before the best are looked for again."""
 _NOISY = 0.5
 """How often there is noise in the choice of terms then."""
-_CLOSELY = 4
+_CLOSELY = 8
 """Leanest ends of all descents, gone on from with more samples."""
 _LEANEST = 12
 """Programs that are judged, the leanest of all searches."""
@@ -122,7 +123,7 @@ def simplified(
     def nearby(ends: list[Descent], turn: int) -> Descent | None:
         rng = np.random.default_rng([seed, turn])
         best = leanest(ends, _BEST)
-        parent = best[turn // 2 % len(best)] if turn % 2 else drawn(ends, rng)
+        parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
         others = [one.start for one in best]
         one = begun(near(parent.start, others, lean, rng, direct=direct), turn)
         # The functions are the same, but at the edge of the budget rounding may tell.
