@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -68,6 +68,10 @@ class LeanModels:
         self._tree = lean_tree(mechanism)
         self._projected = independent and mechanism.loops is not None
         self.n_parameters = mechanism.n_parameters
+
+    def __reduce__(self) -> tuple[Callable[..., LeanModels], tuple[Model]]:
+        # Other processes work out again what they need: that takes less than being told.
+        return partial(LeanModels, independent=self._projected), (self._model,)
 
     @cached_property
     def _inverse(self) -> _Variants:

@@ -28,7 +28,8 @@ from paramreduce_cli.records import (
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Judge
-from paramreduce_cli.terms.simplify import LookedAt, simplified
+from paramreduce_cli.terms.searching import LookedAt, Searcher
+from paramreduce_cli.terms.simplify import simplified
 from paramreduce_cli.terms.starts import starts_within
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
@@ -113,10 +114,13 @@ def _searched(
     def progress(share: float, remark: str) -> None:
         run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
 
-    found, front = simplified(
-        lean, starts, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
-        judge.poses(_POSES), budget, direct=judge.direct, rounds=section.rounds, seed=section.seed, jobs=max(1, run.jobs), progress=progress,
+    searcher = Searcher(
+        lean, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
+        judge.poses(_POSES), budget, direct, section.seed,
     )  # fmt: skip
+    found, front = simplified(
+        searcher, starts, rounds=section.rounds, jobs=run.jobs, progress=progress
+    )
     fitted = judge.thinned(samples.estimation, _FITTED)
     way = [one.refitted(fitted, budget) for one in front]
     records = (_record(one.refitted(fitted, budget), judge, budget, way, lean) for one in found)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 
@@ -87,102 +86,24 @@ class Passed:
 
 
 @dataclass(frozen=True)
-class Descent:
-    """A search from one start, and what it has come by."""
+class Way:
+    """What a descent has come by."""
 
     start: Start
-    searching: Callable[[Tape], Search]
-    """Makes the search among the terms of a program of this start."""
-    stop: threading.Event
-    """Set where it is to end at once."""
-    search: Search
-    """Among the terms of the program as it was last rewritten."""
-    end: Step
-    """Of that program."""
     visited: dict[int, Passed]
-    """The best one of every number of operations."""
-
-    @classmethod
-    def begun(
-        cls, start: Start, tape: Tape, searching: Callable[[Tape], Search], stop: threading.Event
-    ) -> Descent:
-        """With all terms of a program, whose first inputs are the parameters of the start."""
-        search = searching(tape)
-        descent = cls(start, searching, stop, search, search.start(start.model.values), {})
-        descent._note(descent.end)
-        return descent
+    """The best program of every number of operations."""
+    strain: float
+    """Of the end."""
 
     @property
     def fewest(self) -> int:
-        """Operations of the leanest program that it has come by."""
+        """Operations of the leanest program."""
         return min(self.visited)
 
     @property
     def rank(self) -> tuple[int, float]:
         """The less the better; the same for ends that are the same."""
-        return self.fewest, round(self.end.fit.strain, _SAME)
-
-    def down(self, noise: float = 0.0) -> Descent:
-        """Leave terms out until no more can go, also of what comes of rewriting.
-
-        A rewritten program has other terms than before, and shares more of what they are made of. It
-        is rewritten early, too: which terms are cheap to do without hangs on what the others share.
-
-        Args:
-            noise: Of the logarithm of what terms seem to cost, until no more can go with it.
-        """
-        descent = self
-        while True:
-            before = descent.fewest
-            until = int(_LEG * descent.end.count)
-            end = descent.search.descended(descent.end, descent._note, noise, until=until)
-            descent = replace(descent, end=end)
-            rewritten = descent._rewritten()
-            if rewritten.fewest == before:
-                return descent.down() if noise else descent
-            descent = rewritten
-
-    def on(self, searching: Callable[[Tape], Search]) -> Descent | None:
-        """Down on other samples, from the leanest program within the budget there, or made to be.
-
-        None where there is none.
-        """
-        tried: list[Descent] = []
-        for count, passed in sorted(self.visited.items()):
-            search = searching(passed.tape)
-            end = search.mended(passed.left, passed.beta)
-            if not end.fit.within:
-                continue
-            descent = Descent(self.start, searching, self.stop, search, end, {})
-            descent._note(end)
-            tried.append(descent.down())
-            if end.count <= count or len(tried) == _MENDED:
-                break
-        return min(tried, key=lambda one: one.rank, default=None)
-
-    def _rewritten(self) -> Descent:
-        """Among the terms of the leanest program as it is rewritten; as it was if that takes it out of the budget.
-
-        Mass matrices are taken anew, which is enough for what is at the edge of it.
-        """
-        passed = self.visited[self.fewest]
-        search = self.searching(Tape(self.simplified(passed).program))
-        end = search.start(passed.beta)
-        if not end.fit.within:
-            return self
-        descent = replace(self, search=search, end=end)
-        descent._note(end)
-        return descent
-
-    def _note(self, step: Step) -> None:
-        """Remember a program."""
-        if self.stop.is_set():
-            raise KeyboardInterrupt
-        known = self.visited.get(step.count)
-        if known is None or step.fit.excess < known.excess:
-            fit = step.fit
-            passed = Passed(self.search.tape, fit.left, fit.beta, fit.cost, fit.excess)
-            self.visited[step.count] = passed
+        return self.fewest, round(self.strain, _SAME)
 
     def simplified(self, passed: Passed) -> Simplified:
         """A program on the way, its sums and products rearranged."""
@@ -193,33 +114,121 @@ class Descent:
         )
 
 
-def leanest(descents: Iterable[Descent], number: int) -> list[Descent]:
+@dataclass(frozen=True)
+class Descent:
+    """A search from one start, and what it has come by."""
+
+    start: Start
+    searching: Callable[[Tape], Search]
+    """Makes the search among the terms of a program of this start."""
+    search: Search
+    """Among the terms of the program as it was last rewritten."""
+    end: Step
+    """Of that program."""
+    visited: dict[int, Passed]
+    """The best one of every number of operations."""
+
+    @classmethod
+    def begun(cls, start: Start, tape: Tape, searching: Callable[[Tape], Search]) -> Descent:
+        """With all terms of a program, whose first inputs are the parameters of the start."""
+        search = searching(tape)
+        descent = cls(start, searching, search, search.start(start.model.values), {})
+        descent._note(descent.end)
+        return descent
+
+    @property
+    def way(self) -> Way:
+        """What it has come by so far."""
+        return Way(self.start, self.visited, self.end.fit.strain)
+
+    def down(self, noise: float = 0.0) -> Way:
+        """Leave terms out until no more can go, also of what comes of rewriting.
+
+        A rewritten program has other terms than before, and shares more of what they are made of. It
+        is rewritten early, too: which terms are cheap to do without hangs on what the others share.
+
+        Args:
+            noise: Of the logarithm of what terms seem to cost, until no more can go with it.
+        """
+        descent = self
+        while True:
+            before = min(descent.visited)
+            until = int(_LEG * descent.end.count)
+            end = descent.search.descended(descent.end, descent._note, noise, until=until)
+            descent = replace(descent, end=end)
+            rewritten = descent._rewritten()
+            if min(rewritten.visited) == before:
+                return descent.down() if noise else descent.way
+            descent = rewritten
+
+    def _rewritten(self) -> Descent:
+        """Among the terms of the leanest program as it is rewritten; as it was if that takes it out of the budget.
+
+        Mass matrices are taken anew, which is enough for what is at the edge of it.
+        """
+        passed = self.visited[min(self.visited)]
+        search = self.searching(Tape(self.way.simplified(passed).program))
+        end = search.start(passed.beta)
+        if not end.fit.within:
+            return self
+        descent = replace(self, search=search, end=end)
+        descent._note(end)
+        return descent
+
+    def _note(self, step: Step) -> None:
+        """Remember a program."""
+        known = self.visited.get(step.count)
+        if known is None or step.fit.excess < known.excess:
+            fit = step.fit
+            passed = Passed(self.search.tape, fit.left, fit.beta, fit.cost, fit.excess)
+            self.visited[step.count] = passed
+
+
+def gone_on(way: Way, searching: Callable[[Tape], Search]) -> Way | None:
+    """Down on other samples, from the leanest program within the budget there, or made to be.
+
+    Args:
+        way: Of a descent on some samples.
+        searching: Makes searches on others.
+
+    Returns:
+        None where no program is within the budget there.
+    """
+    tried: list[Way] = []
+    for count, passed in sorted(way.visited.items()):
+        search = searching(passed.tape)
+        end = search.mended(passed.left, passed.beta)
+        if not end.fit.within:
+            continue
+        descent = Descent(way.start, searching, search, end, {})
+        descent._note(end)
+        tried.append(descent.down())
+        if end.count <= count or len(tried) == _MENDED:
+            break
+    return min(tried, key=lambda one: one.rank, default=None)
+
+
+def leanest(ways: Iterable[Way], number: int) -> list[Way]:
     """Those with the leanest different ends, so many at most."""
-    different = {descent.rank: descent for descent in descents}
+    different = {way.rank: way for way in ways}
     return [different[rank] for rank in sorted(different)[:number]]
 
 
-def drawn(descents: Sequence[Descent], rng: np.random.Generator) -> Descent:
+def drawn(ways: Sequence[Way], rng: np.random.Generator) -> Way:
     """One of them at random, the likelier the leaner."""
-    fewest = np.array([one.fewest for one in descents])
+    fewest = np.array([one.fewest for one in ways])
     weights = np.exp((fewest.min() - fewest) / _LIKELY)
-    return descents[int(rng.choice(len(descents), p=weights / weights.sum()))]
+    return ways[int(rng.choice(len(ways), p=weights / weights.sum()))]
 
 
-def front(descents: Iterable[Descent]) -> list[Simplified]:
+def front(ways: Iterable[Way]) -> list[Simplified]:
     """Programs on the way that no leaner one beats, some of them, evenly spread."""
-    entries = [
-        (count, passed.cost, descent)
-        for descent in descents
-        for count, passed in descent.visited.items()
-    ]
-    kept: list[tuple[int, Descent]] = []
+    entries = [(count, passed.cost, way) for way in ways for count, passed in way.visited.items()]
+    kept: list[tuple[int, Way]] = []
     least_cost = np.inf
-    for count, cost, descent in sorted(entries, key=lambda entry: entry[:2]):
+    for count, cost, way in sorted(entries, key=lambda entry: entry[:2]):
         if cost < least_cost:
             least_cost = cost
-            kept.append((count, descent))
+            kept.append((count, way))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
-    return [
-        descent.simplified(descent.visited[count]) for count, descent in (kept[i] for i in picks)
-    ]
+    return [way.simplified(way.visited[count]) for count, way in (kept[i] for i in picks)]

@@ -1,8 +1,6 @@
 """From one start down: what is passed on the way keeps to what is said of it."""
 
-import threading
 from collections import Counter
-from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -12,7 +10,7 @@ from terms.test_search import states
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.reduction.models import base_model
-from paramreduce_cli.terms.descent import Descent, drawn, front, leanest
+from paramreduce_cli.terms.descent import Descent, drawn, front, gone_on, leanest
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
@@ -46,7 +44,7 @@ def begun(arm):
         def searching(tape):
             return Search(Fitting(tape, base.n, looked_at, BUDGET), seed)
 
-        return Descent.begun(start, tape, searching, threading.Event())
+        return Descent.begun(start, tape, searching)
 
     return made
 
@@ -93,10 +91,10 @@ def test_on_other_samples_the_leanest_that_keeps_to_the_budget_is_gone_on_from(a
     def closer(budget):
         return lambda tape: Search(Fitting(tape, descent.start.model.n, other, budget), 0)
 
-    found = descent.on(closer(BUDGET))
+    found = gone_on(descent, closer(BUDGET))
     one = found.simplified(found.visited[found.fewest])
     assert other.errors(one.outputs(other.states))[0] <= BUDGET.torque
-    assert descent.on(closer(Budget(1e-14, np.inf))) is None
+    assert gone_on(descent, closer(Budget(1e-14, np.inf))) is None
 
 
 def test_a_front_has_programs_that_no_leaner_one_beats(arm, begun):
@@ -108,11 +106,3 @@ def test_a_front_has_programs_that_no_leaner_one_beats(arm, begun):
     looked_at = samples(arm, 100, 0)
     errors = [looked_at.errors(one.outputs(looked_at.states))[0] for one in programs]
     assert np.all(np.diff(errors) < 0)
-
-
-def test_it_ends_at_once_where_it_is_to_stop(begun):
-    descent = begun()
-    stopped = replace(descent, stop=threading.Event())
-    stopped.stop.set()
-    with pytest.raises(KeyboardInterrupt):
-        stopped.down()

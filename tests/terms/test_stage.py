@@ -236,8 +236,8 @@ def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measu
 def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_copy, monkeypatch):
     seen = []
 
-    def nothing(lean, starts, *looked_at, **__):
-        seen.extend(looked_at[:2])
+    def nothing(searcher, starts, **__):
+        seen.extend([searcher.looked_at, searcher.closely])
         return [], []
 
     module = sys.modules["paramreduce_cli.stages.reduce_terms"]

@@ -1,0 +1,163 @@
+"""Descents of one function's programs, in this process or in several."""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import NamedTuple, Protocol, TypeVar
+
+import numpy as np
+
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.terms.descent import Descent, Way, gone_on
+from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.samples import TermSamples
+from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.starts import Start, near
+from paramreduce_cli.terms.tape import Tape
+
+_NOISY = 0.5
+"""How often there is noise in the choice of terms near a start."""
+
+Item = TypeVar("Item")
+
+
+@dataclass(frozen=True)
+class LookedAt:
+    """Samples that are looked at while terms are left out."""
+
+    samples: TermSamples
+    """What parameters are fitted to."""
+    watched: TermSamples | None
+    """On which errors must be within the budget as well."""
+
+
+class Near(NamedTuple):
+    """A start near which is another one to go down from."""
+
+    start: Start
+    others: list[Start]
+    """What it may have some of."""
+    turn: int
+    """Number of the dice."""
+
+
+@dataclass(frozen=True)
+class Searcher:
+    """Goes down from starts."""
+
+    lean: LeanModels
+    """Programs of reduced models."""
+    looked_at: LookedAt
+    """Samples for most of the search."""
+    closely: LookedAt
+    """More samples, for the best of what was found."""
+    poses: TermSamples | None
+    """States at which mass matrices must be positive definite."""
+    budget: Budget
+    direct: bool
+    """Whether [M | delta] is meant, not torques."""
+    seed: int
+    """Of what is random."""
+
+    def begun(self, start: Start, turn: int = 0) -> Descent:
+        """With all terms."""
+        tape = Tape(start.program(self.lean, direct=self.direct))
+        return Descent.begun(start, tape, self._searching(start, self.looked_at, turn))
+
+    def down(self, start: Start) -> Way:
+        """From a start until no more terms can go."""
+        return self.begun(start).down()
+
+    def nearby(self, what: Near) -> Way | None:
+        """The same from one near another one, half the times with noise; None where it is not within the budget.
+
+        The function is the same to begin with, but at the edge of the budget rounding may tell.
+        """
+        rng = np.random.default_rng([self.seed, what.turn])
+        start = near(what.start, what.others, self.lean, rng, direct=self.direct)
+        descent = self.begun(start, what.turn)
+        noise = NOISE * (rng.random() < _NOISY)
+        return descent.down(noise) if descent.end.fit.within else None
+
+    def closer(self, way: Way) -> Way | None:
+        """On from what a descent has come by with more samples."""
+        return gone_on(way, self._searching(way.start, self.closely))
+
+    def _searching(self, start: Start, some: LookedAt, turn: int = 0) -> Callable[[Tape], Search]:
+        def made(tape: Tape) -> Search:
+            fitting = Fitting(
+                tape, start.model.n, some.samples, self.budget, some.watched, self.poses
+            )
+            return Search(fitting, self.seed + turn)
+
+        return made
+
+
+class Each(Protocol):
+    """Does some work of a searcher on items."""
+
+    def __call__(
+        self, work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
+    ) -> list[Way]:
+        """What is found, in the order of the items."""
+
+
+@contextlib.contextmanager
+def hands(searcher: Searcher, jobs: int, told: Callable[[Way | None], None]) -> Iterator[Each]:
+    """Work in so many processes; what is found does not depend on how many.
+
+    Args:
+        searcher: What works.
+        jobs: Processes; one is this one.
+        told: Of what is found on an item, as soon as it is.
+    """
+
+    def here(
+        work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
+    ) -> Iterator[tuple[int, Way | None]]:
+        for number, item in enumerate(items):
+            yield number, work(searcher, item)
+
+    def each(
+        done: Callable[..., Iterator[tuple[int, Way | None]]],
+        work: Callable[[Searcher, Item], Way | None],
+        items: Sequence[Item],
+    ) -> list[Way]:
+        found: dict[int, Way | None] = {}
+        for number, way in done(work, items):
+            found[number] = way
+            told(way)
+        return [way for _, way in sorted(found.items()) if way is not None]
+
+    if jobs < 2:
+        yield partial(each, here)
+        return
+    with workers(jobs, _start_worker, searcher) as pool:
+
+        def there(
+            work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
+        ) -> Iterator[tuple[int, Way | None]]:
+            for (number, _), way in as_done(pool, partial(_in_worker, work), enumerate(items)):
+                yield number, way
+
+        yield partial(each, there)
+
+
+class _Worker:
+    """What a worker process knows; set once when it starts."""
+
+    searcher: Searcher
+
+
+def _start_worker(searcher: Searcher) -> None:
+    _Worker.searcher = searcher
+
+
+def _in_worker(
+    work: Callable[[Searcher, Item], Way | None], numbered: tuple[int, Item]
+) -> Way | None:
+    return work(_Worker.searcher, numbered[1])

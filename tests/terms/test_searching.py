@@ -1,0 +1,57 @@
+"""Descents in this process and in others."""
+
+import numpy as np
+import pytest
+from conftest import model_of
+from terms.test_search import NOMINAL, states
+
+from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.terms.fitting import Budget
+from paramreduce_cli.terms.samples import term_samples
+from paramreduce_cli.terms.searching import LookedAt, Near, Searcher, hands
+from paramreduce_cli.terms.starts import Start
+
+
+@pytest.fixture(scope="module")
+def searcher():
+    model = model_of("two_link")
+    some, more = (
+        term_samples(
+            model.mechanism, [states(model, count, count)], NOMINAL, np.ones(2),
+            direct=False, projected=False,
+        )
+        for count in (60, 120)
+    )  # fmt: skip
+    return Searcher(
+        LeanModels(model), LookedAt(some, None), LookedAt(more, None), None, Budget(0.05, np.inf),
+        direct=False, seed=0,
+    )  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def start():
+    return Start("base", base_model(model_of("two_link")), 0.0, 0)
+
+
+def found(searcher, start, jobs):
+    told = []
+    with hands(searcher, jobs, lambda way: told.append(way.rank)) as each:
+        ends = each(Searcher.down, [start])
+        ends += each(Searcher.nearby, [Near(start, [start], turn) for turn in range(6)])
+        close = each(Searcher.closer, ends)
+    assert sorted(told) == sorted(one.rank for one in ends + close)
+    return [one.rank for one in ends + close]
+
+
+def test_what_is_found_does_not_depend_on_the_number_of_processes(searcher, start):
+    here = found(searcher, start, 1)
+    assert found(searcher, start, 2) == here
+    assert len(set(here)) > 1
+
+
+def test_what_is_at_the_edge_of_the_budget_may_be_out_of_it_near_there(searcher, start):
+    exact = Searcher(**{**vars(searcher), "budget": Budget(1e-18, np.inf)})
+    assert exact.nearby(Near(start, [start], 0)) is None
+    with hands(exact, 1, lambda way: None) as each:
+        assert each(Searcher.nearby, [Near(start, [start], 0)]) == []
