@@ -84,8 +84,8 @@ def simplified(
         parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
         return Near(parent.start, [one.start for one in best], turn)
 
-    work = (total * _work(begins, searcher.looked_at.samples)) > _MANY
-    with hands(searcher, jobs if work else 1, told) as each:
+    pays = total * _work(begins, searcher.looked_at.samples) > _MANY
+    with hands(searcher, jobs if pays else 1, told) as each:
         ends = each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
             turns = range(first, min(first + _AT_ONCE, rounds))
