@@ -29,7 +29,6 @@ _NEAR = 1.02
 class _Variants:
     """The same model in all formulations."""
 
-    formulations: tuple[Formulation, ...]
     programs: list[Program]
 
     @cached_property
@@ -95,7 +94,7 @@ class LeanModels:
             if self._projected:
                 outputs = project(self.mechanism, graph, outputs)
             programs.append(Program.of_graph(*Written(graph, outputs).settled()))
-        return _Variants(formulations, programs)
+        return _Variants(programs)
 
     def inverse(
         self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
@@ -125,7 +124,7 @@ class LeanModels:
         """The one with the fewest operations before they are rewritten."""
         variants = self._direct if direct else self._inverse
         _, number = self._settled(variants, model, constant=False)
-        return variants.formulations[number]
+        return self.formulations(direct=direct)[number]
 
     def formulations(self, *, direct: bool = False) -> tuple[Formulation, ...]:
         """All that there are."""

@@ -27,7 +27,7 @@ TOLERANCES: dict[str, Tolerance] = {
     "operations": Tolerance(0.0),
     "mass_matrix": Tolerance(1e-4, 1e-9),
     "parameters": Tolerance(1e-5, 1e-9),
-    "terms": Tolerance(0.1),
+    "terms": Tolerance(0.05),
 }
 _TIE = Tolerance(1e-7, 1e-9)
 

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, Protocol, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -97,54 +98,53 @@ class Searcher:
         return made
 
 
-class Each(Protocol):
-    """Does some work of a searcher on items."""
-
-    def __call__(
-        self, work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
-    ) -> list[Way]:
-        """What is found, in the order of the items."""
-
-
-@contextlib.contextmanager
-def hands(searcher: Searcher, jobs: int, told: Callable[[Way | None], None]) -> Iterator[Each]:
-    """Work in so many processes; what is found does not depend on how many.
+class Hands:
+    """What does the work of a searcher, here or in other processes.
 
     Args:
         searcher: What works.
-        jobs: Processes; one is this one.
         told: Of what is found on an item, as soon as it is.
+        pool: Of processes that know the searcher; without them it is done here.
     """
 
-    def here(
-        work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
-    ) -> Iterator[tuple[int, Way | None]]:
-        for number, item in enumerate(items):
-            yield number, work(searcher, item)
+    def __init__(
+        self,
+        searcher: Searcher,
+        told: Callable[[Way | None], None],
+        pool: ProcessPoolExecutor | None = None,
+    ) -> None:
+        self._searcher, self._told, self._pool = searcher, told, pool
 
     def each(
-        done: Callable[..., Iterator[tuple[int, Way | None]]],
-        work: Callable[[Searcher, Item], Way | None],
-        items: Sequence[Item],
+        self, work: Callable[[Searcher, Item], Way | None], items: Iterable[Item]
     ) -> list[Way]:
-        found: dict[int, Way | None] = {}
-        for number, way in done(work, items):
-            found[number] = way
-            told(way)
-        return [way for _, way in sorted(found.items()) if way is not None]
+        """What is found on items, in their order."""
+        found: dict[int, Way] = {}
+        for number, way in self._done(work, items):
+            self._told(way)
+            if way is not None:
+                found[number] = way
+        return [found[number] for number in sorted(found)]
 
+    def _done(
+        self, work: Callable[[Searcher, Item], Way | None], items: Iterable[Item]
+    ) -> Iterator[tuple[int, Way | None]]:
+        """The same in any order, with the numbers of the items."""
+        if self._pool is None:
+            yield from ((k, work(self._searcher, item)) for k, item in enumerate(items))
+            return
+        for (k, _), way in as_done(self._pool, partial(_in_worker, work), enumerate(items)):
+            yield k, way
+
+
+@contextlib.contextmanager
+def hands(searcher: Searcher, jobs: int, told: Callable[[Way | None], None]) -> Iterator[Hands]:
+    """Work here, or in so many other processes; what is found does not depend on how many."""
     if jobs < 2:
-        yield partial(each, here)
+        yield Hands(searcher, told)
         return
     with workers(jobs, _start_worker, searcher) as pool:
-
-        def there(
-            work: Callable[[Searcher, Item], Way | None], items: Sequence[Item]
-        ) -> Iterator[tuple[int, Way | None]]:
-            for (number, _), way in as_done(pool, partial(_in_worker, work), enumerate(items)):
-                yield number, way
-
-        yield partial(each, there)
+        yield Hands(searcher, told, pool)
 
 
 class _Worker:

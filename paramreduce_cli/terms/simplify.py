@@ -71,12 +71,11 @@ def simplified(
         if len(begins) >= _affordable(begins, searcher.looked_at.samples):
             break
     total = len(begins) + rounds + _CLOSELY
-    fewest: list[int | None] = []
+    fewest: list[float] = []
 
     def told(way: Way | None) -> None:
-        fewest.append(None if way is None else way.fewest)
-        least = min((count for count in fewest if count is not None), default=0)
-        progress(len(fewest) / total, f"{least} operations")
+        fewest.append(np.inf if way is None else way.fewest)
+        progress(len(fewest) / total, f"{min(fewest)} operations")
 
     def beside(ends: Sequence[Way], turn: int) -> Near:
         rng = np.random.default_rng([searcher.seed, turn, 1])
@@ -85,12 +84,12 @@ def simplified(
         return Near(parent.start, [one.start for one in best], turn)
 
     pays = total * _work(begins, searcher.looked_at.samples) > _MANY
-    with hands(searcher, jobs if pays else 1, told) as each:
-        ends = each(Searcher.down, [one.start for one in begins])
+    with hands(searcher, jobs if pays else 1, told) as working:
+        ends = working.each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
             turns = range(first, min(first + _AT_ONCE, rounds))
-            ends += each(Searcher.nearby, [beside(ends, turn) for turn in turns])
-        close = each(Searcher.closer, leanest(ends, _CLOSELY))
+            ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
+        close = working.each(Searcher.closer, leanest(ends, _CLOSELY))
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
     )

@@ -1,5 +1,7 @@
 """Descents in this process and in others."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import model_of
@@ -36,10 +38,10 @@ def start():
 
 def found(searcher, start, jobs):
     told = []
-    with hands(searcher, jobs, lambda way: told.append(way.rank)) as each:
-        ends = each(Searcher.down, [start])
-        ends += each(Searcher.nearby, [Near(start, [start], turn) for turn in range(6)])
-        close = each(Searcher.closer, ends)
+    with hands(searcher, jobs, lambda way: told.append(way.rank)) as working:
+        ends = working.each(Searcher.down, [start])
+        ends += working.each(Searcher.nearby, [Near(start, [start], turn) for turn in range(6)])
+        close = working.each(Searcher.closer, ends)
     assert sorted(told) == sorted(one.rank for one in ends + close)
     return [one.rank for one in ends + close]
 
@@ -51,7 +53,7 @@ def test_what_is_found_does_not_depend_on_the_number_of_processes(searcher, star
 
 
 def test_what_is_at_the_edge_of_the_budget_may_be_out_of_it_near_there(searcher, start):
-    exact = Searcher(**{**vars(searcher), "budget": Budget(1e-18, np.inf)})
+    exact = replace(searcher, budget=Budget(1e-18, np.inf))
     assert exact.nearby(Near(start, [start], 0)) is None
-    with hands(exact, 1, lambda way: None) as each:
-        assert each(Searcher.nearby, [Near(start, [start], 0)]) == []
+    with hands(exact, 1, lambda way: None) as working:
+        assert working.each(Searcher.nearby, [Near(start, [start], 0)]) == []
