@@ -92,13 +92,10 @@ class Way:
     start: Start
     visited: dict[int, Passed]
     """The best program of every number of operations."""
+    fewest: int
+    """Operations of the leanest program."""
     strain: float
     """Of the end."""
-
-    @property
-    def fewest(self) -> int:
-        """Operations of the leanest program."""
-        return min(self.visited)
 
     @property
     def rank(self) -> tuple[int, float]:
@@ -139,7 +136,7 @@ class Descent:
     @property
     def way(self) -> Way:
         """What it has come by so far."""
-        return Way(self.start, self.visited, self.end.fit.strain)
+        return Way(self.start, self.visited, min(self.visited), self.end.fit.strain)
 
     def down(self, noise: float = 0.0) -> Way:
         """Leave terms out until no more can go, also of what comes of rewriting.
@@ -219,6 +216,28 @@ def drawn(ways: Sequence[Way], rng: np.random.Generator) -> Way:
     fewest = np.array([one.fewest for one in ways])
     weights = np.exp((fewest.min() - fewest) / _LIKELY)
     return ways[int(rng.choice(len(ways), p=weights / weights.sum()))]
+
+
+def slimmed(ways: Sequence[Way], number: int) -> list[Way]:
+    """The same ways, of all but the leanest ones only programs that are the best of their operations.
+
+    Hundreds of ways with all that they have passed would fill the memory.
+
+    Args:
+        ways: In any order, which is kept.
+        number: How many of the leanest stay whole.
+    """
+    whole = {id(way) for way in leanest(ways, number)}
+    costs: dict[int, float] = {}
+    for way in ways:
+        for count, passed in way.visited.items():
+            costs[count] = min(passed.cost, costs.get(count, np.inf))
+
+    def best(way: Way) -> Way:
+        some = {count: one for count, one in way.visited.items() if one.cost <= costs[count]}
+        return replace(way, visited=some)
+
+    return [way if id(way) in whole else best(way) for way in ways]
 
 
 def front(ways: Iterable[Way]) -> list[Simplified]:

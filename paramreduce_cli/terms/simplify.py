@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest
+from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.searching import Near, Searcher, hands
 from paramreduce_cli.terms.starts import Start, promising
@@ -89,6 +89,7 @@ def simplified(
         for first in range(0, rounds, _AT_ONCE):
             turns = range(first, min(first + _AT_ONCE, rounds))
             ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
+            ends = slimmed(ends, _CLOSELY)
         close = working.each(Searcher.closer, leanest(ends, _CLOSELY))
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)

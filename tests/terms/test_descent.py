@@ -10,7 +10,7 @@ from terms.test_search import states
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.reduction.models import base_model
-from paramreduce_cli.terms.descent import Descent, drawn, front, gone_on, leanest
+from paramreduce_cli.terms.descent import Descent, drawn, front, gone_on, leanest, slimmed
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
@@ -106,3 +106,18 @@ def test_a_front_has_programs_that_no_leaner_one_beats(arm, begun):
     looked_at = samples(arm, 100, 0)
     errors = [looked_at.errors(one.outputs(looked_at.states))[0] for one in programs]
     assert np.all(np.diff(errors) < 0)
+
+
+def test_slimmed_ways_have_the_same_front_and_the_same_leanest_ends(begun):
+    ways = [begun(seed).down(NOISE) for seed in (1, 2, 3, 4)]
+    slim = slimmed(ways, 2)
+    assert [one.rank for one in slim] == [one.rank for one in ways]
+    assert [len(one.visited) for one in leanest(slim, 2)] == [
+        len(one.visited) for one in leanest(ways, 2)
+    ]
+    assert [one.program for one in front(slim)] == [one.program for one in front(ways)]
+    # One program of every number of operations is enough.
+    passed = {count for way in ways for count in way.visited}
+    others = [way for way in slim if way.rank > leanest(ways, 2)[-1].rank]
+    assert sum(len(way.visited) for way in others) <= len(passed)
+    assert slimmed(slim, 2) == slim
