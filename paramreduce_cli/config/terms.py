@@ -20,7 +20,7 @@ class TermsSection(Section):
     """Allowed on the estimation set, and on the validation set where its torques are not held out, a share."""
     acceleration_error: Annotated[Number, Field(gt=0)] | None = None
     """The same of accelerations, a share, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
-    rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 64
-    """How many times terms are left out once more, of the best subsets in formulations changed at random."""
+    rounds: Annotated[Whole, Field(ge=0, le=100_000)] | None = None
+    """How many times terms are left out once more, of the best subsets in formulations changed at random; without it 64 times, fewer for long functions."""
     seed: Annotated[Whole, Field(ge=0)] = 0
     """Of what is random there."""

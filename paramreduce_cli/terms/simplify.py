@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
 from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
-from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.searching import Near, Searcher, hands
 from paramreduce_cli.terms.starts import Start, promising
 
 _LOOKED_AT = 200
 """Starts that are looked at to find the smallest one within the budget, at most."""
-_FEWEST, _MOST = 12, 30
-"""Programs that are gone down from, as many as :data:`_WORK` allows."""
 _WORK = 40_000
-"""Operations times torques, of all of these: time grows a little faster."""
+"""Operations times torques, of all programs that are gone down from first: time grows a little faster."""
+_FEWEST, _MOST = 12, 30
+"""How many these are at the least, and at most."""
+_WORK_NEARBY = 400_000
+"""The same of those near the best ones: what a search takes must not grow with the square of the joints."""
+_FEWEST_NEARBY, _MOST_NEARBY = 8, 64
 _BEST = 4
 """Starts with the leanest ends, near which others are gone down from."""
 _DRAWN = 0.25
@@ -36,7 +38,7 @@ def simplified(
     searcher: Searcher,
     starts: list[Start],
     *,
-    rounds: int,
+    rounds: int | None,
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
 ) -> tuple[list[Simplified], list[Simplified]]:
@@ -48,7 +50,7 @@ def simplified(
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        rounds: How many starts near the best ones are gone down from.
+        rounds: How many starts near the best ones are gone down from, none for as many as their operations allow.
         jobs: Processes; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
@@ -63,13 +65,10 @@ def simplified(
     smallest = next((one.start for one in every if one.end.fit.within), None)
     if smallest is None:
         return [], []
-    begins: list[Descent] = []
-    for one in map(searcher.begun, promising(starts, smallest.model.n)):
-        if not one.end.fit.within:
-            continue
-        begins.append(one)
-        if len(begins) >= _affordable(begins, searcher.looked_at.samples):
-            break
+    begins = _first(searcher, promising(starts, smallest.model.n))
+    work = _work(searcher, begins)
+    if rounds is None:
+        rounds = int(np.clip(_WORK_NEARBY / work, _FEWEST_NEARBY, _MOST_NEARBY))
     total = len(begins) + rounds + _CLOSELY
     fewest: list[float] = []
 
@@ -83,7 +82,7 @@ def simplified(
         parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
         return Near(parent.start, [one.start for one in best], turn)
 
-    pays = total * _work(begins, searcher.looked_at.samples) > _MANY
+    pays = total * work > _MANY
     with hands(searcher, jobs if pays else 1, told) as working:
         ends = working.each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
@@ -99,11 +98,18 @@ def simplified(
     return found, front(ends + close)
 
 
-def _affordable(descents: Sequence[Descent], samples: TermSamples) -> int:
-    """How many programs such as some are gone down from."""
-    return int(np.clip(_WORK / _work(descents, samples), _FEWEST, _MOST))
+def _first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
+    """Descents from starts within the budget, as many as their operations allow."""
+    begins: list[Descent] = []
+    for one in map(searcher.begun, starts):
+        if one.end.fit.within:
+            begins.append(one)
+            if len(begins) >= int(np.clip(_WORK / _work(searcher, begins), _FEWEST, _MOST)):
+                break
+    return begins
 
 
-def _work(descents: Sequence[Descent], samples: TermSamples) -> float:
+def _work(searcher: Searcher, descents: Sequence[Descent]) -> float:
     """Operations times torques of a program, as some have on the average."""
-    return float(np.mean([max(one.visited) for one in descents]) * samples.tau.shape[0])
+    torques = searcher.looked_at.samples.tau.shape[0]
+    return float(np.mean([max(one.visited) for one in descents]) * torques)

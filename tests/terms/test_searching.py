@@ -3,37 +3,9 @@
 from dataclasses import replace
 
 import numpy as np
-import pytest
-from conftest import model_of
-from terms.test_search import NOMINAL, states
 
-from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.samples import term_samples
-from paramreduce_cli.terms.searching import LookedAt, Near, Searcher, hands
-from paramreduce_cli.terms.starts import Start
-
-
-@pytest.fixture(scope="module")
-def searcher():
-    model = model_of("two_link")
-    some, more = (
-        term_samples(
-            model.mechanism, [states(model, count, count)], NOMINAL, np.ones(2),
-            direct=False, projected=False,
-        )
-        for count in (60, 120)
-    )  # fmt: skip
-    return Searcher(
-        LeanModels(model), LookedAt(some, None), LookedAt(more, None), None, Budget(0.05, np.inf),
-        direct=False, seed=0,
-    )  # fmt: skip
-
-
-@pytest.fixture(scope="module")
-def start():
-    return Start("base", base_model(model_of("two_link")), 0.0, 0)
+from paramreduce_cli.terms.searching import Near, Searcher, hands
 
 
 def found(searcher, start, jobs):
