@@ -93,7 +93,7 @@ class Way:
     visited: dict[int, Passed]
     """The best program of every number of operations."""
     fewest: int
-    """Operations of the leanest program."""
+    """Operations of the leanest program, which may not be remembered any more."""
     strain: float
     """Of the end."""
 

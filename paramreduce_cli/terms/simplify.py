@@ -18,8 +18,9 @@ _WORK = 40_000
 _FEWEST, _MOST = 12, 30
 """How many these are at the least, and at most."""
 _WORK_NEARBY = 400_000
-"""The same of those near the best ones: what a search takes must not grow with the square of the joints."""
+"""The same of those near the best ones, unless it is said how many they are."""
 _FEWEST_NEARBY, _MOST_NEARBY = 8, 64
+"""How many these are at the least, and at most."""
 _BEST = 4
 """Starts with the leanest ends, near which others are gone down from."""
 _DRAWN = 0.25
@@ -50,7 +51,7 @@ def simplified(
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        rounds: How many starts near the best ones are gone down from, none for as many as their operations allow.
+        rounds: How many starts near the best ones are gone down from; None for as many as their operations allow.
         jobs: Processes; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
