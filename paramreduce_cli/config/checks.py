@@ -13,6 +13,8 @@ from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 
 Problem = tuple[Key, str]
+_FAR = 25.0
+"""Positions from which on it is asked whether they are degrees, rad."""
 _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
 
@@ -26,8 +28,9 @@ def check(config: Config) -> list[Problem]:
 
 
 def remarks(config: Config) -> list[str]:
-    """What is odd in a config that can be used: bodies and drives that cannot be, values that are not known."""
-    return [f"{text}; going on" for one in (_odd_bodies, _odd_drives) for text in one(config)]
+    """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
+    kinds = (_odd_bodies, _odd_drives, _odd_limits)
+    return [f"{text}; going on" for one in kinds for text in one(config)]
 
 
 def _bodies(config: Config) -> Iterator[Problem]:
@@ -335,6 +338,14 @@ def _odd_bodies(config: Config) -> Iterator[str]:
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "
                 f"pseudo-inertia matrix has the eigenvalue {np.linalg.eigvalsh(moments)[0]:.3g})"
             )
+
+
+def _odd_limits(config: Config) -> Iterator[str]:
+    """Positions that hardly anything that is fed by cables reaches."""
+    for lower, upper in config.trajectories.position_limits:
+        if max(abs(lower), abs(upper)) > _FAR:
+            yield f"trajectories.position_limits of [{lower:g}, {upper:g}] are in rad (m), not degrees"
+            return
 
 
 def _odd_drives(config: Config) -> Iterator[str]:

@@ -245,6 +245,8 @@ def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     if entry["type"] == "missing":
         return path, f"is missing. It says: {meaning}"
     message = entry["msg"].removeprefix("Value error, ").replace(" after validation", "")
+    if entry["type"] == "model_type":
+        message = "input should be a section with keys of its own"
     if entry["type"] == "string_pattern_mismatch":
         message = "a name starts with a letter or digit and goes on with those, _, - or dots"
     given = entry["input"]

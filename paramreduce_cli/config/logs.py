@@ -109,6 +109,10 @@ class LogSection(Section):
         for name in ("signs", "torque_signs"):
             if any(abs(value) != 1 for value in getattr(self, name)):
                 raise ValueError(f"{name} are 1 or -1")
+        if self.torque_constants is not None and 0 in self.torque_constants:
+            raise ValueError(
+                "a torque constant of 0 takes all torque away; `unmeasured` is for joints without torques"
+            )
         return self
 
     def motor_per_joint(self, n_dof: int) -> FloatArray | None:

@@ -112,16 +112,18 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Docume
     document.lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         own = {id(key) for key, _ in node.value}
+        met: set[str] = set()
         loader.flatten_mapping(node)
         result: dict[str, Any] = {}
         for key_node, value_node in node.value:
             key = str(key_node.value)
             line = key_node.start_mark.line + 1
-            if key in result and id(key_node) in own:
+            if key in met:
                 first = document.lines[(*path, key)]
-                if first != line:
-                    message = f"key {key} stands here again; it is already on line {first}"
-                    document.problems.append((line, message))
+                message = f"key {key} stands here again; it is already on line {first}"
+                document.problems.append((line, message))
+            if id(key_node) in own:
+                met.add(key)
             document.lines[(*path, key)] = line
             result[key] = _build(loader, value_node, (*path, key), document)
         return result

@@ -81,102 +81,12 @@ _TAKEN = {
     "edit_cache",
     "help",
     "install",
+    "m",
     "package",
     "rebuild_cache",
     "test",
 }
 """Names of files and targets that exported code itself uses."""
-
-_C_WORDS = frozenset(
-    [
-        "alignas",
-        "alignof",
-        "and_eq",
-        "asm",
-        "auto",
-        "bitand",
-        "bitor",
-        "bool",
-        "case",
-        "catch",
-        "char",
-        "char8_t",
-        "char16_t",
-        "char32_t",
-        "class",
-        "compl",
-        "concept",
-        "const",
-        "constexpr",
-        "const_cast",
-        "decltype",
-        "default",
-        "delete",
-        "do",
-        "double",
-        "dynamic_cast",
-        "Eigen",
-        "else",
-        "enum",
-        "explicit",
-        "export",
-        "extern",
-        "float",
-        "for",
-        "friend",
-        "goto",
-        "if",
-        "inline",
-        "int",
-        "long",
-        "main",
-        "mutable",
-        "namespace",
-        "new",
-        "noexcept",
-        "not_eq",
-        "nullptr",
-        "operator",
-        "or_eq",
-        "private",
-        "protected",
-        "public",
-        "register",
-        "reinterpret_cast",
-        "requires",
-        "restrict",
-        "return",
-        "short",
-        "signed",
-        "sizeof",
-        "static",
-        "static_assert",
-        "static_cast",
-        "std",
-        "struct",
-        "switch",
-        "template",
-        "this",
-        "thread_local",
-        "throw",
-        "try",
-        "typedef",
-        "typeid",
-        "typename",
-        "union",
-        "unsigned",
-        "using",
-        "virtual",
-        "void",
-        "volatile",
-        "wchar_t",
-        "while",
-        "xor",
-        "xor_eq",
-    ]
-)
-"""Words of C and C++, and names that their programs have already."""
-
 
 _WIDTH = 100
 """Characters of a line of a header, at most, where its words allow."""
@@ -192,10 +102,9 @@ _FITTED = (
 
 
 def identifier(name: str) -> str:
-    """A name that every language takes for an identifier, and that means nothing else there."""
+    """A name for files, and that names in code begin with; of itself it is one of Python's modules alone."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
-    words = _TAKEN | _C_WORDS | sys.stdlib_module_names
-    taken = keyword.iskeyword(word) or word in words
+    taken = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
     return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"
 
 

@@ -106,26 +106,16 @@ def export(
     unsafe = ""
     if "direct" in _FUNCTIONS[what] and (unsafe := doubtful_mass_matrices(checked["M"])):
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
+    worth = _worth(model, unsafe, simplified, validation)
+    if single:
+        worth.append(_rounding(functions, checked))
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
     stored = random_cases(mechanism, chosen, _CASES, rng, simplified)
     exported = ExportedModel(
         robot=mechanism.robot,
-        heading=(
-            f"{mechanism.robot}: {title}.",
-            *([f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []),
-            *(
-                [f"NOT PREDICTED, as not measured: the torques of {', '.join(model.unmeasured)}."]
-                if model.unmeasured
-                else []
-            ),
-            *([] if validation is None else _validated(mechanism, validation)),
-            *([] if simplified is None else _validity(mechanism, simplified)),
-            *([_rounding(functions, checked)] if single else []),
-            "Gravity in the base frame, m/s^2: " + " ".join(f"{g:.6g}" for g in mechanism.gravity),
-            f"Made by paramreduce {__version__} ({origin}).",
-        ),
+        heading=(f"{mechanism.robot}: {title}.", *worth, *_made(mechanism, origin)),
         frames=_frames(mechanism),
         coordinates=mechanism.generalised_names,
         units=tuple("rad" if b.joint == "revolute" else "m" for b in mechanism.bodies),
@@ -144,13 +134,35 @@ def export(
     return files
 
 
+def _worth(
+    model: Model, unsafe: str, simplified: TermModel | None, validation: Validation | None
+) -> list[str]:
+    """What a model is worth, and where it holds, line by line."""
+    lines = [f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []
+    if model.unmeasured:
+        names = ", ".join(model.unmeasured)
+        lines.append(f"NOT PREDICTED, as not measured: the torques of {names}.")
+    if validation is not None:
+        lines += _validated(model.mechanism, validation)
+    if simplified is not None:
+        lines += _validity(model.mechanism, simplified)
+    return lines
+
+
+def _made(mechanism: Mechanism, origin: str) -> tuple[str, str]:
+    """Under what gravity it holds, and what made it."""
+    gravity = " ".join(f"{g:.6g}" for g in mechanism.gravity)
+    return (
+        f"Gravity in the base frame, m/s^2: {gravity}",
+        f"Made by paramreduce {__version__} ({origin}).",
+    )
+
+
 def _rounding(functions: tuple[Function, ...], checked: Mapping[str, FloatArray]) -> str:
     """What single precision costs, on the states that the functions are checked on."""
     errors = single_precision_errors(functions, checked)
     listed = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
-    return (
-        f"Single precision, on {_CHECKED} random states off by at most (of the largest): {listed}."
-    )
+    return f"Single precision, on {_CHECKED} random states off by about (of the largest): {listed}."
 
 
 def _validated(mechanism: Mechanism, validation: Validation) -> list[str]:

@@ -165,13 +165,11 @@ def _record(
     one: Simplified, judge: Judge, budget: Budget, way: list[Simplified], lean: LeanModels
 ) -> TermModel | None:
     """A program with what it is worth and those on the way to it; None if it is not within the budget."""
-    estimation, validation = judge.errors(one)
-    looked_at = (estimation,) if judge.measured else (estimation, validation)
-    for torque, acceleration in looked_at:
-        if torque > budget.torque or acceleration > budget.acceleration:
-            return None
+    estimation, validation = errors = judge.errors(one)
+    if not judge.allowed(errors, budget):
+        return None
     smallest, states = judge.smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
-    if smallest <= 0:
+    if judge.direct and not smallest > 0:
         return None
     model, program = one.compact()
     random, largest = judge.random(one)

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, SelectedSection, ValidationSection
-from paramreduce_cli.errors import ConfigError, DataError
+from paramreduce_cli.errors import ConfigError, DataError, Key
 from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
 from paramreduce_cli.judgement.cross_validation import cross_validated
 from paramreduce_cli.judgement.picking import pareto_front
@@ -85,6 +85,7 @@ def validate(
             known.heuristics, known.full, known.nominal_acceleration, known.lower, known.upper
         )
     elif model is None:
+        _refuse_what_needs_a_model(judging, wanted)
         measured = _torques_alone(samples, reduction)
     else:
         measured = _measured(model, samples, reduction, counted, run)
@@ -130,6 +131,25 @@ class _Measured:
     nominal_acceleration: FloatArray
     lower: FloatArray
     upper: FloatArray
+
+
+def _refuse_what_needs_a_model(judging: ValidationSection, wanted: SelectedSection) -> None:
+    """Brought samples have torques, but no mass matrices to accelerate and no functions to count.
+
+    Raises:
+        ConfigError: An error of accelerations, or a number of operations, is asked for.
+    """
+    asked: list[Key] = [
+        (*section, name)
+        for section, limits in ((("selected",), wanted), (("validation", "accept"), judging.accept))
+        for name in limits.model_dump(exclude_none=True)
+    ]
+    for key in asked:
+        if str(key[-1]).startswith(("acceleration_error", "operations")):
+            raise ConfigError(
+                "of samples that were brought torques alone are known; this needs a model of the robot.",
+                key,
+            )
 
 
 def _measured(

@@ -13,6 +13,7 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import thinned_blocks
 from paramreduce_cli.records import Block, FloatArray, Model, Samples, SampleSet
 from paramreduce_cli.terms.descent import Simplified
+from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.samples import TermSamples, errors_over, term_samples
 
 _TORQUES = 1000
@@ -90,6 +91,17 @@ class Judge:
             for parts in self._sets
         )
         return estimation, validation
+
+    def allowed(self, errors: tuple[Errors, Errors], budget: Budget) -> bool:
+        """Whether errors on both sets are; where torques were measured, what is held out is not looked at.
+
+        What is not a number is not allowed.
+        """
+        no_other = self.measured or self._samples.validation is None
+        return all(
+            torque <= budget.torque and (not self.direct or acceleration <= budget.acceleration)
+            for torque, acceleration in (errors[:1] if no_other else errors)
+        )
 
     @cached_property
     def _sets(self) -> list[list[TermSamples]]:

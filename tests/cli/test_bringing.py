@@ -83,6 +83,20 @@ def test_settings_without_a_robot(as_file, invoke, noisy, tmp_path):
         assert file["forward-selection/torque_error_validation"][2] == pytest.approx(0.07, abs=0.02)
 
 
+@pytest.mark.parametrize(
+    "key",
+    ["selected.acceleration_error", "selected.operations", "validation.accept.operations_direct"],
+)
+def test_matrices_tell_nothing_of_accelerations_and_functions(key, invoke, noisy, tmp_path):
+    brought = ("--samples", noisy, "--results", tmp_path / "r")
+    invoke("reduce", *brought, settings=["reduction.heuristics=[qr]"])
+    settings = ["reduction.heuristics=[qr]", f"{key}=100"]
+    error = invoke("validate", *brought, settings=settings, code=2).err
+    assert key in error
+    assert "needs a model" in error
+    assert not (tmp_path / "r" / "validation.h5").exists()
+
+
 def test_a_page_and_values_without_a_robot(invoke, noisy, tmp_path):
     """The page tells what matrices tell, and the values that are exported predict their torques."""
     results = tmp_path / "r"

@@ -131,6 +131,8 @@ def test_compare_tells_what_differs(invoke, two_link_copy, tmp_path):
     invoke(*compare, "--only", "kappa")
     invoke("compare", two_link_copy, tmp_path / "none.json", code=2)
     assert "kappa" in invoke(*compare, "--tolerance", "speed=1", code=2).err
+    for none in ("kappa=-1", "kappa=nan"):
+        assert "of 0 or more" in invoke(*compare, "--tolerance", none, code=2).err
 
 
 def test_inspect_shows_the_selected_model(invoke, two_link_results):

@@ -103,6 +103,23 @@ def test_a_key_that_stands_twice_is_an_error(write_config):
     assert "already on line 20" in message
 
 
+def test_a_key_that_stands_twice_on_one_line_is_an_error(write_config):
+    path = write_config(("  count: 2", "  constraints: [{kind: load, kind: position}]\n  count: 2"))
+    assert "key kind stands here again" in errors_of(path)[0]
+
+
+def test_a_key_may_stand_for_a_merged_one():
+    read = read_yaml("a: &x {b: 1, c: 2}\nd: {<<: *x, b: 3}\n", "x.yaml")
+    assert read.data["d"] == {"b": 3, "c": 2}
+    assert not read.problems
+
+
+def test_limits_in_degrees_are_remarked_on(write_config):
+    path = write_config(("[-pi/2, pi/2]", "[-90, 90]"))
+    with pytest.warns(ParamreduceWarning, match="rad .m., not degrees"):
+        load_config(path)
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [("robot: [", "not YAML"), ("", "mapping"), ("- 1", "mapping"), ("robot: !!python/object:x 1", "not YAML"),

@@ -140,6 +140,8 @@ def test_a_log_of_which_nothing_is_left(tmp_path, invoke):
     ("setting", "said"),
     [
         ("sampling.log.signs=[1, 2]", "signs are 1 or -1"),
+        ("sampling.log.torque_constants=[0, 1]", "takes all torque away"),
+        ("sampling.log.delay=-100", "is longer than"),
         ("sampling.log.units.position=degrees", "'degrees'"),
         ("sampling.log.held_out=0.99", "held_out"),
         ("selected.n=3", "cross_validation chooses n itself"),

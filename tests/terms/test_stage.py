@@ -21,6 +21,7 @@ from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
 from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages import reduce_terms
+from paramreduce_cli.terms import simplify
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
 STAGES = {stage.name: stage for stage in pipeline()}
@@ -193,10 +194,16 @@ def test_the_exported_c_has_the_reported_error_on_the_validation_set(two_link):
     assert term.torque_error_validation == pytest.approx(np.sqrt(off / total), rel=1e-9)
 
 
-def test_what_is_found_does_not_depend_on_threads(two_link, tmp_path):
+def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypatch):
+    monkeypatch.setattr(simplify, "_MANY", 0)
+    started, hands = [], simplify.hands
+    monkeypatch.setattr(
+        simplify, "hands", lambda one, jobs, told: started.append(jobs) or hands(one, jobs, told)
+    )
     shutil.copytree(two_link.store.folder, tmp_path / "r")
     runner = Runner(two_link.config, Store(tmp_path / "r"), jobs=2)
     runner.run(STAGES["reduce-terms"], force=True)
+    assert started == [2, 2]
     one, two = loaded(two_link, TermReduction), loaded(runner, TermReduction)
     for name in ("inverse", "direct"):
         np.testing.assert_array_equal(one.functions[name].values, two.functions[name].values)

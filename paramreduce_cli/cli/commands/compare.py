@@ -65,8 +65,11 @@ def compare(
 def _tolerance(text: str) -> tuple[str, Tolerance]:
     name, _, value = text.partition("=")
     try:
-        return name, Tolerance(float(value), TOLERANCES[name].absolute)
+        relative, absolute = float(value), TOLERANCES[name].absolute
+        if not relative >= 0:
+            raise ValueError
+        return name, Tolerance(relative, absolute)
     except (KeyError, ValueError) as error:
         raise ConfigError(
-            f"--tolerance {text}: write QUANTITY=NUMBER with one of {', '.join(TOLERANCES)}."
+            f"--tolerance {text}: write QUANTITY=NUMBER, of 0 or more, with one of {', '.join(TOLERANCES)}."
         ) from error

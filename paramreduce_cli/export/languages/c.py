@@ -94,12 +94,15 @@ class _Writer:
             "angles": any(_dependence(f).angles for f in (*model.functions, *model.closures)),
             "sines": self.sines(),
             "cases": self.cases(),
-            "n_cases": len(next(iter(model.cases.values()))),
+            "n_cases": (n_cases := len(next(iter(model.cases.values())))),
+            "n_states": n_cases * (BLOCK // n_cases + 1),
             "tolerance": "1e-3f" if model.single else "1e-12",
         }
 
     def number(self, value: float) -> str:
         """How a number is written, in the precision of the code."""
+        if self._model.single and np.float32(value) == 0:
+            value = 0.0  # compilers warn of numbers that single precision is too coarse for
         text = repr(float(value))
         text = text if any(mark in text for mark in ".en") else f"{text}.0"
         return f"{text}{self._suffix}"
@@ -252,13 +255,13 @@ class _Writer:
         }
 
     def stack(self) -> int:
-        """Of the batched functions, kB, at most: block arrays and as much again for temporaries."""
+        """Of the batched functions, kB: block arrays, and twice as much for temporaries, of which wide vectors take most."""
         arrays = max(
             3 * len(body["angles"]) + len(body["outputs"])
             for body in map(self.batched, self._model.functions)
         )
         width = 4 if self._model.single else 8
-        return int(np.ceil(2 * arrays * BLOCK * width / 1024))
+        return int(np.ceil(3 * arrays * BLOCK * width / 1024))
 
     def cases(self) -> dict[str, dict[str, object]]:
         """Stored vectors of the self-test."""
@@ -299,7 +302,7 @@ def _dependence(function: Function) -> _Dependence:
             waves.add(number)
         if wave or number in before:
             before |= below
-        elif number in rest:
+        if number in rest and number not in waves:
             rest |= below
     operations = {number for number, _ in function.steps()}
     waves &= operations
