@@ -17,7 +17,7 @@ class TermsSection(Section):
     ]
     """Each is simplified by itself, and gets values of its own."""
     torque_error: Annotated[Number, Field(gt=0, lt=1)] = 0.01
-    """Allowed on the estimation set, and on the validation set where its torques are not held out, a share."""
+    """Allowed on the estimation set, and on the validation set where its torques are not held out, a share (0.01 is 1 %)."""
     acceleration_error: Annotated[Number, Field(gt=0)] | None = None
     """The same of accelerations, a share, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
     rounds: Annotated[Whole, Field(ge=0, le=100_000)] | None = None

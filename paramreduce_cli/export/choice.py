@@ -63,7 +63,7 @@ def chosen_model(
         )
         raise ConfigError(
             f"--model {text}: there is {others}{known_choices(reduction)}{chosen or ''}; with a config and a "
-            f"log also {IDENTIFIED} and {CONSISTENT}."
+            f"log also {IDENTIFIED} and {CONSISTENT}, with terms left out {TERMS}."
         )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {share(error)}"

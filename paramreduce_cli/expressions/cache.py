@@ -36,7 +36,14 @@ def cache_folder() -> Path:
         folder = _wanted_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = folder.stat()
-    except (OSError, RuntimeError):  # the latter where there is no home
+    except (OSError, RuntimeError) as error:  # the latter where there is no home
+        if os.environ.get("PARAMREDUCE_CACHE"):
+            warnings.warn(
+                f"PARAMREDUCE_CACHE cannot be used ({error}), so compiled models are not kept; name a folder "
+                "that can be written",
+                ParamreduceWarning,
+                stacklevel=2,
+            )
         return Path(_temporary_folder().name)
     others = stat.S_IWGRP | stat.S_IWOTH
     if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & others):

@@ -1,12 +1,16 @@
 """Subsets of the paper's systems beside those of other packages: errors and times in one table.
 
-`python -m tests.benchmarks.selection_peers` after `make puma560 hexaglide`; needs the extra
-`benchmark`.
+`PYTHONPATH=tests python -m tests.benchmarks.selection_peers`, on the committed trajectories; needs
+the extra `benchmark`.
 """
 
 import os
+import subprocess
+import sys
+import tempfile
 import time
 import warnings
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -25,9 +29,28 @@ OURS = ("forward-selection", "forward-selection-2", "floating", "backward-elimin
         "best-subset")  # fmt: skip
 
 
-def problem_of(robot):
+STAGES = ("build-model", "optimize-trajectories", "sample", "reduce")
+
+
+def problem_of(robot, folder):
     """The weighted factor of the estimation set, its columns of unit length."""
-    with h5py.File(ROOT / "results" / robot / "reduction.h5") as file:
+    reference = ROOT / "results" / "reference" / f"{robot}.json"
+    settings = (
+        f"trajectories.file={reference}",
+        "reduction.heuristics=[qr]",
+        "selected.heuristic=qr",
+    )
+    options = [word for setting in settings for word in ("--set", setting)]
+    for stage in STAGES:
+        command = [
+            sys.executable,
+            "-m",
+            "paramreduce_cli",
+            stage,
+            ROOT / "configs" / f"{robot}.yaml",
+        ]
+        subprocess.run([*command, "--results", folder, *options], check=True, capture_output=True)
+    with h5py.File(folder / "reduction.h5") as file:
         factor = file["factor"][:]
     W, chi = factor[:, :-1], factor[:, -1]
     lengths = np.linalg.norm(W, axis=0)
@@ -66,7 +89,8 @@ def main():
     headings = ("system", "method", "time, all sizes", "torque error, %", "sizes")
     table = rich.table.Table(*headings, box=rich.box.MARKDOWN)
     for robot, sizes in SIZES.items():
-        p = problem_of(robot)
+        with tempfile.TemporaryDirectory() as folder:
+            p = problem_of(robot, Path(folder))
         objective = TorqueObjective(p)
 
         def error(subset, objective=objective):

@@ -40,6 +40,13 @@ def test_compiled_loop():
     assert len(list(compiled.cache_folder().glob("*.so"))) == 1
 
 
+def test_a_cache_that_is_named_but_cannot_be_is_said(monkeypatch, tmp_path):
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("PARAMREDUCE_CACHE", str(tmp_path / "file" / "cache"))
+    with pytest.warns(ParamreduceWarning, match="PARAMREDUCE_CACHE cannot be used"):
+        assert compiled.cache_folder().is_dir()
+
+
 def test_machines_of_two_kinds_share_a_folder(monkeypatch):
     """Each takes what was compiled for its own processor."""
     if compiled.compiler() is None:

@@ -80,6 +80,7 @@ def table(
     for one in made.values():
         say(one.to_text())
     tables = ", ".join(f"{prefix.name}{part}.csv" for part in [*made, "-runs"])
+    tables += f", {prefix.name}-runs.parquet" if parquet else ""
     say(f"Written to {prefix}.txt, .tex and .html, and {tables}")
 
 
