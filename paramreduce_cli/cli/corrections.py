@@ -141,8 +141,10 @@ def _setting(message: str, words: Words) -> Words | None:
     whole, key, value, meant = found.groups()
     if wrong := re.search(r": key '(\S+)' is not known", message):
         key = ".".join(meant if name == wrong[1] else name for name in key.split("."))
-    else:
-        value = meant
+    else:  # of a list, one item
+        items = re.findall(r"[^\[\]{},:\s]+", value)
+        near = difflib.get_close_matches(meant, items, n=1, cutoff=0.0)
+        value = value.replace(near[0], meant) if near else meant
     return _exchanged(words, whole, f"{key}={value}")
 
 

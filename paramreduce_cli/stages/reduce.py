@@ -195,6 +195,7 @@ def _criterion_inputs(
 
     def accelerations(most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""
+        direct = dynamics().direct
         nominal = samples.nominal_acceleration
         if nominal is None:
             raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
@@ -204,7 +205,7 @@ def _criterion_inputs(
             np.concatenate([getattr(block, key) for block in blocks])
             for key in ("q", "dq", "ddz", "tau")
         )
-        A, B = dynamics().direct(q, dq, columns.expansion)
+        A, B = direct(q, dq, columns.expansion)
         return AccelerationData(A, B, tau, ddz, nominal)
 
     def cost(kept: IntArray) -> int:

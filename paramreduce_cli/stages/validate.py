@@ -201,7 +201,9 @@ def _ranges(estimation: NormErrors, validation: NormErrors) -> tuple[FloatArray,
 def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
     """Errors of torques; what only a mechanism tells is not a number, operations are zero."""
     if samples.validation is None:
-        raise DataError("samples.h5 holds no validation set, /validation/W and /validation/tau.")
+        raise DataError(
+            "the samples hold no validation set: /validation/W and /validation/tau are missing."
+        )
     models = _Models(reduction, samples.values)
     estimation, validation = (
         torque_errors(part.blocks(), models.values, reduction.nominal_torque)

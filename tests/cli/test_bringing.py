@@ -89,6 +89,10 @@ def test_settings_without_a_robot(as_file, invoke, noisy, tmp_path):
 )
 def test_matrices_tell_nothing_of_accelerations_and_functions(key, invoke, noisy, tmp_path):
     brought = ("--samples", noisy, "--results", tmp_path / "r")
+    settings = ["reduction.heuristics=[swap@acceleration]"]
+    assert (
+        "needs a model; give a CONFIG" in invoke("reduce", *brought, settings=settings, code=2).err
+    )
     invoke("reduce", *brought, settings=["reduction.heuristics=[qr]"])
     settings = ["reduction.heuristics=[qr]", f"{key}=100"]
     error = invoke("validate", *brought, settings=settings, code=2).err
