@@ -141,10 +141,13 @@ def _setting(message: str, words: Words) -> Words | None:
     whole, key, value, meant = found.groups()
     if wrong := re.search(r": key '(\S+)' is not known", message):
         key = ".".join(meant if name == wrong[1] else name for name in key.split("."))
-    else:  # of a list, one item
-        items = re.findall(r"[^\[\]{},:\s]+", value)
-        near = difflib.get_close_matches(meant, items, n=1, cutoff=0.0)
-        value = value.replace(near[0], meant) if near else meant
+    elif item := re.search(
+        r"'([^']+)' is not known", message
+    ):  # all of the value, or one of a list
+        whole_item = rf"(?<![^\[\s,]){re.escape(item[1])}(?![^\]\s,])"
+        value = re.sub(whole_item, lambda _: meant, value)
+    else:
+        value = meant
     return _exchanged(words, whole, f"{key}={value}")
 
 

@@ -7,14 +7,13 @@ import numpy as np
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 
 Problem = tuple[Key, str]
-_FAR = 25.0
-"""Positions from which on it is asked whether they are degrees, rad."""
 _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
 
@@ -341,9 +340,9 @@ def _odd_bodies(config: Config) -> Iterator[str]:
 
 
 def _odd_limits(config: Config) -> Iterator[str]:
-    """Positions that hardly anything that is fed by cables reaches."""
+    """Positions that hardly any joint reaches."""
     for lower, upper in config.trajectories.position_limits:
-        if max(abs(lower), abs(upper)) > _FAR:
+        if max(abs(lower), abs(upper)) > RATHER_DEGREES:
             yield f"trajectories.position_limits of [{lower:g}, {upper:g}] are in rad (m), not degrees"
             return
 

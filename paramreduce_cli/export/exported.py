@@ -102,7 +102,7 @@ _FITTED = (
 
 
 def identifier(name: str) -> str:
-    """A name for files, and that names in code begin with; of itself it is one of Python's modules alone."""
+    """A name for files and Python's module, with which names in code begin."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
     taken = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
     return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"

@@ -12,6 +12,8 @@ from typing import Annotated, Any
 
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
+RATHER_DEGREES = 25.0
+"""Positions beyond this, in rad, are rather degrees."""
 _CONSTANTS = {"pi": math.pi, "inf": math.inf, "deg": math.pi / 180}
 _DEGREES = re.compile(r"(?<=[\d.)])\s*(?:deg\b|°)")
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {

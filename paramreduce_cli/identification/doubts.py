@@ -4,6 +4,7 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
+from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import FloatArray
@@ -16,8 +17,6 @@ _UNLIKE = 0.5
 _PER_DEGREE = 180 / np.pi
 _NEAR = 0.1
 """Relative distance from a factor that counts as it."""
-_TURNS = 25.0
-"""Positions beyond this, in rad, are rather degrees."""
 _SATURATED = 20
 """Samples in a row at the largest torque that tell a limit."""
 _FASTEST = 2.0
@@ -43,7 +42,7 @@ def doubts(
         z, tau = piece.z[:, j], piece.tau[:, j]
         if np.ptp(z) == 0:
             yield f"{name} never moves, so its inertia is not seen."
-        elif np.abs(z).max() > _TURNS:
+        elif np.abs(z).max() > RATHER_DEGREES:
             yield (
                 f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees, or of a motor before its "
                 "gears? Then say so under units, or transmission."

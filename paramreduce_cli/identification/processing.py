@@ -172,19 +172,13 @@ def _read(
         source = log.source
         recorded = signals(log, wanted, names, unmeasured)
         del log  # the next one is read while this name would hold it
-        duration = recorded.time[-1] - recorded.time[0]
-        if abs(wanted.delay) >= duration:
-            raise ConfigError(
-                f"a delay of {wanted.delay:g} s is longer than {source}, which takes {duration:.4g} s.",
-                ("sampling", "log", "delay"),
-            )
-        for tau in recorded.tau.T if wanted.delay else ():
-            # Torques at the times at which they acted.
-            tau[:] = np.interp(recorded.time + wanted.delay, recorded.time, tau)
+        if wanted.delay:
+            _undelay(recorded, wanted.delay, source)
         try:
             pieces, rate, said = evened(recorded)
         except DataError as error:
             raise DataError(f"{source}: {error}") from error
+        duration = recorded.time[-1] - recorded.time[0]
         steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         outliers = replace_outliers(pieces) if wanted.outliers == "replace" else {}
@@ -199,6 +193,22 @@ def _read(
         files.outliers.append(outliers)
         files.motions.append(pieces)
     return files
+
+
+def _undelay(recorded: Signals, delay: float, source: str) -> None:
+    """Torques at the times at which they acted, in place.
+
+    Raises:
+        ConfigError: None of them was recorded then.
+    """
+    time = recorded.time
+    if abs(delay) >= np.ptp(time):
+        raise ConfigError(
+            f"a delay of {delay:g} s is longer than {source}, which takes {np.ptp(time):.4g} s.",
+            ("sampling", "log", "delay"),
+        )
+    for tau in recorded.tau.T:
+        tau[:] = np.interp(time + delay, time, tau)
 
 
 def _parts(

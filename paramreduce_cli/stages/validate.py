@@ -79,13 +79,14 @@ def validate(
 
     Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
     """
+    if model is None:
+        _refuse_what_needs_a_model(judging, wanted)
     known = previous if run.unchanged >= _MEASURED_ON else None
     if known:
         measured = _Measured(
             known.heuristics, known.full, known.nominal_acceleration, known.lower, known.upper
         )
     elif model is None:
-        _refuse_what_needs_a_model(judging, wanted)
         measured = _torques_alone(samples, reduction)
     else:
         measured = _measured(model, samples, reduction, counted, run)

@@ -94,10 +94,16 @@ def test_matrices_tell_nothing_of_accelerations_and_functions(key, invoke, noisy
         "needs a model; give a CONFIG" in invoke("reduce", *brought, settings=settings, code=2).err
     )
     invoke("reduce", *brought, settings=["reduction.heuristics=[qr]"])
-    settings = ["reduction.heuristics=[qr]", f"{key}=100"]
-    error = invoke("validate", *brought, settings=settings, code=2).err
-    assert key in error
-    assert "needs a model" in error
+    invoke("validate", *brought, settings=["reduction.heuristics=[qr]"], code=1)
+    known = (tmp_path / "r" / "validation.h5").read_bytes()
+    for stays in (True, False):
+        if not stays:
+            (tmp_path / "r" / "validation.h5").unlink()
+        settings = ["reduction.heuristics=[qr]", f"{key}=100"]
+        error = invoke("validate", *brought, settings=settings, code=2).err
+        assert key in error
+        assert "needs a model" in error
+        assert not stays or (tmp_path / "r" / "validation.h5").read_bytes() == known
     assert not (tmp_path / "r" / "validation.h5").exists()
 
 

@@ -22,6 +22,7 @@ def test_results_that_are_not_there_are_made_with_their_config(tmp_path, monkeyp
         ("--set x.m=4: x.m: key 'm' is not known; did you mean n?", "run a.yaml --set x.m=4", "run a.yaml --set x.n=4"),
         ("--set m.m=m: m.m: 'm' is not known; did you mean n?", "run --set m.m=m", "run --set m.m=n"),
         ("--set m=[a,sw]: m.1: 'sw' is not known; did you mean swap?", "run --set m=[a,sw]", "run --set 'm=[a,swap]'"),
+        ("--set m=[sw,sw-a]: m.0: 'sw' is not known; did you mean b?", "run --set m=[sw,sw-a]", "run --set 'm=[b,sw-a]'"),
         ("--set m=: m: '' is not known; did you mean n?", "run --set m=", "run --set m=n"),
         ("--model swap:9: there is full, swap:2...7.", "export --model swap:9", "export --model swap:7"),
         ("--model swap:0: there is swap:2...7; with a log also identified.", "export --model swap:0", "export --model swap:2"),
