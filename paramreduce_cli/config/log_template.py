@@ -85,11 +85,16 @@ def _more_joints(names: Sequence[str], n: int) -> int:
 def _remedy(names: Sequence[str], joints: Sequence[str]) -> str:
     """What to do about joints without columns: to lock those after the ones that the log has, if it has any."""
     by_hand = "Write sampling.log.columns by hand"
-    for n in range(len(joints) - 1, 0, -1):
-        if all(_numbered(names, _WORDS[key], n) is not None for key in _NEEDED):
-            locks = " ".join(f"--lock {joint}=0" for joint in joints[n:][:_MOST_JOINTS])
-            return f"The log has {n} joints: if the others stood still, try {locks}. Or: {by_hand[0].lower()}{by_hand[1:]}."
+    most = [_joints_counted(names, _WORDS[key], len(joints)) for key in _NEEDED]
+    if 0 < min(most) == max(most) < len(joints):
+        locks = " ".join(f"--lock {joint}=0" for joint in joints[most[0] :][:_MOST_JOINTS])
+        return f"The log has {most[0]} joints: if the others stood still, try {locks}. Or: {by_hand[0].lower()}{by_hand[1:]}."
     return f"{by_hand}; joints that the log does not have are locked by init's --lock JOINT=VALUE."
+
+
+def _joints_counted(names: Sequence[str], words: Sequence[str], n: int) -> int:
+    """How many joints the numbered columns are of, n at most."""
+    return next((k for k in range(n, 0, -1) if _numbered(names, words, k) is not None), 0)
 
 
 def _time_of(times: Sequence[str], positions: str | list[str]) -> str:

@@ -315,3 +315,12 @@ def test_a_log_with_more_joints_than_the_robot_is_refused():
     with pytest.raises(ConfigError, match="3 joints by its columns, the robot 2"):
         guessed_columns(names, ["a", "b"])
     assert guessed_columns(names, ["a", "b", "c"])["position"] == "q{}"
+
+
+@pytest.mark.parametrize(
+    ("names", "locked"), [(["t", "q1", "tau1"], True), (["t", "q1", "q2", "tau1"], False)]
+)
+def test_joints_are_to_be_locked_where_they_have_no_column_at_all(names, locked):
+    with pytest.raises(ConfigError) as caught:
+        guessed_columns(names, NAMES)
+    assert ("--lock fore=0" in str(caught.value)) == locked
