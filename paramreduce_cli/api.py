@@ -24,7 +24,7 @@ from paramreduce_cli.export.writing import export
 from paramreduce_cli.frames import frame
 from paramreduce_cli.in_memory import made_in_memory
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.pipeline import maker_of, pipeline, stages_to_run
+from paramreduce_cli.pipeline import maker_of, stages_to_run
 from paramreduce_cli.records import (
     FloatArray,
     Identification,
@@ -361,11 +361,11 @@ class Results:
         return self._record(TermReduction)
 
     def _record(self, kind: type) -> Any:
-        return load_file(Store(self.folder).path(kind), kind, None, maker_of(kind))[0]
+        return load_file(Store(self.folder).path(kind), kind, None, maker_of(kind).name)[0]
 
 
 def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
-    stage = next(stage for stage in pipeline() if stage.output is kind)
+    stage = maker_of(kind)
     if not isinstance(config, Config | Settings):
         raise TypeError(
             f"{stage.function.__name__} takes a config, not {config!r:.80}; load_config(path) reads one"

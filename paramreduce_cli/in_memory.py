@@ -38,6 +38,6 @@ def made_in_memory(
             arguments[entry.name] = lent.get(entry.type)
         else:
             name = entry.type.__name__
-            maker = maker_of(entry.type).replace("-", "_")
+            maker = maker_of(entry.type).name.replace("-", "_")
             raise TypeError(f"{stage.function.__name__} needs a {name}, which {maker} makes")
     return called(stage, arguments)

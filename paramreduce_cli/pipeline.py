@@ -116,9 +116,9 @@ def pipeline() -> tuple[Stage, ...]:
     return tuple(ordered)
 
 
-def maker_of(record: type) -> str:
-    """Name of the stage that makes a record."""
-    return next(s.name for s in pipeline() if s.output is record)
+def maker_of(record: type) -> Stage:
+    """The stage that makes a record."""
+    return next(s for s in pipeline() if s.output is record)
 
 
 def brought_files(config: Config | None, kind: type) -> dict[str, Path]:

@@ -299,7 +299,8 @@ class Runner:
         if entry.optional and not self._expected(entry.type):
             return None
         robot = self.config.robot if self.config is not None and brought is None else None
-        record, stamp = load_file(path, entry.type, robot, "" if brought else maker_of(entry.type))
+        maker = "" if brought else maker_of(entry.type).name
+        record, stamp = load_file(path, entry.type, robot, maker)
         inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
         return record
 
@@ -316,10 +317,20 @@ class Runner:
         return self.store.folder.resolve().name
 
     def _look_at_inputs(self, stage: Stage) -> None:
-        """Refuse inputs of another layout; say which ones do not fit what they were made from."""
-        for entry in stage.artifacts:
-            for text in self.remarks_on(entry.type):
+        """Refuse inputs of another layout; say which ones, or what these were made from, do not fit."""
+        for record in self._upstream(stage):
+            for text in self.remarks_on(record):
                 self.remark(text)
+
+    def _upstream(self, stage: Stage) -> list[type]:
+        """Records of files that a stage's artifact comes from, each after those that it is made from."""
+        records: dict[type, None] = {}
+        for entry in stage.artifacts:
+            brought = entry.type is Samples and self.samples is not None
+            if not brought and (not entry.optional or self._expected(entry.type)):
+                records |= dict.fromkeys(self._upstream(maker_of(entry.type)))
+                records[entry.type] = None
+        return list(records)
 
     def remarks_on(self, record: type) -> Iterator[str]:
         """What a record's file does not fit that it was made from; nothing where there is none.
@@ -342,8 +353,10 @@ class Runner:
 
     def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
         """Files of the folder that are not those a record was made from."""
-        maker = next(stage for stage in pipeline() if stage.output is record)
-        stamps = {file_of(entry.type): self.store.stamp(entry.type) for entry in maker.artifacts}
+        stamps = {
+            file_of(entry.type): self.store.stamp(entry.type)
+            for entry in maker_of(record).artifacts
+        }
         return [
             name
             for name, found in stamps.items()

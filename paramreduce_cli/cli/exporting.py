@@ -16,7 +16,7 @@ def up_to_date(config: Config | None, store: Store, record: type) -> Any:
         ArtifactError: It is missing, or was made from something else.
     """
     robot = config.robot if config is not None else None
-    found = load_file(store.path(record), record, robot, maker_of(record))[0]
+    found = load_file(store.path(record), record, robot, maker_of(record).name)[0]
     for remark in Runner(config, store, jobs=1).remarks_on(record):
         raise ArtifactError(f"{remark}.")
     return found

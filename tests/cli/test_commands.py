@@ -80,6 +80,14 @@ def test_stale_inputs_are_remarked_on(invoke, two_link_copy):
     assert "samples.h5 was made with another sampling section" in done.err
 
 
+def test_so_is_what_they_were_made_from(invoke, two_link_copy):
+    done = invoke(
+        "reduce", TWO_LINK, "--results", two_link_copy, settings=["trajectories.harmonics=1"]
+    )
+    assert "trajectories.h5 was made with another trajectories section" in done.err
+    assert done.err.count("was made with") == 1
+
+
 def test_wrong_config_is_exit_code_2_and_leaves_artifacts_alone(
     invoke, two_link_copy, write_config
 ):
