@@ -151,6 +151,8 @@ class Runner:
         if not force and not better and self.is_current(stage):
             self.store.touch(stage.output)
             stamp = self.store.stamp(stage.output)
+            for text in stamp.warnings if stamp else ():  # still true of what was found
+                self.remark(text)
             return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
         started = time.perf_counter()
         inputs = Inputs(self.config, self.progress)

@@ -98,6 +98,22 @@ def test_ctrl_c_while_the_selection_is_repeated_ends_the_stage(two_link_copy, mo
     assert not (two_link_copy / "validation.h5").exists()
 
 
+def test_what_a_stage_has_warned_of_is_said_again_when_it_is_up_to_date(two_link_copy):
+    (two_link_copy / "reduction.h5").unlink()
+    overrides = ("reduction.best_subset.time_limit=0", "reduction.heuristics=[best-subset]")
+    said = []
+    runner = Runner(
+        config_of("two_link", *overrides, "selected.heuristic=best-subset"),
+        Store(two_link_copy),
+        remark=said.append,
+    )
+    with pytest.warns(ParamreduceWarning, match="sizes are proven"):
+        assert not runner.run(STAGES["reduce"]).current
+    assert runner.run(STAGES["reduce"]).current
+    (again,) = said
+    assert "sizes are proven" in again
+
+
 def test_a_share_that_ctrl_c_cut_short_is_gone_on_with(two_link_copy, monkeypatch):
     (two_link_copy / "reduction.h5").unlink()
     runner, share = Runner(config_of("two_link"), Store(two_link_copy)), Share(1, 2)
