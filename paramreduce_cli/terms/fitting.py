@@ -10,7 +10,7 @@ from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.terms.kernels import WHOLE
 from paramreduce_cli.terms.likeness import Ways, alike
 from paramreduce_cli.terms.matrices import positive_definite, roots, times
-from paramreduce_cli.terms.samples import TermSamples, signed_outputs
+from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.tape import Remains, Tape
 
 _LARGEST = 1e100
@@ -150,8 +150,10 @@ class Fitting:
         self._acceleration_scale = 1 / (nominal * size)
 
     def _inputs(self, beta: FloatArray, samples: TermSamples) -> FloatArray:
-        m = samples.tau.shape[1]
-        return np.vstack([np.broadcast_to(beta[:, None], (self.n, m)), samples.states])
+        n_states, m = samples.states.shape
+        inputs = np.empty((self.n + n_states, m))
+        inputs[: self.n], inputs[self.n :] = beta[:, None], samples.states
+        return inputs
 
     def fit(self, left: Remains, beta: FloatArray, looks: int = 1) -> Fit:
         """Fit the parameters.
@@ -161,7 +163,7 @@ class Fitting:
             beta: Values to start from, for the mass matrices that accelerations are found with.
             looks: How often these are found anew.
         """
-        samples, program = self.samples, self.tape.program
+        samples = self.samples
         needed = self.tape.needed(left)
         values = self.tape.values(left, self._inputs(beta, samples), needed)
         adjoints = self.tape.adjoints(left, values, samples.seeds, self._in_parameters)
@@ -169,7 +171,7 @@ class Fitting:
         present[present] = left.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
         W[present] = adjoints[self._parameters[present]]
-        inverse = samples.inverse_masses(signed_outputs(program, values))
+        inverse = samples.inverse_masses(self.tape.outputs(values))
         for _ in range(looks):
             metric = self._metric(inverse)
             rows = self._weighed(W, metric)
@@ -180,7 +182,7 @@ class Fitting:
                 break
             # Accelerations go with the mass matrices of the fitted values.
             values = self.tape.values(left, self._inputs(beta, samples), needed)
-            inverse = samples.inverse_masses(signed_outputs(program, values))
+            inverse = samples.inverse_masses(self.tape.outputs(values))
         residual = self._weighed(off[None], metric)[0]
         errors = self._errors(off, inverse)
         return self._judged(left, beta, errors, Linear(rows, factor, residual, metric))
@@ -227,7 +229,7 @@ class Fitting:
     def _outputs(self, left: Remains, beta: FloatArray, samples: TermSamples) -> FloatArray:
         """Of the program, (n_outputs, n_samples)."""
         values = self.tape.values(left, self._inputs(beta, samples), self.tape.needed(left))
-        return signed_outputs(self.tape.program, values)
+        return self.tape.outputs(values)
 
     def effects(self, fit: Fit, candidates: IntArray) -> FloatArray:
         """What the rows of a fit lose with each term, (n_candidates, n_rows)."""

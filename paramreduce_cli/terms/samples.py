@@ -9,7 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from paramreduce_cli.expressions.loops import compiled
-from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
 from paramreduce_cli.terms.matrices import inverses
@@ -58,11 +57,16 @@ class TermSamples:
         across = np.moveaxis(tangent, 0, 2)
         if not self.direct:
             return np.ascontiguousarray(across)
-        i, j = np.tril_indices(n)
+        i, j = self._places
         mirrored = np.where(i == j, 0.0, 1.0)[:, None, None]
         lower = across[i] * self.ddq[j][:, None]
         lower = lower + mirrored * across[j] * self.ddq[i][:, None]
         return np.concatenate([lower, across])
+
+    @cached_property
+    def _places(self) -> tuple[IntArray, IntArray]:
+        """Rows and columns of the entries of M that a program gives, (n_entries,) each."""
+        return np.tril_indices(len(self.ddq))
 
     def differences(self, outputs: FloatArray) -> FloatArray:
         """Torques to be met less those of a program, (n_dof, n_samples).
@@ -74,7 +78,7 @@ class TermSamples:
         if self.direct:
             n = len(self.ddq)
             torques = outputs[-n:].copy()
-            rows, columns = np.tril_indices(n)
+            rows, columns = self._places
             for entry in np.flatnonzero(outputs[:-n].any(axis=1)):
                 i, j = rows[entry], columns[entry]
                 torques[i] += outputs[entry] * self.ddq[j]
@@ -87,13 +91,10 @@ class TermSamples:
 
     def mass_matrices(self, outputs: FloatArray) -> FloatArray:
         """Of the independent coordinates, (n_samples, n_dof, n_dof)."""
-        n, count = self.ddq.shape
-        rows, columns = np.tril_indices(n)
-        lower = outputs[:-n]
+        rows, columns = self._places
+        lower = outputs[: rows.size]
         if self.tangent is None:
-            M = np.empty((count, n, n))
-            M[:, rows, columns] = M[:, columns, rows] = lower.T
-            return M
+            return np.asarray(_mirrored(lower, rows, columns))
         live = np.flatnonzero(lower.any(axis=1))
         entries = np.ascontiguousarray(lower[live].T)
         return np.asarray(_projected(entries, rows[live], columns[live], self.tangent))
@@ -138,6 +139,17 @@ def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float,
 
 
 @compiled()
+def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray) -> FloatArray:
+    """Symmetric matrices, (n_samples, n, n), of the entries of their lower triangles, (n_entries, n_samples)."""
+    count, n = lower.shape[1], rows[-1] + 1
+    result = np.empty((count, n, n))
+    for m in range(count):
+        for e in range(rows.size):
+            result[m, rows[e], columns[e]] = result[m, columns[e], rows[e]] = lower[e, m]
+    return result
+
+
+@compiled()
 def _projected(
     entries: FloatArray, rows: IntArray, columns: IntArray, tangent: FloatArray
 ) -> FloatArray:
@@ -166,13 +178,6 @@ def _projected(
                 for b in range(n_dof):
                     result[m, a, b] += tangent[m, i, a] * across[i, b]
     return result
-
-
-def signed_outputs(program: Program, values: FloatArray) -> FloatArray:
-    """Outputs of a program from the values of its nodes, (n_outputs, n_samples)."""
-    outputs = np.array(program.outputs)
-    signed: FloatArray = values[outputs >> 1] * np.where(outputs & 1, -1.0, 1.0)[:, None]
-    return signed
 
 
 def term_samples(

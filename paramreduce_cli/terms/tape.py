@@ -81,6 +81,7 @@ class Tape:
         self._operands = np.array(operands, dtype=np.int64).reshape(-1, 2)
         self._numbers = np.array(numbers)
         self._outputs = np.array(program.outputs, dtype=np.int64)
+        self._signs = np.where(self._outputs & 1, -1.0, 1.0)
 
     def everything(self) -> Remains:
         """The whole program."""
@@ -146,6 +147,11 @@ class Tape:
             inputs, which,
         )  # fmt: skip
         return values
+
+    def outputs(self, values: FloatArray) -> FloatArray:
+        """Outputs from the values of nodes, (n_outputs, n_samples)."""
+        outputs: FloatArray = values[self._outputs >> 1] * self._signs[:, None]
+        return outputs
 
     def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
