@@ -141,9 +141,8 @@ def _setting(message: str, words: Words) -> Words | None:
     whole, key, value, meant = found.groups()
     if wrong := re.search(r": key '(\S+)' is not known", message):
         key = ".".join(meant if name == wrong[1] else name for name in key.split("."))
-    elif item := re.search(
-        r"'([^']+)' is not known", message
-    ):  # all of the value, or one of a list
+    elif item := re.search(r"'([^']+)' is not known", message):
+        # All of the value, or one of a list.
         whole_item = rf"(?<![^\[\s,]){re.escape(item[1])}(?![^\]\s,])"
         value = re.sub(whole_item, lambda _: meant, value)
     else:
