@@ -117,4 +117,5 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"torque error {known} (estimation / validation)"
     )
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
-    return ReducedModel(term.names, term.values, term.position, fitted_again), term, title
+    model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)
+    return model, term, title

@@ -96,8 +96,8 @@ _MADE_OF = (
     "by the values in the config; what is zero there is left out:",
 )
 _FITTED = (
-    "Parameters, {}; fitted again to this function, whose terms are fewer: they are",
-    "no combinations of those in the config:",
+    "Parameters, {}; fitted again to this function, whose terms are fewer: they are no",
+    "combinations of those in the config, and in units, in parentheses, that save products:",
 )
 
 

@@ -20,8 +20,8 @@ def values_file(
         origin: The artifact it is from, and its digest.
         mechanism: Says units, coordinates and frames; None where there is none.
     """
-    found = zip(chosen.first, chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
-    units = [] if mechanism is None else [{"unit": p.unit} for p in mechanism.parameters]
+    found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
+    units = [] if mechanism is None else chosen.unit_names(mechanism.parameters)
     known = {} if mechanism is None else {
         "coordinates": mechanism.generalised_names,
         "frames": mechanism.frames,
@@ -33,9 +33,9 @@ def values_file(
         "paramreduce": __version__,
         "parameters": [
             {"name": name, "value": value}
-            | (units[k] if units else {})
+            | ({"unit": units[k]} if units else {})
             | ({"stands_for": expression} if expression else {})
-            for k, name, value, expression in found
+            for k, (name, value, expression) in enumerate(found)
         ],
         **known,
     }

@@ -211,13 +211,10 @@ def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
 
 
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
-    """Values with units: those of the first standard parameter that has each."""
-    return tuple(
-        ParameterValue(name, float(value), model.mechanism.parameters[k].unit, expression)
-        for k, name, value, expression in zip(
-            chosen.first, chosen.names, chosen.values, chosen.expressions, strict=True
-        )
-    )
+    """Values with units."""
+    units = chosen.unit_names(model.mechanism.parameters)
+    found = zip(chosen.names, chosen.values.tolist(), units, chosen.expressions, strict=True)
+    return tuple(ParameterValue(*one) for one in found)
 
 
 def exported_functions(

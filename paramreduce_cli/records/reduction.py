@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
@@ -10,6 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.parameters import Parameter
 
 PROVING = "best-subset"
 """The heuristic that proves."""
@@ -49,11 +50,13 @@ class ReducedModel:
     names: tuple[str, ...]
     """Of the values, (n,)."""
     values: FloatArray
-    """Approximate base parameters, (n,), SI."""
+    """Approximate base parameters, (n,), SI unless there are units."""
     position: IntArray
     """Position of each standard parameter's value, :data:`NOT_KEPT` for none, (n_standard,)."""
     expressions: tuple[str, ...] = ()
     """What each value stands for, in standard parameters; empty where that was not asked for."""
+    units: FloatArray | None = None
+    """Sizes of the units of the values where these are not SI, (n,)."""
 
     @property
     def n(self) -> int:
@@ -71,10 +74,27 @@ class ReducedModel:
         return [int(np.flatnonzero(self.position == k)[0]) for k in range(self.n)]
 
     @property
+    def unit_sizes(self) -> FloatArray:
+        """Sizes of the units of the values, SI, (n,)."""
+        return np.ones(self.n) if self.units is None else self.units
+
+    def unit_names(self, parameters: Sequence[Parameter]) -> list[str]:
+        """Units of the values, such as ``kg m`` or ``(0.0825 kg m)``.
+
+        Args:
+            parameters: The standard parameters.
+        """
+        names = (parameters[k].unit for k in self.first)
+        return [
+            name if size == 1.0 else f"({size:.9g} {name})"
+            for name, size in zip(names, self.unit_sizes, strict=True)
+        ]
+
+    @property
     def standard(self) -> FloatArray:
-        """Values of the standard parameters, zero where none is kept, (n_standard,)."""
+        """Values of the standard parameters, SI, zero where none is kept, (n_standard,)."""
         result = np.zeros(self.position.size)
-        result[self.kept] = self.values[self.position[self.kept]]
+        result[self.kept] = (self.values * self.unit_sizes)[self.position[self.kept]]
         return result
 
     @property

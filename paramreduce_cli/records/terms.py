@@ -46,7 +46,9 @@ class TermModel:
     names: tuple[str, ...]
     """Of the parameters that are left, (n,)."""
     values: FloatArray
-    """(n,), SI; of use to this function alone."""
+    """(n,), in units of their own; of use to this function alone."""
+    units: FloatArray
+    """Sizes of these units, SI, (n,): with them there are fewer products with constants."""
     position: IntArray
     """Position of each standard parameter's value, -1 for none, (n_standard,)."""
     program: StoredProgram

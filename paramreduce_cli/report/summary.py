@@ -201,6 +201,7 @@ def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
             "largest_difference": one.largest_difference,
             "smallest_eigenvalue": one.smallest_eigenvalue,
             "parameters": dict(zip(one.names, one.values, strict=True)),
+            "units": dict(zip(one.names, one.units, strict=True)),
             "pareto": [
                 {"operations": count, **_errors(one.front, k)}
                 for k, count in enumerate(one.front.operations)

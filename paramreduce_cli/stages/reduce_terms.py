@@ -179,6 +179,7 @@ def _record(
         n_start=one.start.model.n,
         names=model.names,
         values=model.values,
+        units=model.unit_sizes,
         position=model.position,
         program=program.stored(),
         projected=judge.projected,

@@ -10,6 +10,7 @@ import numpy as np
 from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.scaling import rescaled
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
@@ -39,6 +40,8 @@ class Simplified:
     program: Program
     """Its inputs are the parameters of the start, then states."""
     beta: FloatArray
+    units: FloatArray
+    """Sizes of the units of its parameters, SI, (n,)."""
 
     def refitted(self, samples: TermSamples, budget: Budget) -> Simplified:
         """The same with parameters fitted to more samples."""
@@ -70,7 +73,8 @@ class Simplified:
             lambda position: position - dropped if position >= model.n else int(place[position])
         )
         names = tuple(model.names[k] for k in used)
-        return ReducedModel(names, self.beta[used], place[model.position]), program
+        values, units = self.beta[used], self.units[used]
+        return ReducedModel(names, values, place[model.position], units=units), program
 
 
 @dataclass(frozen=True)
@@ -81,6 +85,8 @@ class Passed:
     """The program that it is what is left of."""
     left: Remains
     beta: FloatArray
+    units: FloatArray
+    """Sizes of the units of its parameters, SI, (n,)."""
     cost: float
     excess: float
 
@@ -104,11 +110,10 @@ class Way:
 
     def simplified(self, passed: Passed) -> Simplified:
         """A program on the way, its sums and products rearranged."""
+        program, sizes = rescaled(passed.tape.rebuilt(passed.left), passed.beta.size)
         graph = Graph()
-        outputs = passed.tape.rebuilt(passed.left).rebuilt(graph)
-        return Simplified(
-            self.start, Program.of_graph(*least([Written(graph, outputs)])), passed.beta
-        )
+        program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))]))
+        return Simplified(self.start, program, passed.beta / sizes, passed.units * sizes)
 
 
 @dataclass(frozen=True)
@@ -122,14 +127,17 @@ class Descent:
     """Among the terms of the program as it was last rewritten."""
     end: Step
     """Of that program."""
+    units: FloatArray
+    """Sizes of the units of its parameters, SI, (n,)."""
     visited: dict[int, Passed]
     """The best one of every number of operations."""
 
     @classmethod
-    def begun(cls, start: Start, tape: Tape, searching: Callable[[Tape], Search]) -> Descent:
+    def begun(cls, start: Start, program: Program, searching: Callable[[Tape], Search]) -> Descent:
         """With all terms of a program, whose first inputs are the parameters of the start."""
-        search = searching(tape)
-        descent = cls(start, searching, search, search.start(start.model.values), {})
+        program, units = rescaled(program, start.model.n)
+        search = searching(Tape(program))
+        descent = cls(start, searching, search, search.start(start.model.values / units), units, {})
         descent._note(descent.end)
         return descent
 
@@ -164,11 +172,12 @@ class Descent:
         Mass matrices are taken anew, which is enough for what is at the edge of it.
         """
         passed = self.visited[min(self.visited)]
-        search = self.searching(Tape(self.way.simplified(passed).program))
-        end = search.start(passed.beta)
+        simplified = self.way.simplified(passed)
+        search = self.searching(Tape(simplified.program))
+        end = search.start(simplified.beta)
         if not end.fit.within:
             return self
-        descent = replace(self, search=search, end=end)
+        descent = replace(self, search=search, end=end, units=simplified.units)
         descent._note(end)
         return descent
 
@@ -177,7 +186,7 @@ class Descent:
         known = self.visited.get(step.count)
         if known is None or step.fit.excess < known.excess:
             fit = step.fit
-            passed = Passed(self.search.tape, fit.left, fit.beta, fit.cost, fit.excess)
+            passed = Passed(self.search.tape, fit.left, fit.beta, self.units, fit.cost, fit.excess)
             self.visited[step.count] = passed
 
 
@@ -197,7 +206,7 @@ def gone_on(way: Way, searching: Callable[[Tape], Search]) -> Way | None:
         end = search.mended(passed.left, passed.beta)
         if not end.fit.within:
             continue
-        descent = Descent(way.start, searching, search, end, {})
+        descent = Descent(way.start, searching, search, end, passed.units, {})
         descent._note(end)
         tried.append(descent.down())
         if end.count <= count or len(tried) == _MENDED:

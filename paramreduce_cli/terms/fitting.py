@@ -247,7 +247,8 @@ class Fitting:
         itself = fit.left.kept[:, WHOLE] & (fit.left.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
         ways = alike(values, pulls, residual, self._made & itself, self._in_parameters)
-        return ways, values, pulls
+        constants = self.tape.constants()
+        return ways.with_ones(constants[itself[constants]]), values, pulls
 
     def _derived(self, fit: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Values of the nodes, what they would be, and derivatives of the torques by them."""

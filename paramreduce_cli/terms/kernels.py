@@ -342,6 +342,10 @@ def count(
             elif code == PRODUCT:
                 if a == NONE or b == NONE:
                     stands_for[k] = NONE
+                elif source[a] == NUMBER and np.abs(factor[a]) == 1.0:
+                    stands_for[k] = b
+                elif source[b] == NUMBER and np.abs(factor[b]) == 1.0:
+                    stands_for[k] = a
             elif a == NONE and code != COS:
                 stands_for[k] = NONE
     used = np.zeros(n, dtype=np.bool_)

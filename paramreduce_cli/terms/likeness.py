@@ -29,6 +29,14 @@ class Ways:
     def __getitem__(self, which: IntArray) -> Ways:
         return Ways(self.nodes[which], self.sources[which], self.factors[which])
 
+    def with_ones(self, nodes: IntArray) -> Ways:
+        """And nodes that could stand for the number one."""
+        return Ways(
+            np.concatenate([self.nodes, nodes]),
+            np.concatenate([self.sources, np.full(nodes.size, NUMBER)]),
+            np.concatenate([self.factors, np.ones(nodes.size)]),
+        )
+
     def one(self, which: int) -> tuple[int, int, float]:
         """Node, source and factor of one way."""
         return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])

@@ -172,9 +172,13 @@ class Search:
         useful = np.flatnonzero(counts < step.count)
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
         none = np.zeros((len(useful), self._fitting.n))
-        again = fit.linear.costs(ways.changes(values, pulls), fit.beta, none).again
+        costs = fit.linear.costs(ways.changes(values, pulls), fit.beta, none)
+        lists = [
+            np.argsort(cost * own / saved, kind="stable")[:_TRIED]
+            for cost in (costs.again, costs.plain)
+        ]
         tried = []
-        for place in np.argsort(again * own / saved, kind="stable")[:_TRIED]:
+        for place in np.unique(np.concatenate(lists)):
             changed = self._fitting.fit(fit.left.standing(*ways.one(place)), fit.beta)
             if changed.within:
                 tried.append(((changed.strain - fit.strain) / saved[place], place, changed))

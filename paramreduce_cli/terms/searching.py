@@ -66,8 +66,8 @@ class Searcher:
 
     def begun(self, start: Start, turn: int = 0) -> Descent:
         """With all terms."""
-        tape = Tape(start.program(self.lean, direct=self.direct))
-        return Descent.begun(start, tape, self._searching(start, self.looked_at, turn))
+        program = start.program(self.lean, direct=self.direct)
+        return Descent.begun(start, program, self._searching(start, self.looked_at, turn))
 
     def down(self, start: Start) -> Way:
         """From a start until no more terms can go."""

@@ -100,7 +100,7 @@ class Tape:
         terms = [
             *((k, side) for k in sums for side in (FIRST, SECOND)),
             *((k, WHOLE) for k in whole),
-            *((k, ITSELF) for k in np.flatnonzero(self.made())),
+            *((k, ITSELF) for k in np.flatnonzero(self._codes != INPUT)),
         ]
         return np.array(terms, dtype=np.int64).reshape(-1, 2)
 
@@ -108,6 +108,10 @@ class Tape:
         """Which nodes are computed, neither constants nor inputs, (n_nodes,)."""
         result: BoolArray = self._codes > INPUT
         return result
+
+    def constants(self) -> IntArray:
+        """Nodes that are constants, (n_constants,)."""
+        return np.flatnonzero(self._codes == CONSTANT)
 
     def linear(self, n: int) -> BoolArray:
         """Of which nodes the first n inputs are part, (n_nodes,)."""

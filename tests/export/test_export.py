@@ -250,7 +250,7 @@ def test_an_angle_that_results_use_too(tmp_path):
     program = Program.of_graph(g, outputs).stored()
     n = model.mechanism.n_dof
     function = TermModel(
-        "swap", chosen.n, chosen.names, chosen.values, chosen.position, program, False, 6, 6,
+        "swap", chosen.n, chosen.names, chosen.values, np.ones(chosen.n), chosen.position, program, False, 6, 6,
         *[0.0] * 5, np.zeros(n), np.nan, 0, -np.ones((3, n)), np.ones((3, n)), None,
     )  # fmt: skip
     files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=function)

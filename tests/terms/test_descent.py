@@ -15,7 +15,6 @@ from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.search import NOISE, Search
 from paramreduce_cli.terms.starts import Start
-from paramreduce_cli.terms.tape import Tape
 
 BUDGET = Budget(0.03, np.inf)
 
@@ -37,14 +36,14 @@ def samples(model, count, seed):
 def begun(arm):
     base = base_model(arm)
     start = Start("base", base, 0.0, 0)
-    tape = Tape(start.program(LeanModels(arm), direct=False))
+    program = start.program(LeanModels(arm), direct=False)
     looked_at = samples(arm, 100, 0)
 
     def made(seed=0):
         def searching(tape):
             return Search(Fitting(tape, base.n, looked_at, BUDGET), seed)
 
-        return Descent.begun(start, tape, searching)
+        return Descent.begun(start, program, searching)
 
     return made
 

@@ -40,6 +40,8 @@ def random_remains(tape, seed):
             left = left.standing(k, NUMBER, factor)
         elif like.size:
             left = left.standing(k, int(rng.choice(like)), factor)
+    for k in tape.constants()[rng.random(tape.constants().size) < 0.3]:
+        left = left.standing(k, NUMBER, 1.0)
     return left
 
 
@@ -60,6 +62,21 @@ def test_what_is_left_is_the_program_with_terms_set_to_zero(program, inputs, see
     expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluated(list(inputs))]
     np.testing.assert_allclose(outputs_of(tape, left, inputs), expected, atol=1e-14)
     assert rebuilt.n_operations <= tape.count(left) <= program.n_operations
+
+
+def test_a_constant_that_stands_for_one_saves_all_products_with_it():
+    g = Graph()
+    p, x, y = map(g.input, range(3))
+    length = g.constant(1.07)
+    lengths = g.add(g.multiply(length, x), g.multiply(x, g.multiply(length, y)))
+    tape = Tape(Program.of_graph(g, [g.multiply(p, lengths)]))
+    (constant,) = tape.constants()
+    left = tape.everything().standing(constant, NUMBER, 1.0)
+    assert tape.count(left) == tape.count(tape.everything()) - 2
+    assert tape.rebuilt(left).n_operations == tape.count(left)
+    itself = np.array([[constant, ITSELF]])
+    assert itself[0].tolist() in tape.candidates().tolist()
+    assert tape.count(left.flipped(itself)) == tape.count(tape.everything())
 
 
 @pytest.mark.parametrize("seed", range(40))

@@ -1,0 +1,157 @@
+"""Units for what a program computes on the way, in which products with constants vanish.
+
+Where some inputs may come in units of any size, as parameters that are fitted anyway, so may all that is made of
+them; and in a unit of length that is one of a mechanism's own, no product with that length is left. With s the
+logarithm of how many times what it was a value is, a sum has the s of both its operands, a product has the sum of
+theirs, other inputs and outputs have none. A product with a constant c can make up for any difference between
+what it has and its operand has; if that is -log c, it is no more than its operand.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from paramreduce_cli.expressions.graph import Graph, Node
+from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.records import FloatArray
+
+_ROUNDING = 1e-9
+"""Of coefficients of equations in s, and of the factor one."""
+_DIGITS = 6
+"""To which equations are told apart."""
+
+
+def rescaled(program: Program, n: int) -> tuple[Program, FloatArray]:
+    """The same function of inputs in other units, in which few products with constants are left.
+
+    Those that vanish together in most places are made to first, then others as far as these leave it open.
+
+    Args:
+        program: Of sums, products and functions.
+        n: How many inputs, the first ones, may come in other units.
+
+    Returns:
+        The program, and the sizes of the units that these inputs come in, (n,): what they were is so many
+        times what they are.
+    """
+    units = _Units(program, n)
+    units.meet_wishes()
+    graph, sizes = Graph(), np.ones(n)
+    values: list[int] = []
+    for k, node in enumerate(program.nodes):
+        if node.operation == "input" and node.number < n:
+            sizes[int(node.number)] = 1 / units.factor(k)
+        values.append(_moved(graph, node, k, values, units))
+    outputs = [values[value >> 1] ^ (value & 1) for value in program.outputs]
+    return Program.of_graph(graph, outputs), sizes
+
+
+def _moved(graph: Graph, node: Node, k: int, values: list[int], units: _Units) -> int:
+    """The value of a node in another graph, in its unit."""
+    operation, operands, number = node
+    if operation == "constant":
+        return graph.constant(number)
+    if operation == "input":
+        return graph.input(int(number))
+    moved = [values[value >> 1] ^ (value & 1) for value in operands]
+    for place, value in enumerate(operands):
+        constant = units.constant(value)
+        if constant is not None and operation in ("+", "*"):
+            other = operands[1 - place] >> 1
+            factor = units.factor(k) / (units.factor(other) if operation == "*" else 1.0)
+            moved[place] = graph.constant(_rounded(constant * factor))
+    if operation == "+":
+        return graph.add(*moved)
+    return graph.multiply(*moved) if operation == "*" else graph.call(operation, *moved)
+
+
+def _rounded(number: float) -> float:
+    """One where only rounding is between."""
+    return float(np.sign(number)) if abs(abs(number) - 1.0) < _ROUNDING else number
+
+
+class _Units:
+    """The s of all nodes, as far as equations between them do not leave it open.
+
+    Args:
+        program: Whose nodes.
+        n: How many inputs may have one.
+    """
+
+    def __init__(self, program: Program, n: int) -> None:
+        self._nodes = program.nodes
+        self._products = [k for k in range(len(self._nodes)) if self._by_constant(k) is not None]
+        inputs = [
+            k for k, node in enumerate(self._nodes) if node.operation == "input" and node.number < n
+        ]
+        # The s of these are open. That of any node is a combination of them, and a number, which comes last.
+        self._s = np.zeros((len(self._nodes), len(self._products) + len(inputs) + 1))
+        self._s[[*self._products, *inputs], range(self._s.shape[1] - 1)] = 1.0
+        for k in range(len(self._nodes)):
+            self._follow(k)
+        for value in program.outputs:
+            self._meet(self._s[value >> 1].copy())
+
+    def constant(self, value: int) -> float | None:
+        """What a value is if it is a constant."""
+        node = self._nodes[value >> 1]
+        if node.operation != "constant":
+            return None
+        return -node.number if value & 1 else node.number
+
+    def factor(self, k: int) -> float:
+        """How many times what it was a node is."""
+        return float(np.exp(self._s[k, -1]))
+
+    def meet_wishes(self) -> None:
+        """Make products with constants vanish, those first of which most do together."""
+        found: dict[tuple[float, ...], int] = {}
+        counts: Counter[tuple[float, ...]] = Counter()
+        for k in self._products:
+            equation = self._wish(k)
+            (open_ones,) = np.nonzero(np.abs(equation[:-1]) > _ROUNDING)
+            if open_ones.size:
+                key = tuple(np.round(equation / equation[open_ones[0]], _DIGITS).tolist())
+                found.setdefault(key, k)
+                counts[key] += 1
+        for key, _ in counts.most_common():
+            self._meet(self._wish(found[key]))
+
+    def _wish(self, k: int) -> FloatArray:
+        """What is zero where a product with a constant is no more than its operand."""
+        constant, other = self._by_constant(k) or (1.0, 0)
+        equation = self._s[k] - self._s[other]
+        equation[-1] += np.log(constant)
+        return equation
+
+    def _meet(self, equation: FloatArray) -> None:
+        """Close one s that is open by what is to be zero, if there is one left."""
+        place = int(np.argmax(np.abs(np.append(equation[:-1], 0.0))))
+        if abs(equation[place]) > _ROUNDING and place < equation.size - 1:
+            self._s -= np.outer(self._s[:, place], equation / equation[place])
+
+    def _by_constant(self, k: int) -> tuple[float, int] | None:
+        """Of a product with a constant, its size and the other operand."""
+        operation, operands, _ = self._nodes[k]
+        if operation != "*":
+            return None
+        for value, other in (operands, operands[::-1]):
+            if (constant := self.constant(value)) is not None:
+                return abs(constant), other >> 1
+        return None
+
+    def _follow(self, k: int) -> None:
+        """What its operands say of the s of a node."""
+        operation, operands, _ = self._nodes[k]
+        # A number can come in any unit.
+        below = [value >> 1 for value in operands if self.constant(value) is None]
+        if operation == "*" and len(below) == 2:
+            self._s[k] = self._s[below[0]] + self._s[below[1]]
+        elif operation == "+":
+            self._meet(self._s[below[0]] - self._s[below[-1]])
+            self._s[k] = self._s[below[0]]
+        elif operation not in ("*", "+", "input", "constant"):
+            for node in below:
+                self._meet(self._s[node].copy())
