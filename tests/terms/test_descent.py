@@ -60,6 +60,15 @@ def test_programs_on_the_way_have_the_errors_and_operations_that_are_said(arm, b
         assert error <= BUDGET.torque
 
 
+def test_with_all_terms_parameters_are_those_of_the_start_in_the_units_that_are_said(begun):
+    one = begun()
+    assert np.any(one.units != 1.0)
+    whole = one.way.simplified(one.visited[one.end.count])
+    np.testing.assert_allclose(
+        whole.beta * whole.units, one.start.model.values, rtol=1e-6, atol=1e-9
+    )
+
+
 def test_rewriting_on_the_way_is_no_worse_than_one_descent(begun):
     one = begun()
     assert one.down().fewest <= one.search.descended(one.end).count

@@ -13,6 +13,7 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.export.choice import simplified_model
+from paramreduce_cli.export.values import values_file
 from paramreduce_cli.export.writing import Exported, export
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.operations import Program
@@ -170,6 +171,21 @@ def test_exported_functions_compute_the_same(four_bar, name):
             simplified=term,
         )
         assert any(name.endswith(".py") for name in files)
+
+
+def test_units_of_parameters_are_said(two_link):
+    model = loaded(two_link, Model)
+    chosen, term, title = simplified_model(loaded(two_link, TermReduction), "inverse")
+    files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=term)
+    header = files["two_link.h"].decode()
+    values = json.loads(values_file(chosen, title, "", model.mechanism)["parameters.json"])
+    for k, (name, value, size) in enumerate(zip(term.names, term.values, term.units, strict=True)):
+        si = model.mechanism.parameters[model.mechanism.parameter_names.index(name)].unit
+        unit = si if size == 1.0 else f"({size:.9g} {si})"
+        assert f"{name} = {value:.9g} {unit}\n" in header
+        assert values["parameters"][k]["unit"] == unit
+        assert chosen.standard[term.position == k] == pytest.approx(value * size)
+    assert np.any(term.units != 1.0), "the arm's lengths are no units"
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
