@@ -30,6 +30,8 @@ _LIKELY = 2.0
 """Operations more than the leanest has, with which a descent is drawn a third as often."""
 _ON_THE_WAY = 16
 """Programs of a front."""
+_EXACT = 1e-18
+"""Squared share of the budget below which errors are no more than rounding."""
 
 
 @dataclass(frozen=True)
@@ -255,8 +257,8 @@ def front(ways: Iterable[Way]) -> list[Simplified]:
     kept: list[tuple[int, Way]] = []
     least_cost = np.inf
     for count, cost, way in sorted(entries, key=lambda entry: entry[:2]):
-        if cost < least_cost:
-            least_cost = cost
+        if max(cost, _EXACT) < least_cost:
+            least_cost = max(cost, _EXACT)
             kept.append((count, way))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
     return [way.simplified(way.visited[count]) for count, way in (kept[i] for i in picks)]

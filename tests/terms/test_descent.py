@@ -1,6 +1,7 @@
 """From one start down: what is passed on the way keeps to what is said of it."""
 
 from collections import Counter
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -114,6 +115,14 @@ def test_a_front_has_programs_that_no_leaner_one_beats(arm, begun):
     looked_at = samples(arm, 100, 0)
     errors = [looked_at.errors(one.outputs(looked_at.states))[0] for one in programs]
     assert np.all(np.diff(errors) < 0)
+
+
+def test_of_exact_programs_a_front_has_the_leanest(begun):
+    one = begun().way
+    counts = sorted(one.visited)
+    dearer = replace(one.visited[counts[0]], cost=0.0)
+    way = replace(one, visited={counts[0]: replace(dearer, cost=1e-25), counts[0] + 9: dearer})
+    assert [found.program for found in front([way])] == [way.simplified(dearer).program]
 
 
 def test_slimmed_ways_have_the_same_front_and_the_same_leanest_ends(begun):
