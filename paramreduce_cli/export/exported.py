@@ -97,7 +97,7 @@ _MADE_OF = (
 )
 _FITTED = (
     "Parameters, {}; fitted again to this function, whose terms are fewer: they are no",
-    "combinations of those in the config, and in units, in parentheses, that save products:",
+    "combinations of those in the config; units in parentheses save products:",
 )
 
 

@@ -22,6 +22,7 @@ def values_file(
     """
     found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
     units = [] if mechanism is None else chosen.unit_names(mechanism.parameters)
+    sizes = chosen.unit_sizes.tolist() if chosen.units is not None else []
     known = {} if mechanism is None else {
         "coordinates": mechanism.generalised_names,
         "frames": mechanism.frames,
@@ -34,6 +35,7 @@ def values_file(
         "parameters": [
             {"name": name, "value": value}
             | ({"unit": units[k]} if units else {})
+            | ({"unit_size": sizes[k]} if sizes else {})
             | ({"stands_for": expression} if expression else {})
             for k, (name, value, expression) in enumerate(found)
         ],

@@ -3,12 +3,13 @@
 Where some inputs may come in units of any size, as parameters that are fitted anyway, so may all that is made of
 them; and in a unit of length that is one of a mechanism's own, no product with that length is left. With s the
 logarithm of how many times what it was a value is, a sum has the s of both its operands, a product has the sum of
-theirs, other inputs and outputs have none. A product with a constant c can make up for any difference between
+theirs, other inputs and outputs have none, nor what functions are taken of and give. A product with a constant c can make up for any difference between
 what it has and its operand has; if that is -log c, it is no more than its operand.
 """
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 
 import numpy as np
@@ -18,7 +19,7 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import FloatArray
 
 _ROUNDING = 1e-9
-"""Of coefficients of equations in s, and of the factor one."""
+"""Of coefficients of equations in s, and of numbers."""
 _DIGITS = 6
 """To which equations are told apart."""
 
@@ -29,7 +30,7 @@ def rescaled(program: Program, n: int) -> tuple[Program, FloatArray]:
     Those that vanish together in most places are made to first, then others as far as these leave it open.
 
     Args:
-        program: Of sums, products and functions.
+        program: Of sums, products and functions, numbers folded as a :class:`Graph` folds them.
         n: How many inputs, the first ones, may come in other units.
 
     Returns:
@@ -38,38 +39,71 @@ def rescaled(program: Program, n: int) -> tuple[Program, FloatArray]:
     """
     units = _Units(program, n)
     units.meet_wishes()
-    graph, sizes = Graph(), np.ones(n)
-    values: list[int] = []
+    sizes = np.ones(n)
     for k, node in enumerate(program.nodes):
         if node.operation == "input" and node.number < n:
             sizes[int(node.number)] = 1 / units.factor(k)
-        values.append(_moved(graph, node, k, values, units))
-    outputs = [values[value >> 1] ^ (value & 1) for value in program.outputs]
-    return Program.of_graph(graph, outputs), sizes
+    return _Moving(program, units).moved(), sizes
 
 
-def _moved(graph: Graph, node: Node, k: int, values: list[int], units: _Units) -> int:
-    """The value of a node in another graph, in its unit."""
-    operation, operands, number = node
-    if operation == "constant":
-        return graph.constant(number)
-    if operation == "input":
-        return graph.input(int(number))
-    moved = [values[value >> 1] ^ (value & 1) for value in operands]
-    for place, value in enumerate(operands):
-        constant = units.constant(value)
-        if constant is not None and operation in ("+", "*"):
-            other = operands[1 - place] >> 1
-            factor = units.factor(k) / (units.factor(other) if operation == "*" else 1.0)
-            moved[place] = graph.constant(_rounded(constant * factor))
-    if operation == "+":
-        return graph.add(*moved)
-    return graph.multiply(*moved) if operation == "*" else graph.call(operation, *moved)
+class _Moving:
+    """Builds a program again in units.
 
+    Args:
+        program: As it is.
+        units: Of its nodes.
+    """
 
-def _rounded(number: float) -> float:
-    """One where only rounding is between."""
-    return float(np.sign(number)) if abs(abs(number) - 1.0) < _ROUNDING else number
+    def __init__(self, program: Program, units: _Units) -> None:
+        self._program, self._units = program, units
+        self._graph = Graph()
+        self._values: list[int] = []
+        # Numbers between which there is only rounding must be one, or their products are not shared.
+        self._numbers = [
+            1.0,
+            *(node.number for node in program.nodes if node.operation == "constant"),
+        ]
+
+    def moved(self) -> Program:
+        """The program in its units."""
+        for k, node in enumerate(self._program.nodes):
+            self._values.append(self._made(k, node))
+        return Program.of_graph(self._graph, [self._value(v) for v in self._program.outputs])
+
+    def _value(self, value: int) -> int:
+        """What has become of one."""
+        found = self._values[value >> 1]
+        return self._graph.negate(found) if value & 1 else found
+
+    def _made(self, k: int, node: Node) -> int:
+        """Node k in its unit."""
+        operation, operands, number = node
+        if operation == "constant":
+            return self._graph.constant(number)
+        if operation == "input":
+            return self._graph.input(int(number))
+        moved = [self._value(value) for value in operands]
+        for place, value in enumerate(operands):
+            constant = self._units.constant(value)
+            if constant is not None and operation in ("+", "*"):
+                factor = self._units.factor(k)
+                if operation == "*":
+                    factor /= self._units.factor(operands[1 - place] >> 1)
+                moved[place] = self._constant(constant * factor)
+        if operation == "+":
+            return self._graph.add(*moved)
+        if operation == "*":
+            return self._graph.multiply(*moved)
+        return self._graph.call(operation, *moved)
+
+    def _constant(self, number: float) -> int:
+        """A number, or the one that it differs from by rounding."""
+        size = abs(number)
+        same = (one for one in self._numbers if abs(one - size) <= _ROUNDING * size)
+        known = next(same, None)
+        if known is None:
+            self._numbers.append(size)
+        return self._graph.constant(math.copysign(size if known is None else known, number))
 
 
 class _Units:

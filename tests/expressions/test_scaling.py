@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import model_of
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.expressions.graph import Graph
@@ -25,7 +25,8 @@ def programs(draw):
     graph = Graph()
     values = [graph.input(k) for k in range(N)]
     for _ in range(draw(st.integers(1, 25))):
-        a, b = (draw(st.sampled_from(values)) ^ draw(st.booleans()) for _ in range(2))
+        a, b = (draw(st.sampled_from(values)) for _ in range(2))
+        b = graph.negate(b) if draw(st.booleans()) else b
         number = graph.constant(draw(st.sampled_from(NUMBERS)))
         kind = draw(st.sampled_from(("sum", "product", "multiple", "shift", "sine")))
         if kind == "sine":
@@ -45,14 +46,12 @@ def same(program, scaled, units):
         np.testing.assert_allclose(other, one, rtol=1e-7, atol=1e-7 * np.abs(one).max())
 
 
+@settings(deadline=None)
 @given(programs())
 def test_the_function_is_the_same_and_takes_no_more_operations(program):
     scaled, units = rescaled(program, FREE)
     same(program, scaled, units)
     assert scaled.n_operations <= program.n_operations
-    again, more = rescaled(scaled, FREE)
-    assert again.n_operations == scaled.n_operations
-    np.testing.assert_allclose(more, 1.0, rtol=1e-9)
 
 
 def built(make):
@@ -102,7 +101,7 @@ def test_what_vanishes_in_more_places_goes_first():
     assert scaled.n_operations == program.n_operations - 2
     np.testing.assert_allclose(units[0], 1 / 0.3)
     numbers = [node.number for node in scaled.nodes if node.operation == "constant"]
-    np.testing.assert_allclose(numbers, 0.4 / 0.3)
+    assert numbers == pytest.approx([0.4 / 0.3])
 
 
 @pytest.mark.parametrize("outputs", [inverse_outputs, direct_outputs])
@@ -126,3 +125,14 @@ def test_an_arm_takes_what_it_would_take_if_its_length_were_one(outputs):
     sizes = dict(zip(mechanism.parameter_names, units, strict=True))
     for name, power in {"m_fore": 2, "mx_fore": 1, "my_fore": 1, "Izz_fore": 0}.items():
         assert sizes[name] == pytest.approx(length**-power)
+
+
+@pytest.mark.parametrize("outputs", [inverse_outputs, direct_outputs])
+def test_numbers_that_differ_by_rounding_are_one(outputs):
+    mechanism = model_of("puma560").mechanism
+    graph = Graph()
+    values = outputs(lean_tree(mechanism), [JointFormulation()] * 6, graph)
+    scaled, _ = rescaled(Program.of_graph(graph, values), mechanism.n_parameters)
+    numbers = np.sort([node.number for node in scaled.nodes if node.operation == "constant"])
+    assert numbers.size > 3
+    assert np.diff(numbers).min() > 1e-6

@@ -184,6 +184,7 @@ def test_units_of_parameters_are_said(two_link):
         unit = si if size == 1.0 else f"({size:.9g} {si})"
         assert f"{name} = {value:.9g} {unit}\n" in header
         assert values["parameters"][k]["unit"] == unit
+        assert values["parameters"][k]["unit_size"] == size
         assert chosen.standard[term.position == k] == pytest.approx(value * size)
     assert np.any(term.units != 1.0), "the arm's lengths are no units"
 

@@ -15,5 +15,6 @@ def latex(model: ExportedModel) -> dict[str, bytes]:
         (p.name, f"{p.value:.6g}", p.unit.replace("^2", "²"), p.expression)[: len(columns)]
         for p in model.parameters
     )
-    table = Table(f"{model.robot}: {len(rows)} parameters", columns, rows)
+    own = ", units in parentheses" if any(p.unit.startswith("(") for p in model.parameters) else ""
+    table = Table(f"{model.robot}: {len(rows)} parameters{own}", columns, rows)
     return {f"{model.name}_parameters.tex": (heading + latex_table(table, model.symbols)).encode()}
