@@ -116,7 +116,8 @@ class _Units:
 
     def __init__(self, program: Program, n: int) -> None:
         self._nodes = program.nodes
-        self._products = [k for k in range(len(self._nodes)) if self._by_constant(k) is not None]
+        by_constants = ((k, self._by_constant(k)) for k in range(len(self._nodes)))
+        self._products = {k: found for k, found in by_constants if found is not None}
         inputs = [
             k for k, node in enumerate(self._nodes) if node.operation == "input" and node.number < n
         ]
@@ -155,15 +156,16 @@ class _Units:
 
     def _wish(self, k: int) -> FloatArray:
         """What is zero where a product with a constant is no more than its operand."""
-        constant, other = self._by_constant(k) or (1.0, 0)
+        constant, other = self._products[k]
         equation = self._s[k] - self._s[other]
         equation[-1] += np.log(constant)
         return equation
 
     def _meet(self, equation: FloatArray) -> None:
         """Close one s that is open by what is to be zero, if there is one left."""
-        place = int(np.argmax(np.abs(np.append(equation[:-1], 0.0))))
-        if abs(equation[place]) > _ROUNDING and place < equation.size - 1:
+        sizes = np.abs(equation[:-1])
+        if np.any(sizes > _ROUNDING):
+            place = int(np.argmax(sizes))
             self._s -= np.outer(self._s[:, place], equation / equation[place])
 
     def _by_constant(self, k: int) -> tuple[float, int] | None:

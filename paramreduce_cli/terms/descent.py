@@ -253,12 +253,16 @@ def slimmed(ways: Sequence[Way], number: int) -> list[Way]:
 
 def front(ways: Iterable[Way]) -> list[Simplified]:
     """Programs on the way that no leaner one beats, some of them, evenly spread."""
-    entries = [(count, passed.cost, way) for way in ways for count, passed in way.visited.items()]
+    entries = [
+        (count, max(passed.cost, _EXACT), way)
+        for way in ways
+        for count, passed in way.visited.items()
+    ]
     kept: list[tuple[int, Way]] = []
     least_cost = np.inf
     for count, cost, way in sorted(entries, key=lambda entry: entry[:2]):
-        if max(cost, _EXACT) < least_cost:
-            least_cost = max(cost, _EXACT)
+        if cost < least_cost:
+            least_cost = cost
             kept.append((count, way))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
     return [way.simplified(way.visited[count]) for count, way in (kept[i] for i in picks)]
