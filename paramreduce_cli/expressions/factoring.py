@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.rewriting import rewrite
-from paramreduce_cli.expressions.rows import COST, PRODUCT, SUM, Rows, rows_of, terms_of
+from paramreduce_cli.expressions.rows import COST, DICE, PRODUCT, SUM, Rows, rows_of, terms_of
 
 _CLOSE = {0.0: 0.01, 1.0: 0.003}
 """After so many rewritings per operation, the share of them by which a way of writing may be behind and go on."""
@@ -75,17 +75,20 @@ class Written(NamedTuple):
         return Written(target, _Assembly(self.graph, sums, products, target).built(self.outputs))
 
 
-def least(ways: Iterable[Written]) -> Written:
+def least(ways: Iterable[Written], dice: int = 0) -> Written:
     """Write values with fewer operations.
 
     Args:
         ways: The same values, written in one or several ways; those that are far behind before they are
             rewritten are dropped.
+        dice: Where they begin; others may come to another end.
 
     Returns:
         What takes the fewest operations.
     """
     apart = [(way, way.taken_apart()) for way in ways]
+    for _, rows in apart:
+        rows.counters[DICE] = dice
     for tries, share in _CLOSE.items():
         for _, rows in apart:
             rewrite(rows, int(tries * _places(rows)))

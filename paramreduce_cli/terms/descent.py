@@ -30,6 +30,8 @@ _LIKELY = 2.0
 """Operations more than the leanest has, with which a descent is drawn a third as often."""
 _ON_THE_WAY = 16
 """Programs of a front."""
+_DICE = 2**40
+"""Ways for them to fall."""
 _EXACT = 1e-18
 """Squared share of the budget below which errors are no more than rounding."""
 
@@ -110,11 +112,11 @@ class Way:
         """The less the better; the same for ends that are the same."""
         return self.fewest, round(self.strain, _SAME)
 
-    def simplified(self, passed: Passed) -> Simplified:
-        """A program on the way, its sums and products rearranged."""
+    def simplified(self, passed: Passed, dice: int = 0) -> Simplified:
+        """A program on the way, its sums and products rearranged; how hangs on the dice."""
         program, sizes = rescaled(passed.tape.rebuilt(passed.left), passed.beta.size)
         graph = Graph()
-        program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))]))
+        program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))], dice))
         return Simplified(self.start, program, passed.beta / sizes, passed.units * sizes)
 
 
@@ -138,9 +140,32 @@ class Descent:
     def begun(cls, start: Start, program: Program, searching: Callable[[Tape], Search]) -> Descent:
         """With all terms of a program, whose first inputs are the parameters of the start."""
         program, units = rescaled(program, start.model.n)
-        search = searching(Tape(program))
-        descent = cls(start, searching, search, search.start(start.model.values / units), units, {})
-        descent._note(descent.end)
+        return cls._of(Simplified(start, program, start.model.values / units, units), searching)
+
+    @classmethod
+    def again(
+        cls, way: Way, rng: np.random.Generator, searching: Callable[[Tape], Search]
+    ) -> Descent:
+        """From a program shortly before the end of a descent, written in another way.
+
+        Where sums and products were rearranged by other dice, it has other terms to leave out.
+
+        Args:
+            way: What the descent has come by.
+            rng: Which program it is, and the dice.
+            searching: Makes searches.
+        """
+        near = [count for count in sorted(way.visited) if count <= way.fewest / _LEG]
+        passed = way.visited[int(rng.choice(near))]
+        return cls._of(way.simplified(passed, int(rng.integers(_DICE))), searching)
+
+    @classmethod
+    def _of(cls, whole: Simplified, searching: Callable[[Tape], Search]) -> Descent:
+        """With all terms of a program."""
+        search = searching(Tape(whole.program))
+        end = search.start(whole.beta)
+        descent = cls(whole.start, searching, search, end, whole.units, {})
+        descent._note(end)
         return descent
 
     @property

@@ -21,7 +21,7 @@ from paramreduce_cli.terms.starts import Start, near
 from paramreduce_cli.terms.tape import Tape
 
 _NOISY = 0.5
-"""How often there is noise in the choice of terms near a start."""
+"""How often there is noise in the choice of terms, but from the first starts."""
 
 Item = TypeVar("Item")
 
@@ -42,6 +42,15 @@ class Near(NamedTuple):
     start: Start
     others: list[Start]
     """What it may have some of."""
+    turn: int
+    """Number of the dice."""
+
+
+class Again(NamedTuple):
+    """A descent to go down once more from shortly before its end."""
+
+    way: Way
+    """What it has come by."""
     turn: int
     """Number of the dice."""
 
@@ -80,9 +89,13 @@ class Searcher:
         """
         rng = np.random.default_rng([self.seed, what.turn])
         start = near(what.start, what.others, self.lean, rng, direct=self.direct)
-        descent = self.begun(start, what.turn)
-        noise = NOISE * (rng.random() < _NOISY)
-        return descent.down(noise) if descent.end.fit.within else None
+        return _down(self.begun(start, what.turn), rng)
+
+    def again(self, what: Again) -> Way | None:
+        """The same from a program shortly before the end of a descent, written in another way."""
+        rng = np.random.default_rng([self.seed, what.turn, 2])
+        searching = self._searching(what.way.start, self.looked_at, what.turn)
+        return _down(Descent.again(what.way, rng, searching), rng)
 
     def closer(self, way: Way) -> Way | None:
         """On from what a descent has come by with more samples."""
@@ -96,6 +109,12 @@ class Searcher:
             return Search(fitting, self.seed + turn)
 
         return made
+
+
+def _down(descent: Descent, rng: np.random.Generator) -> Way | None:
+    """Until no more terms can go, half the times with noise; None where it does not begin within the budget."""
+    noise = NOISE * (rng.random() < _NOISY)
+    return descent.down(noise) if descent.end.fit.within else None
 
 
 class Hands:

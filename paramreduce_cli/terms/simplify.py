@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable, Sequence
 import numpy as np
 
 from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
-from paramreduce_cli.terms.searching import Near, Searcher, hands
+from paramreduce_cli.terms.searching import Again, Hands, Near, Searcher, hands
 from paramreduce_cli.terms.starts import Start, promising
 
 _LOOKED_AT = 200
@@ -19,7 +19,7 @@ _FEWEST, _MOST = 12, 30
 """How many these are at the least, and at most."""
 _WORK_NEARBY = 400_000
 """The same of those near the best ones, unless it is said how many they are."""
-_FEWEST_NEARBY, _MOST_NEARBY = 8, 64
+_FEWEST_NEARBY, _MOST_NEARBY = 8, 40
 """How many these are at the least, and at most."""
 _BEST = 4
 """Starts with the leanest ends, near which others are gone down from."""
@@ -46,12 +46,14 @@ def simplified(
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
     Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
-    formulations are changed at random; from the best ends it goes on with more samples.
+    formulations are changed at random; then once more from programs shortly before the best ends, written in other
+    ways, as long as that helps; from the best ends it goes on with more samples.
 
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        rounds: How many starts near the best ones are gone down from; None for as many as their operations allow.
+        rounds: How many starts near the best ones are gone down from, and how many descents once more may bring
+            nothing until these end; None for as many as their operations allow.
         jobs: Processes; what is found does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
 
@@ -70,12 +72,7 @@ def simplified(
     work = _work(searcher, begins)
     if rounds is None:
         rounds = int(np.clip(_WORK_NEARBY / work, _FEWEST_NEARBY, _MOST_NEARBY))
-    total = len(begins) + rounds + _CLOSELY
-    fewest: list[float] = []
-
-    def told(way: Way | None) -> None:
-        fewest.append(np.inf if way is None else way.fewest)
-        progress(len(fewest) / total, f"{min(fewest)} operations")
+    told = _Told(progress, len(begins) + 2 * rounds + _CLOSELY)
 
     def beside(ends: Sequence[Way], turn: int) -> Near:
         rng = np.random.default_rng([searcher.seed, turn, 1])
@@ -83,13 +80,14 @@ def simplified(
         parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
         return Near(parent.start, [one.start for one in best], turn)
 
-    pays = total * work > _MANY
+    pays = told.ahead * work > _MANY
     with hands(searcher, jobs if pays else 1, told) as working:
         ends = working.each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
             turns = range(first, min(first + _AT_ONCE, rounds))
             ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
             ends = slimmed(ends, _CLOSELY)
+        ends = _again(working, ends, rounds, told)
         close = working.each(Searcher.closer, leanest(ends, _CLOSELY))
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
@@ -97,6 +95,43 @@ def simplified(
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
     return found, front(ends + close)
+
+
+class _Told:
+    """Tells how far it is.
+
+    Args:
+        progress: Told what share is done, and the fewest operations so far.
+        ahead: Descents that are still to be made.
+    """
+
+    def __init__(self, progress: Callable[[float, str], None], ahead: int) -> None:
+        self._progress, self.ahead = progress, ahead
+        self._done, self._fewest = 0, np.inf
+
+    def __call__(self, way: Way | None) -> None:
+        """Of one more descent."""
+        self._done, self.ahead = self._done + 1, self.ahead - 1
+        self._fewest = min(self._fewest, np.inf if way is None else way.fewest)
+        self._progress(self._done / (self._done + self.ahead), f"{self._fewest} operations")
+
+    def more(self, ahead: int) -> None:
+        """So many descents are still to be made besides."""
+        self.ahead += ahead
+
+
+def _again(working: Hands, ends: list[Way], patience: int, told: _Told) -> list[Way]:
+    """Down once more from shortly before the best ends, until so many descents in a row have brought nothing."""
+    turn = since = 0
+    while since < patience:
+        best = leanest(ends, _BEST)
+        some = [Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience))]
+        ends = slimmed(ends + working.each(Searcher.again, some), _CLOSELY)
+        turn, since = turn + len(some), since + len(some)
+        if min(way.fewest for way in ends) < best[0].fewest:
+            told.more(since)
+            since = 0
+    return ends
 
 
 def _first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:

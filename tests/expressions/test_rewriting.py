@@ -7,6 +7,7 @@ from random_graphs import evaluated, expressions
 
 from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.graph import Graph
+from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.expressions.rewriting import rewrite
 from paramreduce_cli.expressions.rows import (
     COST,
@@ -120,9 +121,28 @@ def test_it_repeats_itself():
     for k in range(12):
         total = graph.add(graph.multiply(total, x[k % 5]), x[(3 * k + 1) % 5])
         outputs.append(graph.multiply(total, x[(2 * k) % 5]))
-    found = [least([Written(graph, outputs)]) for _ in range(2)]
-    assert found[0].graph.nodes == found[1].graph.nodes
-    assert found[0].outputs == found[1].outputs
+    for dice in (0, 1234567):
+        found = [least([Written(graph, outputs)], dice) for _ in range(2)]
+        assert found[0].graph.nodes == found[1].graph.nodes
+        assert found[0].outputs == found[1].outputs
+
+
+def test_other_dice_write_the_same_values_in_other_ways():
+    graph = Graph()
+    x = [graph.input(k) for k in range(7)]
+    rng = np.random.default_rng(0)
+    outputs = []
+    for _ in range(10):
+        total = x[int(rng.integers(7))]
+        for k in rng.permutation(7)[:4]:
+            total = graph.add(total, x[k])
+        outputs.append(total)
+    given = rng.normal(size=7)
+    expected = Program.of_graph(graph, outputs).evaluated([*given])
+    found = [Program.of_graph(*least([Written(graph, outputs)], dice)) for dice in (0, 1, 10**12)]
+    assert len(set(found)) > 1
+    for one in found:
+        np.testing.assert_allclose(one.evaluated([*given]), expected, rtol=1e-12)
 
 
 def test_where_nothing_can_be_rewritten_it_ends():

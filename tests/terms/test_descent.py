@@ -84,6 +84,30 @@ def test_noise_finds_other_ends_and_the_same_seed_the_same(begun):
     assert best[0].rank != best[1].rank
 
 
+def test_once_more_it_begins_shortly_before_the_end_with_the_same_function(arm, begun):
+    first = begun()
+    way = first.down()
+    looked_at = samples(arm, 100, 0)
+
+    def again(turn):
+        return Descent.again(way, np.random.default_rng(turn), first.searching)
+
+    known = np.array([passed.excess for passed in way.visited.values()])
+    sizes = set()
+    for turn in range(6):
+        one = again(turn)
+        assert one.end.count <= way.fewest / 0.88
+        whole = one.way.simplified(one.visited[one.end.count])
+        error, _ = looked_at.errors(whole.outputs(looked_at.states))
+        # That of a program on the way, whatever it is written in.
+        assert np.abs(known * BUDGET.torque / error - 1).min() < 1e-6
+        sizes.add(one.search.tape.size)
+    assert len(sizes) > 1
+    ends = [again(turn).down().rank for turn in (0, 0, 1, 2)]
+    assert ends[0] == ends[1]
+    assert len(set(ends)) > 1
+
+
 def test_leaner_ends_are_drawn_more_often():
     ends = [SimpleNamespace(fewest=fewest) for fewest in (104, 100, 102)]
     rng = np.random.default_rng(0)

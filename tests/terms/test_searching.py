@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.searching import Near, Searcher, hands
+from paramreduce_cli.terms.searching import Again, Near, Searcher, hands
 
 
 def found(searcher, start, jobs):
@@ -13,6 +13,7 @@ def found(searcher, start, jobs):
     with hands(searcher, jobs, lambda way: told.append(way.rank)) as working:
         ends = working.each(Searcher.down, [start])
         ends += working.each(Searcher.nearby, [Near(start, [start], turn) for turn in range(6)])
+        ends += working.each(Searcher.again, [Again(ends[k], k) for k in range(4)])
         close = working.each(Searcher.closer, ends)
     assert sorted(told) == sorted(one.rank for one in ends + close)
     return [one.rank for one in ends + close]

@@ -1,5 +1,7 @@
 """How much is searched for one function."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,16 +11,37 @@ from paramreduce_cli.terms.searching import Searcher
 
 @pytest.mark.parametrize(
     ("rounds", "allowed", "expected"),
-    [(None, 0, 8), (None, 20, 20), (None, np.inf, 64), (3, np.inf, 3), (0, np.inf, 0)],
+    [(None, 0, 8), (None, 20, 20), (None, np.inf, 40), (3, np.inf, 3), (0, np.inf, 0)],
 )
 def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
     searcher, start, monkeypatch, rounds, allowed, expected
 ):
     turns = []
     monkeypatch.setattr(Searcher, "nearby", lambda self, what: turns.append(what.turn))
+    monkeypatch.setattr(Searcher, "again", lambda self, what: None)
     whole = 2 * searcher.begun(start).way.fewest
     monkeypatch.setattr(simplify, "_WORK_NEARBY", allowed * whole)
     found, front = simplify.simplified(searcher, [start], rounds=rounds)
     assert turns == list(range(expected))
     assert found[0].program.n_operations == min(one.program.n_operations for one in found)
     assert front
+
+
+@pytest.mark.parametrize(("gains", "expected"), [((), 24), ((3,), 32), ((3, 20), 48), ((30,), 24)])
+def test_descents_once_more_go_on_until_so_many_in_a_row_bring_nothing(
+    searcher, start, monkeypatch, gains, expected
+):
+    turns, told = [], []
+
+    def again(self, what):
+        turns.append(what.turn)
+        fewest = what.way.fewest - 1 if what.turn in gains else what.way.fewest + 1
+        return replace(what.way, fewest=fewest)
+
+    monkeypatch.setattr(Searcher, "nearby", lambda self, what: None)
+    monkeypatch.setattr(Searcher, "again", again)
+    simplify.simplified(
+        searcher, [start], rounds=24, progress=lambda share, remark: told.append(share)
+    )
+    assert turns == list(range(expected))
+    assert max(told) <= 1.0
