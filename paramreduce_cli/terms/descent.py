@@ -140,7 +140,7 @@ class Descent:
     def begun(cls, start: Start, program: Program, searching: Callable[[Tape], Search]) -> Descent:
         """With all terms of a program, whose first inputs are the parameters of the start."""
         program, units = rescaled(program, start.model.n)
-        return cls._of(Simplified(start, program, start.model.values / units, units), searching)
+        return cls._of(Simplified(start, program, start.model.values / units, units), searching, {})
 
     @classmethod
     def again(
@@ -148,7 +148,8 @@ class Descent:
     ) -> Descent:
         """From a program shortly before the end of a descent, written in another way.
 
-        Where sums and products were rearranged by other dice, it has other terms to leave out.
+        Where sums and products were rearranged by other dice, it has other terms to leave out. What the descent passed
+        before stays with it, as on other samples a dearer program may be the one to go on from.
 
         Args:
             way: What the descent has come by.
@@ -156,15 +157,19 @@ class Descent:
             searching: Makes searches.
         """
         near = [count for count in sorted(way.visited) if count <= way.fewest / _LEG]
-        passed = way.visited[int(rng.choice(near))]
-        return cls._of(way.simplified(passed, int(rng.integers(_DICE))), searching)
+        count = int(rng.choice(near))
+        dearer = {known: passed for known, passed in way.visited.items() if known > count}
+        whole = way.simplified(way.visited[count], int(rng.integers(_DICE)))
+        return cls._of(whole, searching, dearer)
 
     @classmethod
-    def _of(cls, whole: Simplified, searching: Callable[[Tape], Search]) -> Descent:
-        """With all terms of a program."""
+    def _of(
+        cls, whole: Simplified, searching: Callable[[Tape], Search], visited: dict[int, Passed]
+    ) -> Descent:
+        """With all terms of a program, after others on the way to it."""
         search = searching(Tape(whole.program))
         end = search.start(whole.beta)
-        descent = cls(whole.start, searching, search, end, whole.units, {})
+        descent = cls(whole.start, searching, search, end, whole.units, visited)
         descent._note(end)
         return descent
 
@@ -243,7 +248,9 @@ def gone_on(way: Way, searching: Callable[[Tape], Search]) -> Way | None:
 
 def leanest(ways: Iterable[Way], number: int) -> list[Way]:
     """Those with the leanest different ends, so many at most."""
-    different = {way.rank: way for way in ways}
+    different: dict[tuple[int, float], Way] = {}
+    for way in ways:
+        different.setdefault(way.rank, way)
     return [different[rank] for rank in sorted(different)[:number]]
 
 

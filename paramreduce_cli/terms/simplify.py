@@ -125,7 +125,9 @@ def _again(working: Hands, ends: list[Way], patience: int, told: _Told) -> list[
     turn = since = 0
     while since < patience:
         best = leanest(ends, _BEST)
-        some = [Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience))]
+        some = [
+            Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience - since))
+        ]
         ends = slimmed(ends + working.each(Searcher.again, some), _CLOSELY)
         turn, since = turn + len(some), since + len(some)
         if min(way.fewest for way in ends) < best[0].fewest:

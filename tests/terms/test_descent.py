@@ -102,6 +102,9 @@ def test_once_more_it_begins_shortly_before_the_end_with_the_same_function(arm, 
         # That of a program on the way, whatever it is written in.
         assert np.abs(known * BUDGET.torque / error - 1).min() < 1e-6
         sizes.add(one.search.tape.size)
+        # What was passed before stays, nothing beyond.
+        assert min(one.visited) == one.end.count
+        assert max(one.visited) == max(way.visited)
     assert len(sizes) > 1
     ends = [again(turn).down().rank for turn in (0, 0, 1, 2)]
     assert ends[0] == ends[1]

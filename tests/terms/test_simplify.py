@@ -27,9 +27,21 @@ def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
     assert front
 
 
-@pytest.mark.parametrize(("gains", "expected"), [((), 24), ((3,), 32), ((3, 20), 48), ((30,), 24)])
+def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_samples(
+    searcher, start, monkeypatch
+):
+    found, _ = simplify.simplified(searcher, [start], rounds=8)
+    monkeypatch.setattr(Searcher, "again", lambda self, what: None)
+    without, _ = simplify.simplified(searcher, [start], rounds=8)
+    assert found[0].program.n_operations <= without[0].program.n_operations
+
+
+@pytest.mark.parametrize(
+    ("rounds", "gains", "expected"),
+    [(24, (), 24), (24, (3,), 32), (24, (3, 20), 48), (24, (30,), 24), (12, (), 12), (3, (), 3)],
+)
 def test_descents_once_more_go_on_until_so_many_in_a_row_bring_nothing(
-    searcher, start, monkeypatch, gains, expected
+    searcher, start, monkeypatch, rounds, gains, expected
 ):
     turns, told = [], []
 
@@ -41,7 +53,7 @@ def test_descents_once_more_go_on_until_so_many_in_a_row_bring_nothing(
     monkeypatch.setattr(Searcher, "nearby", lambda self, what: None)
     monkeypatch.setattr(Searcher, "again", again)
     simplify.simplified(
-        searcher, [start], rounds=24, progress=lambda share, remark: told.append(share)
+        searcher, [start], rounds=rounds, progress=lambda share, remark: told.append(share)
     )
     assert turns == list(range(expected))
     assert max(told) <= 1.0
