@@ -31,7 +31,7 @@ _LIKELY = 2.0
 _ON_THE_WAY = 16
 """Programs of a front."""
 _DICE = 2**40
-"""Ways for them to fall."""
+"""Ways for the dice of rewriting to fall."""
 _EXACT = 1e-18
 """Squared share of the budget below which errors are no more than rounding."""
 
