@@ -107,8 +107,8 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
     term = found.functions.get(name)
     if term is None:
         raise ConfigError(
-            f"--model {TERMS}: terms.h5 has no {name} dynamics; name it under terms.functions and run "
-            "`paramreduce reduce-terms`."
+            f"--model {TERMS}: terms.h5 has no {name} dynamics; it has to stand under terms.functions, and "
+            "`paramreduce reduce-terms` to find something within the budget."
         )
     errors = [term.torque_error_estimation, term.torque_error_validation]
     known = " / ".join(share(error) for error in errors if error == error)

@@ -29,6 +29,7 @@ from paramreduce_cli.records import (
     TermModel,
     Validation,
 )
+from paramreduce_cli.texts import share
 from paramreduce_cli.texts.table import Table
 
 _TASK = "write code"
@@ -201,12 +202,26 @@ def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
         "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are"
     ]
     lines += _ranges(mechanism, simplified.lower, simplified.upper)
-    largest = ", ".join(f"{value:.3g}" for value in simplified.largest_difference)
     where = "both sets"
     if np.isfinite(simplified.random_torque_error):
-        error = f"{100 * simplified.random_torque_error:.3g} %"
-        where = f"random states inside, where the torque error is {error}"
-    lines.append(f"Largest differences of torques by joint, N m or N: {largest}, on {where}.")
+        where = f"random states inside, where the torque error is {share(simplified.random_torque_error)}"
+    lines.append(f"Largest differences of torques, N m or N, on {where}:")
+    lines += [
+        f"  {name}: {value:.3g}"
+        for name, value in zip(
+            mechanism.coordinate_names, simplified.largest_difference.tolist(), strict=True
+        )
+    ]
+    errors = (simplified.acceleration_error_estimation, simplified.acceleration_error_validation)
+    known = " / ".join(share(error) for error in errors if np.isfinite(error))
+    if known:
+        lines.append(f"Error of the accelerations (estimation / validation): {known}.")
+    if np.isfinite(simplified.smallest_eigenvalue):
+        random = simplified.random_states
+        besides = f" and on {random} random states inside the ranges" if random else ""
+        lines.append(
+            f"Smallest eigenvalue of M on both sets{besides}: {simplified.smallest_eigenvalue:.3g}."
+        )
     return lines
 
 

@@ -23,6 +23,7 @@ from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduc
 from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages import reduce_terms
 from paramreduce_cli.terms import simplify
+from paramreduce_cli.texts import share
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
 STAGES = {stage.name: stage for stage in pipeline()}
@@ -190,25 +191,67 @@ def test_units_of_parameters_are_said(two_link):
 
 
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
-def test_the_exported_c_has_the_reported_error_on_the_validation_set(two_link):
+@pytest.mark.parametrize("name", ["inverse", "direct"])
+def test_the_exported_c_has_the_reported_errors_on_the_validation_set(two_link, name):
     model, samples = loaded(two_link, Model), loaded(two_link, Samples)
-    chosen, term, title = simplified_model(loaded(two_link, TermReduction), "inverse")
-    files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=term)
+    chosen, term, title = simplified_model(loaded(two_link, TermReduction), name)
+    what = Exported.IDM if name == "inverse" else Exported.DDM
+    files = export(model, chosen, title=title, language="c", what=what, simplified=term)
     header, source = files["two_link.h"].decode(), files["two_link.c"].decode()
-    assert "TERMS WERE LEFT OUT" in header
-    assert "velocity -3" in header or "velocity -2" in header, "ranges stand in the header"
     library = load(header + source.replace('#include "two_link.h"', ""))
-    off = total = 0.0
-    phi = np.ascontiguousarray(term.values)
+    function = getattr(library, f"two_link_{name}_dynamics")
+    off, total = np.zeros(2), np.zeros(2)
+
+    def called(given, *outputs):
+        arrays = [np.ascontiguousarray(one) for one in (term.values, *given)]
+        function(*[ctypes.c_void_p(one.ctypes.data) for one in (*arrays, *outputs)])
+
     for block in samples.validation.blocks():
         for q, dq, ddq, tau in zip(block.q, block.dq, block.ddq, block.tau, strict=True):
-            given = np.empty(2)
-            arrays = [np.ascontiguousarray(a) for a in (phi, q, dq, ddq)]
-            pointers = [ctypes.c_void_p(a.ctypes.data) for a in (*arrays, given)]
-            library.two_link_inverse_dynamics(*pointers)
-            off += np.sum(((given - tau) / samples.nominal_torque) ** 2)
-            total += np.sum((tau / samples.nominal_torque) ** 2)
-    assert term.torque_error_validation == pytest.approx(np.sqrt(off / total), rel=1e-9)
+            torques, M, delta = np.empty(2), np.empty((2, 2)), np.empty(2)
+            if name == "inverse":
+                called((q, dq, ddq), torques)
+                motion = ddq
+            else:
+                called((q, dq), M, delta)
+                torques, motion = M @ ddq + delta, np.linalg.solve(M, tau - delta)
+            for k, (found, true, nominal) in enumerate(
+                [
+                    (torques, tau, samples.nominal_torque),
+                    (motion, ddq, samples.nominal_acceleration),
+                ]
+            ):
+                off[k] += np.sum(((found - true) / nominal) ** 2)
+                total[k] += np.sum((true / nominal) ** 2)
+    torque_error, acceleration_error = np.sqrt(off / total)
+    assert term.torque_error_validation == pytest.approx(torque_error, rel=1e-9)
+    if name == "direct":
+        assert term.acceleration_error_validation == pytest.approx(acceleration_error, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["inverse", "direct"])
+def test_the_exported_header_says_where_a_function_holds(two_link, name):
+    model = loaded(two_link, Model)
+    chosen, term, title = simplified_model(loaded(two_link, TermReduction), name)
+    what = Exported.IDM if name == "inverse" else Exported.DDM
+    files = export(model, chosen, title=title, language="c", what=what, simplified=term)
+    header = " ".join(files["two_link.h"].decode().replace("*", " ").split())
+    assert "TERMS WERE LEFT OUT" in header
+    joints = zip(
+        model.mechanism.coordinate_names, term.lower.T, term.upper.T, term.largest_difference,
+        strict=True,
+    )  # fmt: skip
+    for joint, lower, upper, largest in joints:
+        assert (
+            f"{joint}: position {lower[0]:.4g} to {upper[0]:.4g} rad, velocity {lower[1]:.4g}"
+            in header
+        )
+        assert f"{joint}: {largest:.3g} " in header
+    assert f"torque error is {share(term.random_torque_error)}" in header
+    said = f"100000 random states inside the ranges: {term.smallest_eigenvalue:.3g}."
+    assert (said in header) == (name == "direct")
+    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    assert (" / ".join(map(share, errors)) in header) == (name == "direct")
 
 
 def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypatch):
@@ -240,6 +283,11 @@ def test_summary_and_page(two_link, tmp_path):
         assert one["pareto"][0]["operations"] <= one["operations"]
     page = path.with_name("index.html").read_text()
     assert "Without small terms" in page
+    term = loaded(runner, TermReduction).functions["direct"]
+    ranges = (path.parent / "tables" / "term-ranges.csv").read_text()
+    assert f"{term.lower[0, 0]:.4g} to {term.upper[0, 0]:.4g}" in ranges
+    assert f"{term.largest_difference[1]:.3g}" in ranges
+    assert f"{term.lower[1, 1]:.4g} to {term.upper[1, 1]:.4g}" in page
     assert (path.parent / "figures" / "terms.svg").exists()
 
 
@@ -310,3 +358,17 @@ def test_bad_input(two_link, invoke, tmp_path):
         "export", path, *common, *sets, "--model", "terms", "--what", "regressor", code=2
     )
     assert "each function has values of its own" in refused.err
+    refused = invoke(
+        "export",
+        path,
+        *common,
+        *sets,
+        "--model",
+        "terms",
+        "--what",
+        "idm",
+        "--format",
+        "urdf",
+        code=2,
+    )
+    assert "not to a robot's file" in refused.err

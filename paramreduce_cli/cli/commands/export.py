@@ -99,6 +99,11 @@ def export(
         raise click.UsageError("--single goes with --format c.")
     if kind in (*FORMATS, VALUES) and (what != Exported.BOTH or constants) and text != TERMS:
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
+    if text == TERMS and kind in FORMATS:
+        raise click.UsageError(
+            f"--model {TERMS}: its values are of use to one function alone, not to a robot's file; "
+            f"write code, or --format {VALUES}."
+        )
     if text == TERMS and what not in _FUNCTIONS:
         raise click.UsageError(
             f"--model {TERMS}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."

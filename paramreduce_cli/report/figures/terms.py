@@ -11,7 +11,7 @@ from paramreduce_cli.report.style import FUNCTIONS, legend_beside, pair_of_plots
 
 @placed(PageSection.TERMS, 0)
 def terms(data: ReportData) -> Figure | None:
-    """Torque error against operations: the best models of fewer parameters, and the same with terms left out on the way to the budget. Filled: estimation set; hollow: validation set."""
+    """Torque error against operations: the best models of fewer parameters, for the direct dynamics of those whose mass matrix is positive definite, and the same with terms left out on the way to the budget. Filled: estimation set; hollow: validation set."""
     if data.terms is None:
         return None
     drawn, *axes = pair_of_plots()
@@ -19,11 +19,13 @@ def terms(data: ReportData) -> Figure | None:
         found = [
             (float(cost), float(error))
             for result in data.validation.heuristics.values()
-            for cost, error in zip(
+            for cost, error, eigenvalue in zip(
                 getattr(result, f"operations_{key}"),
                 visible(result.torque_error_estimation),
+                result.mass_matrix_smallest_eigenvalue,
                 strict=True,
             )
+            if key == "inverse" or eigenvalue > 0
         ]
         stairs = np.array(staircase(found))
         if stairs.size:

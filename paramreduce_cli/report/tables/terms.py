@@ -11,7 +11,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TERMS, 1)
 def terms(data: ReportData) -> Table:
-    """Errors on the estimation (E) and the validation set (V) and on random states inside the ranges, the largest difference of a joint's torque there, N m (N), and the smallest eigenvalue of all mass matrices."""
+    """Errors on the estimation (E) and the validation set (V) and on random states inside the ranges, what is the largest difference of a joint's torque there as a share of its nominal torque, N m (N), and the smallest eigenvalue of all mass matrices."""
     header = (
         "function", "n", "operations", "before", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "ε_τ random",
         "largest", "smallest eigenvalue",
