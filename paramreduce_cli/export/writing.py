@@ -119,7 +119,7 @@ def export(
         heading=(f"{mechanism.robot}: {title}.", *worth, *_made(mechanism, origin)),
         frames=_frames(mechanism),
         coordinates=mechanism.generalised_names,
-        units=tuple("rad" if b.joint == "revolute" else "m" for b in mechanism.bodies),
+        units=tuple(body.unit for body in mechanism.bodies),
         independent=np.array(mechanism.independent, dtype=np.int64),
         parameters=_parameter_values(model, chosen),
         symbols=mechanism.symbols,
@@ -176,8 +176,7 @@ def _ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[
     """Of states, (3, n_dof) each, a line for every joint."""
     lines = []
     for j, name in enumerate(mechanism.coordinate_names):
-        kind = mechanism.bodies[mechanism.independent[j]].joint
-        unit = "rad" if kind == "revolute" else "m"
+        unit = mechanism.bodies[mechanism.independent[j]].unit
         kinds = (f"{unit}, velocity", f"{unit}/s, acceleration", f"{unit}/s^2")
         ranges = (
             f"{low:.4g} to {high:.4g}" for low, high in zip(lower[:, j], upper[:, j], strict=True)

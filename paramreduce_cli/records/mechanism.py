@@ -51,6 +51,11 @@ class Body:
     intermediate: bool = False
     """Whether it is but a frame between the axes of one joint."""
 
+    @property
+    def unit(self) -> str:
+        """Of the joint's coordinate."""
+        return "rad" if self.joint == "revolute" else "m"
+
 
 ClosureKind = Literal[
     "fixed", "revolute", "prismatic", "cylindrical", "universal", "point", "planar", "distance",
