@@ -29,7 +29,14 @@ from paramreduce_cli.fields.section import (
     Span,
     per_joint,
 )
-from paramreduce_cli.records import CountedDynamics, JointLimits, Kind, Parameter
+from paramreduce_cli.records import (
+    Constraint,
+    CountedDynamics,
+    JointLimits,
+    Kind,
+    Mechanism,
+    Parameter,
+)
 from paramreduce_cli.robots import Robot
 
 Method = Annotated[str, OneMethod()]
@@ -110,6 +117,13 @@ class TrajectoriesSection(Section):
             torque=per_joint(self.torque_limits or [np.inf], n_dof),
             power=per_joint(self.power_limits or [np.inf], n_dof),
         )
+
+    def bounded(self, mechanism: Mechanism) -> tuple[Constraint, ...]:
+        """What is bounded besides the coordinates: constraints, then clearances."""
+        given = [entry.constraint(mechanism) for entry in self.constraints]
+        if self.clearance is not None:
+            given += self.clearance.constraints(mechanism)
+        return tuple(given)
 
 
 class InputSection(Section):

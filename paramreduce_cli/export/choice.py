@@ -112,9 +112,12 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         )
     errors = [term.torque_error_estimation, term.torque_error_validation]
     known = " / ".join(share(error) for error in errors if error == error)
+    allowed = share(found.torque_budget)
+    if name == "direct" and found.acceleration_budget < float("inf"):
+        allowed += f", of accelerations {share(found.acceleration_budget)}"
     title = (
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
-        f"torque error {known} (estimation / validation)"
+        f"torque error {known} (estimation / validation), allowed {allowed}"
     )
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)

@@ -17,6 +17,7 @@ from paramreduce_cli.export.check import (
 )
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
 from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.validity import validity, within
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
 from paramreduce_cli.records import (
@@ -29,7 +30,6 @@ from paramreduce_cli.records import (
     TermModel,
     Validation,
 )
-from paramreduce_cli.texts import share
 from paramreduce_cli.texts.table import Table
 
 _TASK = "write code"
@@ -144,9 +144,10 @@ def _worth(
         names = ", ".join(model.unmeasured)
         lines.append(f"NOT PREDICTED, as not measured: the torques of {names}.")
     if validation is not None:
-        lines += _validated(model.mechanism, validation)
+        lines.append("Errors were measured on motions within")
+        lines += within(model.mechanism, validation.lower, validation.upper)
     if simplified is not None:
-        lines += _validity(model.mechanism, simplified)
+        lines += validity(model.mechanism, simplified)
     return lines
 
 
@@ -166,62 +167,11 @@ def _rounding(functions: tuple[Function, ...], checked: Mapping[str, FloatArray]
     return f"Single precision, on {_CHECKED} random states off by about (of the largest): {listed}."
 
 
-def _validated(mechanism: Mechanism, validation: Validation) -> list[str]:
-    """What the errors were measured on, line by line."""
-    lines = ["Errors were measured on motions within"]
-    return lines + _ranges(mechanism, validation.lower, validation.upper)
-
-
-def _ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
-    """Of states, (3, n_dof) each, a line for every joint."""
-    lines = []
-    for j, name in enumerate(mechanism.coordinate_names):
-        unit = mechanism.bodies[mechanism.independent[j]].unit
-        kinds = (f"{unit}, velocity", f"{unit}/s, acceleration", f"{unit}/s^2")
-        ranges = (
-            f"{low:.4g} to {high:.4g}" for low, high in zip(lower[:, j], upper[:, j], strict=True)
-        )
-        lines.append(
-            f"  {name}: position "
-            + " ".join(f"{r} {k}" for r, k in zip(ranges, kinds, strict=True))
-        )
-    return lines
-
-
 def _frames(mechanism: Mechanism) -> tuple[str, ...]:
     """The geometry of the config, line by line."""
     header, *rows = mechanism.table
     lines = Table(mechanism.frames, header, tuple(rows)).to_text().splitlines()
     return tuple(f"  {line}".rstrip() for line in lines if line)
-
-
-def _validity(mechanism: Mechanism, simplified: TermModel) -> list[str]:
-    """Where a function with terms left out holds, line by line."""
-    lines = [
-        "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are"
-    ]
-    lines += _ranges(mechanism, simplified.lower, simplified.upper)
-    where = "both sets"
-    if np.isfinite(simplified.random_torque_error):
-        where = f"random states inside, where the torque error is {share(simplified.random_torque_error)}"
-    lines.append(f"Largest differences of torques, N m or N, on {where}:")
-    lines += [
-        f"  {name}: {value:.3g}"
-        for name, value in zip(
-            mechanism.coordinate_names, simplified.largest_difference.tolist(), strict=True
-        )
-    ]
-    errors = (simplified.acceleration_error_estimation, simplified.acceleration_error_validation)
-    known = " / ".join(share(error) for error in errors if np.isfinite(error))
-    if known:
-        lines.append(f"Error of the accelerations (estimation / validation): {known}.")
-    if np.isfinite(simplified.smallest_eigenvalue):
-        random = simplified.random_states
-        besides = f" and on {random} random states inside the ranges" if random else ""
-        lines.append(
-            f"Smallest eigenvalue of M on both sets{besides}: {simplified.smallest_eigenvalue:.3g}."
-        )
-    return lines
 
 
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:

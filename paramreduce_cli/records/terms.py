@@ -67,17 +67,27 @@ class TermModel:
     """Not a number for the inverse dynamics, like all that is of accelerations."""
     acceleration_error_validation: float
     random_torque_error: float
-    """On random states inside the ranges; not a number where the torques are not known there."""
+    """On random states inside the limits; not a number where the torques are not known there."""
+    random_acceleration_error: float
+    random_states: int
+    """How many these are; 0 where torques were measured, or no states of loops were found."""
     largest_difference: FloatArray
     """Largest difference of each joint's torque on those states, else on both sets, N m (N), (n_dof,)."""
+    worst_joint: int
+    """The joint whose largest difference is the largest share of its nominal torque."""
+    worst_state: FloatArray
+    """Where that is, z, dz and ddz, (3, n_dof)."""
     smallest_eigenvalue: float
     """Of all mass matrices looked at, kg m^2 (kg)."""
-    random_states: int
-    """How many random states mass matrices were looked at on."""
+    mass_states: int
+    """How many random states inside the limits mass matrices were looked at on."""
     lower: FloatArray
     """Smallest z, dz and ddz of the estimation set, (3, n_dof): the model holds within."""
     upper: FloatArray
     """The largest."""
+    limits: FloatArray
+    """Smallest and largest z, dz and ddz of random states, those that the config allows; what has no limit is
+    inside what the estimation set reaches, (2, 3, n_dof)."""
     front: TermFront
 
 

@@ -244,6 +244,23 @@ def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
                 y["operations"] <= most,
             )
         yield from _exact(f"budget of terms, {name}", x["budget"], y["budget"])
+        yield from _kept_budget(name, x, y)
+
+
+def _kept_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
+    """What must hold of a function however its terms were left out, as far as it held at first."""
+    for kind, allowed in x["budget"].items():
+        for part, before in x[f"{kind}_error"].items():
+            now = y[f"{kind}_error"][part]
+            if before is not None and allowed is not None and before <= allowed:
+                holds = now is not None and now <= allowed
+                if not holds:
+                    what = f"{kind} error without small terms, {name}, {part}"
+                    yield Difference(what, f"{before:.6g} of {allowed:.6g}", _text(now), False)
+    before, now = x["smallest_eigenvalue"], y["smallest_eigenvalue"]
+    if before is not None and (now is None or now <= 0 < before):
+        what = f"smallest eigenvalue without small terms, {name}"
+        yield Difference(what, _text(before), _text(now), False)
 
 
 QUANTITIES: dict[str, Quantity] = {

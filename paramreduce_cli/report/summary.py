@@ -56,7 +56,7 @@ def summary_of(
         },
         "full": dict(validation.full),
         "identification": _identification(identification),
-        "terms": _terms(terms),
+        "terms": _terms(model, terms),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,
@@ -184,9 +184,9 @@ def _identification(found: Identification | None) -> dict[str, Any] | None:
     }
 
 
-def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
+def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, Any]]:
     """Functions with terms left out; empty where that was not asked for."""
-    if found is None:
+    if model is None or found is None:
         return []
     return [
         {
@@ -198,8 +198,15 @@ def _terms(found: TermReduction | None) -> list[dict[str, Any]]:
             "operations_start": one.operations_start,
             **_errors(one),
             "random_torque_error": one.random_torque_error,
+            "random_acceleration_error": one.random_acceleration_error,
+            "random_states": one.random_states,
             "largest_difference": one.largest_difference,
+            "worst_joint": model.mechanism.coordinate_names[one.worst_joint],
+            "worst_state": one.worst_state,
             "smallest_eigenvalue": one.smallest_eigenvalue,
+            "mass_states": one.mass_states,
+            "ranges": [one.lower, one.upper],
+            "limits": one.limits,
             "parameters": dict(zip(one.names, one.values, strict=True)),
             "units": dict(zip(one.names, one.units, strict=True)),
             "pareto": [

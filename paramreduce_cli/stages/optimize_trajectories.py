@@ -15,7 +15,6 @@ from paramreduce_cli.records import (
     Constraint,
     FloatArray,
     JointLimits,
-    Mechanism,
     Model,
     Run,
     Share,
@@ -70,7 +69,7 @@ def excitation_task(
         base_values=model.base_values,
         torque_scale=_torque_scale(wanted, model.nominal_torque),
         criterion=wanted.criterion,
-        constraints=_constraints(wanted, model.mechanism),
+        constraints=wanted.bounded(model.mechanism),
         settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
@@ -82,13 +81,6 @@ def _torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> Fl
         return nominal_torque
     noise = per_joint(wanted.torque_noise, nominal_torque.size)
     return np.where(np.isfinite(nominal_torque), noise, np.inf)
-
-
-def _constraints(wanted: TrajectoriesSection, mechanism: Mechanism) -> tuple[Constraint, ...]:
-    given = [entry.constraint(mechanism) for entry in wanted.constraints]
-    if wanted.clearance is not None:
-        given += wanted.clearance.constraints(mechanism)
-    return tuple(given)
 
 
 def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonics: int) -> Settings:

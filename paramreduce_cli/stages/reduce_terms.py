@@ -1,11 +1,13 @@
 """reduce-terms: functions of reduced models with terms left out."""
 
 import warnings
-from dataclasses import replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
-from paramreduce_cli.config.schema import SamplingSection
+from paramreduce_cli.config.schema import SamplingSection, TrajectoriesSection
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.lean.formulations import formulations_for
@@ -27,7 +29,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.judging import Judge
+from paramreduce_cli.terms.judging import Errors, Judge
 from paramreduce_cli.terms.searching import LookedAt, Searcher
 from paramreduce_cli.terms.simplify import simplified
 from paramreduce_cli.terms.starts import starts_within
@@ -47,6 +49,7 @@ _FITTED = 1000
 
 def reduce_terms(
     section: TermsSection | None,
+    trajectories: TrajectoriesSection,
     sampling: SamplingSection,
     counted: CountedDynamics,
     model: Model,
@@ -75,7 +78,16 @@ def reduce_terms(
         functions = {}
         for name in share.dealt(names):
             found = _searched(
-                name, section, budget, sampling, counted, model, samples, reduction, run
+                name,
+                section,
+                budget,
+                trajectories,
+                sampling,
+                counted,
+                model,
+                samples,
+                reduction,
+                run,
             )
             functions |= {} if found is None else {name: found}
     functions = {name: functions[name] for name in names if name in functions}
@@ -88,6 +100,7 @@ def _searched(
     name: str,
     section: TermsSection,
     budget: Budget,
+    trajectories: TrajectoriesSection,
     sampling: SamplingSection,
     counted: CountedDynamics,
     model: Model,
@@ -106,9 +119,11 @@ def _searched(
     smallest = [start.model.kept for start in starts[:_SMALLEST]]
     suited = replace(model, formulations=formulations_for(model, smallest, direct=direct))
     lean = LeanModels(suited, independent=projected)
+    mechanism = model.mechanism
     judge = Judge(
-        model, samples, reduction.nominal_torque, direct=direct,
-        projected=projected, measured=measured,
+        model, samples, reduction.nominal_torque,
+        trajectories.limits(mechanism.n_dof), trajectories.bounded(mechanism),
+        direct=direct, projected=projected, measured=measured,
     )  # fmt: skip
 
     def progress(share: float, remark: str) -> None:
@@ -122,9 +137,46 @@ def _searched(
         searcher, starts, rounds=section.rounds, jobs=run.jobs, progress=progress
     )
     fitted = judge.thinned(samples.estimation, _FITTED)
-    way = [one.refitted(fitted, budget) for one in front]
-    records = (_record(one.refitted(fitted, budget), judge, budget, way, lean) for one in found)
+    way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in front]
+    ends = (one.refitted(fitted, budget) for one in found)
+    records = (_record(one, judge, way, lean) for one in _in_order(ends, judge, budget))
     return next((record for record in records if record is not None), None)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A program and its errors on both sets."""
+
+    program: Simplified
+    errors: tuple[Errors, Errors]
+    strain: float
+    """The largest as a share of the budget."""
+
+    @classmethod
+    def of(cls, program: Simplified, judge: Judge, budget: Budget) -> "Judged":
+        """Of a program."""
+        errors = judge.errors(program)
+        return cls(program, errors, judge.strain(errors, budget))
+
+    @property
+    def rank(self) -> tuple[int, float]:
+        """The less the better."""
+        return self.program.program.n_operations, self.strain
+
+
+def _in_order(ends: Iterable[Simplified], judge: Judge, budget: Budget) -> Iterator[Judged]:
+    """Those within the budget, the leanest first, the more exact ones of as many operations before others.
+
+    Args:
+        ends: Programs, the leanest first; they are judged when they are asked for.
+        judge: Judges them.
+        budget: Of errors.
+    """
+    for _, alike in groupby(ends, lambda one: one.program.n_operations):
+        judged = sorted(
+            (Judged.of(one, judge, budget) for one in alike), key=lambda one: one.strain
+        )
+        yield from (one for one in judged if one.strain <= 1)
 
 
 def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
@@ -161,18 +213,14 @@ def _say_missing(names: list[str], others: bool) -> None:
     warnings.warn(f"terms.torque_error: {text}", ParamreduceWarning, stacklevel=3)
 
 
-def _record(
-    one: Simplified, judge: Judge, budget: Budget, way: list[Simplified], lean: LeanModels
-) -> TermModel | None:
-    """A program with what it is worth and those on the way to it; None if it is not within the budget."""
-    estimation, validation = errors = judge.errors(one)
-    if not judge.allowed(errors, budget):
-        return None
+def _record(judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels) -> TermModel | None:
+    """A program with what it is worth and those on the way to it; None if not all of its M are positive definite."""
+    one, (estimation, validation) = judged.program, judged.errors
     smallest, states = judge.smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
     if judge.direct and not smallest > 0:
         return None
     model, program = one.compact()
-    random, largest = judge.random(one)
+    strayed = judge.strayed(one)
     whole = (lean.direct if judge.direct else lean.inverse)(one.start.model)
     return TermModel(
         heuristic=one.start.heuristic,
@@ -189,26 +237,30 @@ def _record(
         torque_error_validation=validation[0],
         acceleration_error_estimation=estimation[1],
         acceleration_error_validation=validation[1],
-        random_torque_error=random,
-        largest_difference=largest,
+        random_torque_error=strayed.torque_error,
+        random_acceleration_error=strayed.acceleration_error,
+        random_states=strayed.states,
+        largest_difference=strayed.largest,
+        worst_joint=strayed.worst_joint,
+        worst_state=strayed.worst_state,
         smallest_eigenvalue=smallest,
-        random_states=states,
+        mass_states=states,
         lower=judge.lower,
         upper=judge.upper,
-        front=_front(judge, [*way, one]),
+        limits=judge.limits,
+        front=_front([*way, judged]),
     )
 
 
-def _front(judge: Judge, programs: list[Simplified]) -> TermFront:
-    """What programs are worth that no leaner one beats."""
-    judged = sorted((one.program.n_operations, *judge.errors(one)) for one in programs)
-    kept = judged[:1]
-    for entry in judged[1:]:
-        if entry[0] > kept[-1][0] and entry[1][0] < kept[-1][1][0]:
-            kept.append(entry)
-    errors = np.array([[estimation, validation] for _, estimation, validation in kept])
+def _front(programs: list[Judged]) -> TermFront:
+    """What programs are worth that no leaner one beats, by the largest error as a share of the budget."""
+    kept: list[Judged] = []
+    for one in sorted(programs, key=lambda one: one.rank):
+        if not kept or one.strain < kept[-1].strain:
+            kept.append(one)
+    errors = np.array([one.errors for one in kept])
     return TermFront(
-        operations=np.array([count for count, _, _ in kept], dtype=np.int64),
+        operations=np.array([one.rank[0] for one in kept], dtype=np.int64),
         torque_error_estimation=errors[:, 0, 0],
         torque_error_validation=errors[:, 1, 0],
         acceleration_error_estimation=errors[:, 0, 1],

@@ -1,9 +1,11 @@
-"""What a program without some of its terms is worth: on whole sets, and on random states."""
+"""What a program without some of its terms is worth: on whole sets, and on random states inside the limits."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import chain
 
 import numpy as np
 
@@ -11,17 +13,30 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import thinned_blocks
-from paramreduce_cli.records import Block, FloatArray, Model, Samples, SampleSet
+from paramreduce_cli.multibody.states_inside import States, StatesInside
+from paramreduce_cli.records import (
+    Block,
+    Constraint,
+    FloatArray,
+    JointLimits,
+    Model,
+    Samples,
+    SampleSet,
+)
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.samples import TermSamples, errors_over, term_samples
 
-_TORQUES = 1000
+_TORQUES = 10_000
 """Random states on which torques are compared with those of the full model."""
 _MASSES = 100_000
 """Random states on which mass matrices are looked at."""
+_OF_LOOPS = 1000
+"""Random states of loops, for both: these have to be assembled."""
 _AT_ONCE = 2000
 """Of them at a time."""
+_KNOWN = 2000
+"""Samples of the estimation set from which those of loops are reached."""
 _JUDGED = 20_000
 """Samples of a set, evenly spread, that programs are judged on: more of them tell no more."""
 _BLOCKS = 16
@@ -32,6 +47,24 @@ Errors = tuple[float, float]
 """Of torques and of accelerations."""
 
 
+@dataclass(frozen=True)
+class Strayed:
+    """How far torques and accelerations stray from the full model's away from the sets."""
+
+    torque_error: float
+    """On random states; not a number where there are none, or the torques are not known there."""
+    acceleration_error: float
+    """The same; not a number for the inverse dynamics either."""
+    states: int
+    """How many these are; without any, what follows is of both sets."""
+    largest: FloatArray
+    """Difference of each joint's torque, N m (N), (n_dof,)."""
+    worst_joint: int
+    """With the largest one as a share of the nominal torque."""
+    worst_state: FloatArray
+    """Its z, dz and ddz, (3, n_dof)."""
+
+
 class Judge:
     """Judges programs of one function.
 
@@ -39,6 +72,8 @@ class Judge:
         model: Of the robot.
         samples: Both sets.
         nominal_torque: (n_dof,)
+        limits: Of the coordinates; what has none is limited by what the estimation set reaches.
+        constraints: That positions keep to besides.
         direct: Whether the function is [M | delta].
         projected: Whether it is of the independent coordinates of loops.
         measured: Whether torques were measured, so that those at other states are not known.
@@ -49,6 +84,8 @@ class Judge:
         model: Model,
         samples: Samples,
         nominal_torque: FloatArray,
+        limits: JointLimits,
+        constraints: Sequence[Constraint],
         *,
         direct: bool,
         projected: bool,
@@ -72,6 +109,9 @@ class Judge:
         self.lower = np.array(ranges)[:, :, 0].min(axis=0)
         """Smallest z, dz and ddz of the estimation set, (3, n_dof)."""
         self.upper = np.array(ranges)[:, :, 1].max(axis=0)
+        self.limits = _bounds(limits, self.lower, self.upper)
+        """Smallest and largest of random states, (2, 3, n_dof)."""
+        self._constraints = constraints
 
     def thinned(self, part: SampleSet, most: int) -> TermSamples:
         """So many samples of a set at most, evenly spread."""
@@ -92,16 +132,17 @@ class Judge:
         )
         return estimation, validation
 
-    def allowed(self, errors: tuple[Errors, Errors], budget: Budget) -> bool:
-        """Whether errors on both sets are; where torques were measured, what is held out is not looked at.
+    def strain(self, errors: tuple[Errors, Errors], budget: Budget) -> float:
+        """The largest error as a share of what is allowed; infinite if one is not a number.
 
-        What is not a number is not allowed.
+        Where torques were measured, what is held out is not looked at.
         """
         no_other = self.measured or self._samples.validation is None
-        return all(
-            torque <= budget.torque and (not self.direct or acceleration <= budget.acceleration)
-            for torque, acceleration in (errors[:1] if no_other else errors)
-        )
+        kinds = 2 if self.direct else 1
+        looked_at = np.array(errors[:1] if no_other else errors)[:, :kinds]
+        with np.errstate(invalid="ignore"):
+            shares = looked_at / (budget.torque, budget.acceleration)[:kinds]
+        return float(np.nan_to_num(shares, nan=np.inf).max())
 
     @cached_property
     def _sets(self) -> list[list[TermSamples]]:
@@ -114,64 +155,90 @@ class Judge:
             result.append([self._made(some) for some in _together(blocks)])
         return result
 
-    def random(self, program: Simplified) -> tuple[float, FloatArray]:
-        """Torque error on random states inside the ranges, and the largest difference of each joint.
+    def strayed(self, program: Simplified) -> Strayed:
+        """How far a program strays inside the limits; where torques were measured, on both sets alone."""
+        parts = [] if self.measured else self._random_sets
+        states = sum(part.states.shape[1] for part in parts)
+        looked_at = parts or list(chain(*self._sets))
+        outputs = [program.outputs(part.states) for part in looked_at]
+        errors = errors_over(zip(parts, outputs, strict=True)) if parts else _NONE
+        off = np.abs(np.hstack([s.differences(o) for s, o in zip(looked_at, outputs, strict=True)]))
+        joint, state = np.unravel_index(np.argmax((off.T / self._nominal_torque).T), off.shape)
+        mechanism = self._model.mechanism
+        worst = np.hstack([part.states for part in looked_at])[: 3 * mechanism.n_q, state]
+        of_joints = worst.reshape(3, -1)[:, list(mechanism.independent)]
+        return Strayed(*errors, states, off.max(axis=1), int(joint), of_joints)
 
-        With loops, or where torques were measured, there is no error, and differences are those on both
-        sets.
-        """
-        if self.measured or self._model.mechanism.loops is not None:
-            off = [
-                np.abs(s.differences(program.outputs(s.states))).max(axis=1)
-                for parts in self._sets
-                for s in parts
-            ]
-            return np.nan, np.max(off, axis=0)
-        q, dq, ddq = self._random_states(_TORQUES)
-        tau = Dynamics(self._model.mechanism, once=True).inverse(q, dq, ddq, self._model.values)
-        made_up = self._made([self._block(q, dq, ddq, tau)])
-        outputs = program.outputs(made_up.states)
-        return made_up.errors(outputs)[0], np.abs(made_up.differences(outputs)).max(axis=1)
+    @cached_property
+    def _random_sets(self) -> list[TermSamples]:
+        """Random states with the torques of the full model, in parts; empty if none were found."""
+        dynamics = Dynamics(self._model.mechanism, once=True)
+        return [
+            self._made([self._block(some, dynamics.inverse(*some, self._model.values))])
+            for some in self._random_states(_TORQUES)
+        ]
 
     def smallest_eigenvalue(self, program: Simplified) -> tuple[float, int]:
-        """Of all mass matrices looked at, and on how many random states; with loops both sets alone."""
-        smallest = min(
-            float(np.linalg.eigvalsh(one.mass_matrices(program.outputs(one.states)))[:, 0].min())
-            for one in self._looked_at()
-        )
-        return smallest, 0 if self._model.mechanism.loops is not None else _MASSES
+        """Of all mass matrices looked at, and on how many random states inside the limits."""
+        smallest, states = np.inf, 0
+        for one in chain(*self._sets, self._random_poses):
+            M = one.mass_matrices(program.outputs(one.states))
+            smallest = min(smallest, float(np.linalg.eigvalsh(M)[:, 0].min()))
+            states += len(M)
+        return smallest, states - sum(one.states.shape[1] for one in chain(*self._sets))
 
     def poses(self, count: int) -> TermSamples | None:
-        """States inside the ranges, half of them in their corners; None where M does not matter, or with
-        loops, whose states would have to be assembled.
-        """
-        if not self.direct or self._model.mechanism.loops is not None:
+        """States inside the limits, half of them in their corners if there are no loops; None where M does not matter."""
+        if not self.direct:
             return None
-        corners = self._rng.random((count - count // 2, *self.lower.shape)) < 0.5
-        q, dq, ddq = np.moveaxis(np.where(corners, self.lower, self.upper), 1, 0)
-        inside = self._random_states(count // 2)
-        return self._made(
-            [self._block(*(np.vstack(pair) for pair in zip((q, dq, ddq), inside, strict=True)))]
+        halves = (
+            self._inside.drawn(some, self._rng, corners=corners)
+            for some, corners in ((count // 2, False), (count - count // 2, True))
         )
+        q, dq, ddq = (np.vstack(pair) for pair in zip(*halves, strict=True))
+        return self._made([self._block((q, dq, ddq))]) if len(q) else None
 
-    def _looked_at(self) -> Iterator[TermSamples]:
-        for parts in self._sets:
-            yield from parts
-        if self._model.mechanism.loops is None:
-            for _ in range(_MASSES // _AT_ONCE):
-                yield self._made([self._block(*self._random_states(_AT_ONCE))])
+    @property
+    def _random_poses(self) -> Iterator[TermSamples]:
+        """Random states on which mass matrices are looked at, in parts."""
+        if self._model.mechanism.loops is not None:
+            yield from self._random_sets
+        else:
+            for some in self._random_states(_MASSES):
+                yield self._made([self._block(some)])
 
-    def _block(
-        self, q: FloatArray, dq: FloatArray, ddq: FloatArray, tau: FloatArray | None = None
-    ) -> Block:
-        """States of a tree; without torques where these do not matter."""
+    @cached_property
+    def _inside(self) -> StatesInside:
+        part = self._samples.estimation
+        blocks = thinned_blocks(part.blocks(), -(-part.n_samples // _KNOWN))
+        known = np.concatenate([b.q for b in blocks])
+        lower, upper = self.limits
+        return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
+
+    def _random_states(self, count: int) -> Iterator[States]:
+        """So many, or as many as are assembled of loops, some at a time; fewer where they are hard to find."""
+        count = count if self._model.mechanism.loops is None else _OF_LOOPS
+        for start in range(0, count, _AT_ONCE):
+            some = self._inside.drawn(min(_AT_ONCE, count - start), self._rng)
+            if len(some[0]):
+                yield some
+
+    def _block(self, states: States, tau: FloatArray | None = None) -> Block:
+        """Of random states; without torques where these do not matter."""
+        q, dq, ddq = states
+        z, dz, ddz = (one[:, list(self._model.mechanism.independent)] for one in states)
         nothing = np.zeros((0, self._n_standard))
-        tau = np.zeros_like(q) if tau is None else tau
-        return Block(0, np.zeros(len(q)), q, dq, ddq, tau, q, dq, ddq, nothing)
+        tau = np.zeros_like(z) if tau is None else tau
+        return Block(0, np.zeros(len(q)), z, dz, ddz, tau, q, dq, ddq, nothing)
 
-    def _random_states(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        drawn = self._rng.uniform(self.lower, self.upper, size=(count, *self.lower.shape))
-        return drawn[:, 0], drawn[:, 1], drawn[:, 2]
+
+def _bounds(limits: JointLimits, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Smallest and largest z, dz and ddz inside limits, (2, 3, n_dof); where there is none, what was reached, (3, n_dof)."""
+    most = np.array([limits.velocity, limits.acceleration])
+    least = np.vstack([limits.lower, np.where(np.isfinite(most), -most, lower[1:])])
+    return np.array(
+        [least, np.vstack([limits.upper, np.where(np.isfinite(most), most, upper[1:])])]
+    )
 
 
 def _together(blocks: list[Block]) -> Iterator[list[Block]]:

@@ -135,7 +135,7 @@ def export(
     origin = f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
     if kind == VALUES:
         known = loading[Model].mechanism if Model in loading else None
-        files = values_file(chosen, title, origin, known)
+        files = values_file(chosen, title, origin, known, simplified)
     elif kind in FORMATS:
         assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)

@@ -1,0 +1,65 @@
+"""Where a model holds, and what it is worth there, as lines of text."""
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray, Mechanism, TermModel
+from paramreduce_cli.texts import share
+
+
+def within(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
+    """Ranges of states, (3, n_dof) each, a line for every joint."""
+    lines = []
+    for j, name in enumerate(mechanism.coordinate_names):
+        extremes = zip(lower[:, j], upper[:, j], strict=True)
+        lines.append(
+            _state(mechanism, j, name, [f"{low:.4g} to {high:.4g}" for low, high in extremes])
+        )
+    return lines
+
+
+def _state(mechanism: Mechanism, j: int, name: str, values: list[str]) -> str:
+    """Position, velocity and acceleration of a joint."""
+    unit = mechanism.bodies[mechanism.independent[j]].unit
+    position, velocity, acceleration = values
+    return (
+        f"  {name}: position {position} {unit}, velocity {velocity} {unit}/s, "
+        f"acceleration {acceleration} {unit}/s^2"
+    )
+
+
+def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
+    """Where a function with terms left out holds, how far it strays elsewhere, and where most."""
+    lines = [
+        "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are",
+        *within(mechanism, term.lower, term.upper),
+    ]
+    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    if known := " / ".join(share(error) for error in errors if np.isfinite(error)):
+        lines.append(f"Error of the accelerations (estimation / validation): {known}.")
+    where = "both sets"
+    if term.random_states or term.mass_states:
+        lines.append("Random states were drawn inside the limits, which are")
+        lines += within(mechanism, *term.limits)
+    if term.random_states:
+        where = "these"
+        lines.append(
+            f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
+        )
+        if np.isfinite(term.random_acceleration_error):
+            error = share(term.random_acceleration_error)
+            lines.append(f"Error of the accelerations on these: {error}.")
+    lines.append(f"Largest differences of torques, N m or N, on {where}:")
+    differences = zip(mechanism.coordinate_names, term.largest_difference.tolist(), strict=True)
+    lines += [f"  {name}: {value:.3g}" for name, value in differences]
+    worst = mechanism.coordinate_names[term.worst_joint]
+    lines.append(f"The worst one, against the nominal torque, is that of {worst}, at")
+    lines += [
+        _state(mechanism, j, name, [f"{value:.4g}" for value in term.worst_state[:, j]])
+        for j, name in enumerate(mechanism.coordinate_names)
+    ]
+    if np.isfinite(term.smallest_eigenvalue):
+        besides = f" and on {term.mass_states} random states" if term.mass_states else ""
+        lines.append(
+            f"Smallest eigenvalue of M on both sets{besides}: {term.smallest_eigenvalue:.3g}."
+        )
+    return lines

@@ -1,0 +1,24 @@
+"""How far torques of functions with terms left out stray."""
+
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.style import FUNCTIONS
+from paramreduce_cli.texts import share
+from paramreduce_cli.texts.table import Table
+
+
+@placed(PageSection.TERMS, 3)
+def term_differences(data: ReportData) -> Table:
+    """Largest difference of each joint's torque, N m (N), and as a share of its nominal torque, on random states inside the limits, or on both sets where there are none; and the state where the worst joint, marked with a star, strays most, in units of the table above."""
+    functions = data.terms.functions if data.terms is not None else {}
+    labels = {key: label for key, label, _ in FUNCTIONS}
+    header = ("function", "joint", "largest", "of nominal", "position", "velocity", "acceleration")
+    rows = []
+    for name, one in functions.items():
+        for j, joint in enumerate(data.model.mechanism.coordinate_names):
+            largest = one.largest_difference[j]
+            star = " *" if j == one.worst_joint else ""
+            of_nominal = share(largest / data.reduction.nominal_torque[j])
+            state = (f"{value:.4g}" for value in one.worst_state[:, j])
+            rows.append((labels[name], f"{joint}{star}", f"{largest:.3g}", of_nominal, *state))
+    return Table("Differences of torques without small terms", header, tuple(rows))
