@@ -28,7 +28,7 @@ def check(config: Config) -> list[Problem]:
 
 def remarks(config: Config) -> list[str]:
     """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
-    kinds = (_odd_bodies, _odd_drives, _odd_limits)
+    kinds = (_odd_bodies, _odd_drives, _odd_limits, _odd_terms)
     return [f"{text}; going on" for one in kinds for text in one(config)]
 
 
@@ -345,6 +345,17 @@ def _odd_limits(config: Config) -> Iterator[str]:
         if max(abs(lower), abs(upper)) > RATHER_DEGREES:
             yield f"trajectories.position_limits of [{lower:g}, {upper:g}] are in rad (m), not degrees"
             return
+
+
+def _odd_terms(config: Config) -> Iterator[str]:
+    """A budget that nothing has to keep to."""
+    terms = config.terms
+    if (
+        terms is not None
+        and terms.acceleration_error is not None
+        and "direct" not in terms.functions
+    ):
+        yield "terms.acceleration_error is of the direct dynamics, which is not under terms.functions"
 
 
 def _odd_drives(config: Config) -> Iterator[str]:

@@ -4,7 +4,7 @@ import numpy as np
 
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.records import BoolArray, FloatArray, Mechanism
+from paramreduce_cli.records import FloatArray, Mechanism
 
 _SHARES = (0.25, 0.5, 1.0)
 """Of a random move, at which a mechanism with loops is looked at: it may not get further."""
@@ -39,21 +39,14 @@ def random_states(
         return z, dz, ddz
     coordinates, independent = Coordinates(mechanism), list(mechanism.independent)
     assembly = mechanism.loops.assembly
+    least = _NEAREST * float(coordinates.distance(assembly[None])[0])
     moves = rng.uniform(0, 1, size=(count, 1)) * z
     q = np.tile(assembly, (count, 1))
     for share in _SHARES:
         reached, _ = coordinates.follow(assembly[independent] + share * moves, q)
-        safe = clear_of_singular(coordinates, reached)
+        safe = coordinates.distance(reached) >= least
         q[safe] = reached[safe]
     return coordinates.states(q[:, independent], dz, ddz, start=q)
-
-
-def clear_of_singular(coordinates: Coordinates, q: FloatArray) -> BoolArray:
-    """Whether positions of loops are far enough from singular ones, (n_samples,), at q (n_samples, n_q)."""
-    assert coordinates.mechanism.loops is not None
-    assembly = coordinates.mechanism.loops.assembly
-    least = _NEAREST * float(coordinates.distance(assembly[None])[0])
-    return np.asarray(coordinates.distance(q) >= least)
 
 
 def _extent(mechanism: Mechanism) -> float:

@@ -7,15 +7,16 @@ import numpy as np
 
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.multibody.random_states import clear_of_singular
 from paramreduce_cli.records import BoolArray, Constraint, FloatArray, Mechanism
 
 _DRAWS = 20
-"""Times that positions are drawn, as constraints may forbid most of them."""
+"""Times that states are drawn, as constraints may forbid most of them."""
 _MOVES = 12
 """Random moves from a known position of loops, one after the other."""
 _SHORTEST, _LONGEST = 0.01, 0.3
 """Of a move, as a share of the limits: most positions far away cannot be assembled."""
+_DRIFT = 0.5
+"""Of the accelerations of dependent coordinates, what velocities may cause."""
 
 States = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -24,11 +25,12 @@ class StatesInside:
     """Random states whose coordinates are drawn each by itself inside its limits.
 
     Positions of loops are reached from known ones by random moves, each taken where the loops can be
-    followed, clear of singular configurations: after many, all that can be reached are as likely.
+    followed, and come no nearer to a singular configuration than these; velocities and then
+    accelerations are shortened until those of the dependent coordinates are inside their limits, too.
 
     Args:
         mechanism: The mechanism.
-        lower: Least independent coordinates, velocities and accelerations, (3, n_dof).
+        lower: Least coordinates, velocities and accelerations, (3, n_q).
         upper: The largest.
         constraints: That positions keep to besides.
         known: Generalised coordinates of some states, (n_known, n_q).
@@ -42,13 +44,19 @@ class StatesInside:
         constraints: Sequence[Constraint],
         known: FloatArray,
     ) -> None:
-        self.lower, self.upper = lower, upper
         self._mechanism, self._known = mechanism, known
+        self._lower, self._upper = lower, upper
+        self._independent = list(mechanism.independent)
         self._quantities = Quantities(mechanism, constraints)
 
     @cached_property
     def _coordinates(self) -> Coordinates:
         return Coordinates(self._mechanism)
+
+    @cached_property
+    def _nearest(self) -> float:
+        """Distance to singularity of the known position that is nearest to one."""
+        return float(self._coordinates.distance(self._known).min())
 
     def drawn(self, count: int, rng: np.random.Generator, *, corners: bool = False) -> States:
         """q, dq and ddq, each (count, n_q); fewer where so many are not found.
@@ -60,9 +68,8 @@ class StatesInside:
         """
         if self._mechanism.loops is not None:
             q = self._moved(count, rng)
-            dz, ddz = self._anywhere(len(q), rng, corners)[:, 1:].swapaxes(0, 1)
-            return (q, *self._coordinates.rates(q, dz, ddz))
-        kept = np.empty((0, *self.lower.shape))
+            return self._shortened(q, self._anywhere(len(q), rng, corners))
+        kept = np.empty((0, *self._lower.shape))
         for _ in range(_DRAWS):
             some = self._anywhere(count, rng, corners)
             kept = np.concatenate([kept, some[self._allowed(some[:, 0])]])[:count]
@@ -71,29 +78,50 @@ class StatesInside:
         return kept[:, 0], kept[:, 1], kept[:, 2]
 
     def _anywhere(self, count: int, rng: np.random.Generator, corners: bool) -> FloatArray:
-        """Between the limits, or at them, (count, 3, n_dof)."""
-        shape = (count, *self.lower.shape)
+        """Independent ones between the limits, or at them, (count, 3, n_dof)."""
+        lower, upper = self._lower[:, self._independent], self._upper[:, self._independent]
+        shape = (count, *lower.shape)
         if corners:
-            return np.where(rng.random(shape) < 0.5, self.lower, self.upper)
-        return rng.uniform(self.lower, self.upper, size=shape)
+            return np.where(rng.random(shape) < 0.5, lower, upper)
+        return rng.uniform(lower, upper, size=shape)
 
     def _allowed(self, q: FloatArray) -> BoolArray:
         """Whether positions keep to limits and constraints, (n_samples,)."""
-        z = q[:, list(self._mechanism.independent)]
-        inside = ((z >= self.lower[0]) & (z <= self.upper[0])).all(axis=1)
+        inside = ((q >= self._lower[0]) & (q <= self._upper[0])).all(axis=1)
+        if self._mechanism.loops is not None:
+            inside &= self._coordinates.distance(q) >= self._nearest
         return np.asarray(inside & (self._quantities.rows(q) <= 0).all(axis=1))
 
     def _moved(self, count: int, rng: np.random.Generator) -> FloatArray:
         """Positions of loops that were reached, (count, n_q)."""
-        independent = list(self._mechanism.independent)
+        lower, upper = self._lower[0, self._independent], self._upper[0, self._independent]
         q = self._known[rng.integers(len(self._known), size=count)]
-        reach = self.upper[0] - self.lower[0]
         for _ in range(_MOVES):
             length = np.exp(rng.uniform(np.log(_SHORTEST), np.log(_LONGEST), size=(count, 1)))
-            moves = length * rng.uniform(-1, 1, size=(count, reach.size)) * reach
-            z = q[:, independent] + moves
-            tried = np.flatnonzero(((z >= self.lower[0]) & (z <= self.upper[0])).all(axis=1))
+            moves = length * rng.uniform(-1, 1, size=(count, lower.size)) * (upper - lower)
+            z = q[:, self._independent] + moves
+            tried = np.flatnonzero(((z >= lower) & (z <= upper)).all(axis=1))
             found, way = self._coordinates.follow(z[tried], q[tried])
-            taken = (way == 1) & self._allowed(found) & clear_of_singular(self._coordinates, found)
+            taken = (way == 1) & self._allowed(found)
             q[tried[taken]] = found[taken]
-        return q[self._allowed(q) & clear_of_singular(self._coordinates, q)]
+        return q[self._allowed(q)]
+
+    def _shortened(self, q: FloatArray, drawn: FloatArray) -> States:
+        """States at positions q of loops, with velocities and accelerations as drawn, (n_samples, 3, n_dof), or shorter."""
+        rates, (_, dz, ddz) = self._coordinates.rates, np.moveaxis(drawn, 1, 0)
+        still = np.zeros_like(dz)
+        dq, _ = rates(q, dz, still)
+        dz = dz * _shares(dq, self._lower[1], self._upper[1])
+        _, drift = rates(q, dz, still)  # grows with the square of the velocities
+        dz = dz * np.sqrt(_shares(drift, _DRIFT * self._lower[2], _DRIFT * self._upper[2]))
+        _, drift = rates(q, dz, still)
+        _, ddq = rates(q, dz, ddz)
+        ddz = ddz * _shares(ddq - drift, self._lower[2] - drift, self._upper[2] - drift)
+        return (q, *rates(q, dz, ddz))
+
+
+def _shares(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Of rates, (n_samples, n_q), that are inside limits around zero, one at the most, (n_samples, 1)."""
+    bound = np.where(rates > 0, upper, lower)
+    shares = np.divide(bound, rates, out=np.ones_like(rates), where=rates != 0)
+    return np.asarray(np.clip(shares, 0.0, 1.0).min(axis=1, keepdims=True))

@@ -72,7 +72,7 @@ class Judge:
         model: Of the robot.
         samples: Both sets.
         nominal_torque: (n_dof,)
-        limits: Of the coordinates; what has none is limited by what the estimation set reaches.
+        limits: Of the independent coordinates; what has none is limited by what the estimation set reaches.
         constraints: That positions keep to besides.
         direct: Whether the function is [M | delta].
         projected: Whether it is of the independent coordinates of loops.
@@ -103,15 +103,19 @@ class Judge:
         self._nominal_acceleration = samples.nominal_acceleration
         self._coordinates = Coordinates(model.mechanism, once=True)
         ranges = [
-            [(x.min(axis=0), x.max(axis=0)) for x in (b.z, b.dz, b.ddz)]
+            [(x.min(axis=0), x.max(axis=0)) for x in (b.q, b.dq, b.ddq)]
             for b in samples.estimation.blocks()
         ]
-        self.lower = np.array(ranges)[:, :, 0].min(axis=0)
-        """Smallest z, dz and ddz of the estimation set, (3, n_dof)."""
-        self.upper = np.array(ranges)[:, :, 1].max(axis=0)
-        self.limits = _bounds(limits, self.lower, self.upper)
-        """Smallest and largest of random states, (2, 3, n_dof)."""
+        reached = np.array(ranges)[:, :, 0].min(axis=0), np.array(ranges)[:, :, 1].max(axis=0)
+        self._bounds = _bounds(limits, list(model.mechanism.independent), *reached)
         self._constraints = constraints
+        self.lower, self.upper = (x[:, list(model.mechanism.independent)] for x in reached)
+        """Smallest and largest z, dz and ddz of the estimation set, (3, n_dof) each."""
+
+    @property
+    def limits(self) -> FloatArray:
+        """Smallest and largest z, dz and ddz of random states, (2, 3, n_dof)."""
+        return self._bounds[:, :, list(self._model.mechanism.independent)]
 
     def thinned(self, part: SampleSet, most: int) -> TermSamples:
         """So many samples of a set at most, evenly spread."""
@@ -212,7 +216,7 @@ class Judge:
         part = self._samples.estimation
         blocks = thinned_blocks(part.blocks(), -(-part.n_samples // _KNOWN))
         known = np.concatenate([b.q for b in blocks])
-        lower, upper = self.limits
+        lower, upper = self._bounds
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
 
     def _random_states(self, count: int) -> Iterator[States]:
@@ -232,13 +236,16 @@ class Judge:
         return Block(0, np.zeros(len(q)), z, dz, ddz, tau, q, dq, ddq, nothing)
 
 
-def _bounds(limits: JointLimits, lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """Smallest and largest z, dz and ddz inside limits, (2, 3, n_dof); where there is none, what was reached, (3, n_dof)."""
-    most = np.array([limits.velocity, limits.acceleration])
-    least = np.vstack([limits.lower, np.where(np.isfinite(most), -most, lower[1:])])
-    return np.array(
-        [least, np.vstack([limits.upper, np.where(np.isfinite(most), most, upper[1:])])]
-    )
+def _bounds(
+    limits: JointLimits, independent: list[int], lower: FloatArray, upper: FloatArray
+) -> FloatArray:
+    """Smallest and largest q, dq and ddq inside limits, (2, 3, n_q); where there is none, what was reached, (3, n_q)."""
+    rates = np.array([limits.velocity, limits.acceleration])
+    known = np.array([np.vstack([limits.lower, -rates]), np.vstack([limits.upper, rates])])
+    bounds = np.array([lower, upper])
+    own = bounds[:, :, independent]
+    bounds[:, :, independent] = np.where(np.isfinite(known), known, own)
+    return bounds
 
 
 def _together(blocks: list[Block]) -> Iterator[list[Block]]:

@@ -120,6 +120,13 @@ def test_limits_in_degrees_are_remarked_on(write_config):
         load_config(path)
 
 
+def test_a_budget_of_terms_that_nothing_keeps_to_is_remarked_on(write_config):
+    terms = "terms: {{acceleration_error: 0.05, functions: [{}]}}\nselected:"
+    with pytest.warns(ParamreduceWarning, match="terms.acceleration_error is of the direct"):
+        load_config(write_config(("selected:", terms.format("inverse"))))
+    load_config(write_config(("selected:", terms.format("inverse, direct"))))
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [("robot: [", "not YAML"), ("", "mapping"), ("- 1", "mapping"), ("robot: !!python/object:x 1", "not YAML"),

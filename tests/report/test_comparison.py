@@ -97,15 +97,40 @@ def test_only_what_is_asked(summary):
     assert bad(summary, other, only=("kappa", "order")) == []
 
 
+TERM = {
+    "function": "direct",
+    "operations": 100,
+    "budget": {"torque": 0.01, "acceleration": 0.05},
+    "torque_error": {"estimation": 0.0099, "validation": 0.012},
+    "acceleration_error": {"estimation": 0.04, "validation": None},
+    "smallest_eigenvalue": 0.1,
+}
+
+
 def test_more_operations_without_small_terms_are_a_regression_and_fewer_are_not(summary):
-    term = {"function": "inverse", "operations": 100, "budget": {"torque": 0.01}}
-    one = summary | {"terms": [term]}
+    one = summary | {"terms": [TERM]}
     assert bad(one, summary) == ["functions without small terms"]
     for operations, what in (
         (80, []),
         (104, []),
-        (106, ["operations without small terms, inverse"]),
+        (106, ["operations without small terms, direct"]),
     ):
-        assert bad(one, summary | {"terms": [term | {"operations": operations}]}) == what
-    other = term | {"budget": {"torque": 0.02}}
-    assert bad(one, summary | {"terms": [other]}) == ["budget of terms, inverse"]
+        assert bad(one, summary | {"terms": [TERM | {"operations": operations}]}) == what
+    other = TERM | {"budget": {"torque": 0.02, "acceleration": 0.05}}
+    assert bad(one, summary | {"terms": [other]}) == ["budget of terms, direct"]
+
+
+@pytest.mark.parametrize(
+    ("changed", "what"),
+    [
+        ({"torque_error": {"estimation": 0.0101, "validation": 0.009}}, ["torque error without small terms, direct, estimation"]),
+        ({"torque_error": {"estimation": 0.009, "validation": 0.02}}, []),  # was above the budget before: held out
+        ({"acceleration_error": {"estimation": 0.051, "validation": None}}, ["acceleration error without small terms, direct, estimation"]),
+        ({"acceleration_error": {"estimation": None, "validation": None}}, ["acceleration error without small terms, direct, estimation"]),
+        ({"smallest_eigenvalue": 0.01}, []),
+        ({"smallest_eigenvalue": -0.01}, ["smallest eigenvalue without small terms, direct"]),
+        ({"smallest_eigenvalue": None}, ["smallest eigenvalue without small terms, direct"]),
+    ],
+)  # fmt: skip
+def test_a_budget_that_was_kept_to_is_kept_to(summary, changed, what):
+    assert bad(summary | {"terms": [TERM]}, summary | {"terms": [TERM | changed]}) == what

@@ -1,9 +1,11 @@
 """reduce-terms on whole robots, its records and its exported code against definitions."""
 
 import ctypes
+import itertools
 import json
 import shutil
 import sys
+from functools import cache
 
 import numpy as np
 import pytest
@@ -14,9 +16,10 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.export.choice import simplified_model
 from paramreduce_cli.export.values import values_file
-from paramreduce_cli.export.writing import Exported, export
+from paramreduce_cli.export.writing import Exported, export, exported_functions
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
@@ -29,9 +32,51 @@ TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", 
 STAGES = {stage.name: stage for stage in pipeline()}
 
 
+GEARED = """
+robot: geared
+description:
+  gravity: [0, -9.81, 0]
+  dh:
+    joints:
+      - {name: upper, a: 0}
+      - {name: fore, a: 0.5}
+parameter_sets:
+  rods:
+    upper: {m: 2.0, com: [0.25, 0, 0], inertia_com: [1e-3, 0, 0, 1/24, 0, 1/24]}
+    fore: {m: 1.0, com: [0.2, 0.01, 0], inertia_com: [5e-4, 0, 0, 0.0135, 0, 0.0135]}
+drives:
+  z_upper: {viscous: 0.8, coulomb: 1.5}
+  z_fore: {viscous: 0.2, coulomb: 0.5, inertia: 0.01}
+trajectories: {position_limits: [-pi/2, pi/2], velocity_limits: 3, count: 2, harmonics: 2, points: 40, starts: 1, polished: 1}
+selected: {torque_error: 0.05}
+reduction: {heuristics: [qr, forward-selection]}
+terms: {torque_error: 0.05, acceleration_error: 0.2, rounds: 0}
+"""
+FLOATING = """
+robot: afloat
+description:
+  gravity: [0, 0, -9.81]
+  tree:
+    bodies:
+      - {name: hull, joint: free}
+      - {name: arm, parent: hull, joint: revolute, at: [{xyz: [0.2, 0, 0.1]}]}
+parameter_sets:
+  solid:
+    hull: {m: 4.0, com: [0.02, 0, 0.01], inertia_com: [0.05, 0, 0, 0.06, 0, 0.07]}
+    arm: {m: 1.0, com: [0.2, 0.01, 0], inertia_com: [5e-4, 0, 0, 0.0135, 0, 0.0135]}
+trajectories: {position_limits: [-0.5, 0.5], velocity_limits: 1, count: 2, harmonics: 2, points: 60, starts: 1, polished: 1}
+selected: {torque_error: 0.05}
+reduction: {heuristics: [qr, forward-selection]}
+terms: {torque_error: 0.05, acceleration_error: 0.3, functions: [direct], rounds: 0}
+"""
+
+
 def simplified(folder, robot, *overrides):
-    """Run a config as far as its functions without small terms."""
-    config = config_of(robot, ONE_FORMAT, *TERMS, *overrides)
+    """Run a config that ships as far as its functions without small terms."""
+    return as_far(config_of(robot, ONE_FORMAT, *TERMS, *overrides), folder)
+
+
+def as_far(config, folder):
     runner = Runner(config, Store(folder))
     for stage in stages_to_run(config):
         runner.run(stage)
@@ -44,21 +89,38 @@ def loaded(runner, record):
     return load_file(runner.store.path(record), record, None, "")[0]
 
 
+LOOPS = ["four_bar-generalised", "four_bar-independent"]
+OTHERS = {"geared": GEARED, "afloat": FLOATING}
+"""An arm with friction and a rotor, and one on a floating base."""
+
+
 @pytest.fixture(scope="module")
-def two_link(tmp_path_factory):
-    return simplified(tmp_path_factory.mktemp("two_link_terms"), "two_link")
+def run_of(tmp_path_factory):
+    """Runs of robots by name, each made once."""
+
+    @cache
+    def made(name):
+        folder = tmp_path_factory.mktemp(f"{name}_terms")
+        robot, _, counted = name.partition("-")
+        if name not in OTHERS:
+            return simplified(
+                folder, robot, *([f"validation.operations={counted}"] if counted else ())
+            )
+        path = folder / "config.yaml"
+        path.write_text(OTHERS[name])
+        return as_far(load_config(path, [ONE_FORMAT]), folder / "results")
+
+    return made
 
 
-LOOPS = {
-    "generalised": ("validation.operations=generalised",),
-    "independent": ("validation.operations=independent",),
-}
+@pytest.fixture(scope="module")
+def two_link(run_of):
+    return run_of("two_link")
 
 
-@pytest.fixture(scope="module", params=list(LOOPS))
-def four_bar(request, tmp_path_factory):
-    folder = tmp_path_factory.mktemp(f"four_bar_{request.param}")
-    return simplified(folder, "four_bar", *LOOPS[request.param])
+@pytest.fixture(params=LOOPS)
+def four_bar(request, run_of):
+    return run_of(request.param)
 
 
 def errors_by_definition(runner, name):
@@ -139,7 +201,7 @@ def test_errors_are_what_they_are_defined_as_and_within_the_budget(two_link, nam
     assert term.operations == Program.of_stored(term.program).n_operations
     if name == "direct":
         assert term.smallest_eigenvalue > 0
-        assert term.random_states == 100_000
+        assert term.mass_states == 100_000
         assert max(term.acceleration_error_estimation, term.acceleration_error_validation) <= 0.2
     front = term.front
     assert np.all(np.diff(front.operations) > 0)
@@ -152,7 +214,11 @@ def test_loops(four_bar, name):
     assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
     assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
     assert max(estimation, validation) <= 0.05
-    assert np.isnan(term.random_torque_error), "nobody knows random states of loops"
+    assert 0 < term.random_states <= 1000
+    assert np.isnan(term.random_acceleration_error) == (name == "inverse")
+    if name == "direct":
+        assert term.mass_states == term.random_states
+        assert term.smallest_eigenvalue > 0
 
 
 @pytest.mark.parametrize("name", ["inverse", "direct"])
@@ -190,43 +256,145 @@ def test_units_of_parameters_are_said(two_link):
     assert np.any(term.units != 1.0), "the arm's lengths are no units"
 
 
-@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+def given_by(runner, name):
+    """What the stored program gives for states, in plain NumPy: torques, or M and delta, of the tree or projected."""
+    model, term = loaded(runner, Model), loaded(runner, TermReduction).functions[name]
+    assert model.mechanism.loops is None
+    program = Program.of_stored(term.program)
+
+    def given(q, dq, ddq):
+        count, n = q.shape
+        inputs = [*(np.full(count, value) for value in term.values), *q.T, *dq.T, *ddq.T]
+        outputs = np.array([np.broadcast_to(x, count) for x in program.evaluated(inputs)])
+        if name == "inverse":
+            return outputs.T, None
+        M = np.zeros((count, n, n))
+        for (i, j), entry in zip(zip(*np.tril_indices(n), strict=True), outputs, strict=False):
+            M[:, i, j] = M[:, j, i] = entry
+        return np.einsum("kij,kj->ki", M, ddq) + outputs[-n:].T, M
+
+    return given
+
+
 @pytest.mark.parametrize("name", ["inverse", "direct"])
-def test_the_exported_c_has_the_reported_errors_on_the_validation_set(two_link, name):
+def test_random_states_are_inside_the_limits_and_have_the_errors_that_are_said(two_link, name):
+    """Drawn anew, other states of the same limits are as far off; the worst one is exactly."""
     model, samples = loaded(two_link, Model), loaded(two_link, Samples)
-    chosen, term, title = simplified_model(loaded(two_link, TermReduction), name)
+    term, given = loaded(two_link, TermReduction).functions[name], given_by(two_link, name)
+    (low, dlow, ddlow), (high, dhigh, ddhigh) = term.limits
+    np.testing.assert_allclose([low, high], [[-np.pi / 2] * 2, [np.pi / 2] * 2])
+    np.testing.assert_allclose([dlow, dhigh], [[-3] * 2, [3] * 2])
+    np.testing.assert_array_equal([ddlow, ddhigh], [term.lower[2], term.upper[2]])  # no limits
+    q, dq, ddq = np.random.default_rng(7).uniform(*term.limits, size=(20_000, 3, 2)).swapaxes(0, 1)
+    dynamics = Dynamics(model.mechanism)
+
+    def off(q, dq, ddq):
+        tau = dynamics.inverse(q, dq, ddq, model.values)
+        torques, M = given(q, dq, ddq)
+        return tau, tau - torques, M
+
+    tau, missed, M = off(q, dq, ddq)
+    nominal = model_weights(two_link)
+    expected = np.linalg.norm(missed / nominal) / np.linalg.norm(tau / nominal)
+    assert term.random_states == 10_000
+    assert term.random_torque_error == pytest.approx(expected, rel=0.03)
+    if name == "direct":
+        scale = samples.nominal_acceleration
+        caused = np.linalg.solve(M, missed[..., None])[..., 0] / scale
+        expected = np.linalg.norm(caused) / np.linalg.norm(ddq / scale)
+        assert term.random_acceleration_error == pytest.approx(expected, rel=0.1)
+        assert 0 < term.smallest_eigenvalue <= np.linalg.eigvalsh(M).min() * 1.01
+    _, worst, _ = off(*term.worst_state[:, None])
+    assert abs(worst[0, term.worst_joint]) == pytest.approx(
+        term.largest_difference[term.worst_joint], rel=1e-9
+    )
+    assert np.argmax(term.largest_difference / nominal) == term.worst_joint
+    assert np.all(np.abs(missed).max(axis=0) < 1.1 * term.largest_difference)
+
+
+def test_the_worst_state_of_loops_is_assembled_inside_the_limits(four_bar):
+    model, found = loaded(four_bar, Model), loaded(four_bar, TermReduction)
+    mechanism = model.mechanism
+    for term in found.functions.values():
+        (lower, upper), (z, dz, ddz) = term.limits, term.worst_state[:, None]
+        assert np.all((term.worst_state >= lower) & (term.worst_state <= upper))
+        q, dq, ddq = Coordinates(mechanism).states(z, dz, ddz)
+        tau = Dynamics(mechanism).inverse(q, dq, ddq, model.values)
+        assert np.abs(tau).max() < 5 * mechanism_reach(four_bar), "no singular one"
+
+
+def mechanism_reach(runner):
+    """Largest torque of the estimation set."""
+    return max(np.abs(b.tau).max() for b in loaded(runner, Samples).estimation.blocks())
+
+
+def recomputed_in_c(runner, name):
+    """Errors of torques and accelerations on the validation set, by the exported C code, state by state."""
+    model, samples = loaded(runner, Model), loaded(runner, Samples)
+    mechanism, robot = model.mechanism, model.mechanism.robot
+    chosen, term, title = simplified_model(loaded(runner, TermReduction), name)
     what = Exported.IDM if name == "inverse" else Exported.DDM
     files = export(model, chosen, title=title, language="c", what=what, simplified=term)
-    header, source = files["two_link.h"].decode(), files["two_link.c"].decode()
-    library = load(header + source.replace('#include "two_link.h"', ""))
-    function = getattr(library, f"two_link_{name}_dynamics")
+    header, source = files[f"{robot}.h"].decode(), files[f"{robot}.c"].decode()
+    library = load(header + source.replace(f'#include "{robot}.h"', ""))
+    function = getattr(library, f"{robot}_{name}_dynamics")
+    (declared,) = exported_functions(model, chosen, what, simplified=term)
+    n, independent, dependent = (
+        mechanism.n_dof,
+        *map(list, (mechanism.independent, mechanism.dependent)),
+    )
+    results = {"inverse": [np.empty(n)], "direct": [np.empty((n, n)), np.empty(n)]}[name]
     off, total = np.zeros(2), np.zeros(2)
-
-    def called(given, *outputs):
-        arrays = [np.ascontiguousarray(one) for one in (term.values, *given)]
-        function(*[ctypes.c_void_p(one.ctypes.data) for one in (*arrays, *outputs)])
-
+    nominal, scale = model_weights(runner), samples.nominal_acceleration
     for block in samples.validation.blocks():
-        for q, dq, ddq, tau in zip(block.q, block.dq, block.ddq, block.tau, strict=True):
-            torques, M, delta = np.empty(2), np.empty((2, 2)), np.empty(2)
-            if name == "inverse":
-                called((q, dq, ddq), torques)
-                motion = ddq
-            else:
-                called((q, dq), M, delta)
-                torques, motion = M @ ddq + delta, np.linalg.solve(M, tau - delta)
-            for k, (found, true, nominal) in enumerate(
-                [
-                    (torques, tau, samples.nominal_torque),
-                    (motion, ddq, samples.nominal_acceleration),
-                ]
-            ):
-                off[k] += np.sum(((found - true) / nominal) ** 2)
-                total[k] += np.sum((true / nominal) ** 2)
-    torque_error, acceleration_error = np.sqrt(off / total)
+        tangent = Coordinates(mechanism).tangent(block.q)
+        R = tangent[:, dependent]
+        b = block.ddq[:, dependent] - np.einsum("kij,kj->ki", R, block.ddz)
+        for k, (tau, ddz) in enumerate(zip(block.tau, block.ddz, strict=True)):
+            state = {"q": block.q[k], "dq": block.dq[k], "ddq": block.ddq[k], "R": R[k], "b": b[k]}
+            arrays = [
+                np.ascontiguousarray({**state}.get(a.name, term.values)) for a in declared.arguments
+            ]
+            function(*[ctypes.c_void_p(one.ctypes.data) for one in (*arrays, *results)])
+            torques, motion = results[0], ddz
+            if name == "direct":
+                M, delta = results
+                torques, motion = M @ ddz + delta, np.linalg.solve(M, tau - delta)
+            pairs = ((torques, tau, nominal), (motion, ddz, scale))
+            off += [np.sum(((found - true) / unit) ** 2) for found, true, unit in pairs]
+            total += [np.sum((true / unit) ** 2) for _, true, unit in pairs]
+    assert independent
+    return term, np.sqrt(off / total)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
+@pytest.mark.parametrize(
+    ("robot", "name"),
+    [
+        *itertools.product(["two_link", *LOOPS, "geared"], ["inverse", "direct"]),
+        ("afloat", "direct"),
+    ],
+)
+def test_the_exported_c_has_the_reported_errors_on_the_validation_set(robot, name, run_of):
+    term, (torque_error, acceleration_error) = recomputed_in_c(run_of(robot), name)
     assert term.torque_error_validation == pytest.approx(torque_error, rel=1e-9)
     if name == "direct":
         assert term.acceleration_error_validation == pytest.approx(acceleration_error, rel=1e-9)
+
+
+@pytest.mark.parametrize("robot", OTHERS)
+def test_friction_and_floating_bases(robot, run_of):
+    """Errors by definition, and columns of friction among those that are left."""
+    others = run_of(robot)
+    for name, term in loaded(others, TermReduction).functions.items():
+        _, (estimation, validation) = errors_by_definition(others, name)
+        assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
+        assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+        assert max(estimation, validation) <= 0.05
+        assert term.operations < term.operations_start
+        assert 0 < term.random_torque_error < 0.5
+        if robot == "geared":
+            assert any(one.startswith(("fv", "fc")) for one in term.names)
 
 
 @pytest.mark.parametrize("name", ["inverse", "direct"])
@@ -237,8 +405,9 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
     files = export(model, chosen, title=title, language="c", what=what, simplified=term)
     header = " ".join(files["two_link.h"].decode().replace("*", " ").split())
     assert "TERMS WERE LEFT OUT" in header
+    names = model.mechanism.coordinate_names
     joints = zip(
-        model.mechanism.coordinate_names, term.lower.T, term.upper.T, term.largest_difference,
+        names, term.lower.T, term.upper.T, term.largest_difference,
         strict=True,
     )  # fmt: skip
     for joint, lower, upper, largest in joints:
@@ -247,9 +416,20 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
             in header
         )
         assert f"{joint}: {largest:.3g} " in header
-    assert f"torque error is {share(term.random_torque_error)}" in header
-    said = f"{term.random_states} random states inside the ranges: {term.smallest_eigenvalue:.3g}."
-    assert (said in header) == (name == "direct")
+    for joint, (lower, upper) in zip(names, np.moveaxis(term.limits, 2, 0), strict=True):
+        assert f"{joint}: position {lower[0]:.4g} to {upper[0]:.4g} rad, velocity {lower[1]:.4g} to {upper[1]:.4g}" in header  # fmt: skip
+    said = f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
+    assert said in header
+    assert f"that of {names[term.worst_joint]}, at" in header
+    for joint, state in zip(names, term.worst_state.T, strict=True):
+        assert f"{joint}: position {state[0]:.4g} rad, velocity {state[1]:.4g} rad/s" in header
+    eigenvalue = f"on {term.mass_states} random states: {term.smallest_eigenvalue:.3g}."
+    error = f"accelerations on these: {share(term.random_acceleration_error)}."
+    assert (eigenvalue in header) == (error in header) == (name == "direct")
+    assert "allowed 5 %" in header
+    values = values_file(chosen, title, "", model.mechanism, term)["parameters.json"].decode()
+    for line in json.loads(values)["holds"]:
+        assert " ".join(line.split()) in header
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
     assert (" / ".join(map(share, errors)) in header) == (name == "direct")
 
@@ -270,6 +450,12 @@ def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypa
         assert one.functions[name].operations == two.functions[name].operations
 
 
+def share_of(row, kind, part, budget):
+    """An error as a share of what is allowed; zero where there is none."""
+    error = row[f"{kind}_error"][part]
+    return 0.0 if error is None else error / budget[kind]
+
+
 def test_summary_and_page(two_link, tmp_path):
     shutil.copytree(two_link.store.folder, tmp_path / "r")
     runner = Runner(two_link.config, Store(tmp_path / "r"))
@@ -281,12 +467,23 @@ def test_summary_and_page(two_link, tmp_path):
     for one in summary["terms"]:
         assert max(one["torque_error"].values()) <= 0.05
         assert one["pareto"][0]["operations"] <= one["operations"]
+        strains = [
+            max(
+                share_of(row, kind, part, one["budget"])
+                for kind in ("torque", "acceleration")
+                for part in ("estimation", "validation")
+            )
+            for row in one["pareto"]
+        ]
+        assert np.all(np.diff(strains) < 0), "no leaner one is as good"
     page = path.with_name("index.html").read_text()
     assert "Without small terms" in page
     term = loaded(runner, TermReduction).functions["direct"]
     ranges = (path.parent / "tables" / "term-ranges.csv").read_text()
     assert f"{term.lower[0, 0]:.4g} to {term.upper[0, 0]:.4g}" in ranges
-    assert f"{term.largest_difference[1]:.3g}" in ranges
+    differences = (path.parent / "tables" / "term-differences.csv").read_text()
+    assert f"{term.largest_difference[1]:.3g}" in differences
+    assert f"{term.worst_state[0, 1]:.4g}" in differences
     assert f"{term.lower[1, 1]:.4g} to {term.upper[1, 1]:.4g}" in page
     assert (path.parent / "figures" / "terms.svg").exists()
 

@@ -169,10 +169,12 @@ def _say_summary(summary: dict[str, Any]) -> None:
     say_table(table, _TABLE_WIDTH)
     for one in summary["terms"]:
         name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
-        errors = [share(error) for error in one["torque_error"].values() if error is not None]
-        say(
-            f"Without small terms: {name} in {one['operations']} operations, ε_τ {' / '.join(errors)}"
+        said = "".join(
+            f", {symbol} {' / '.join(share(error) for error in known)}"
+            for symbol, kind in (("ε_τ", "torque_error"), ("ε_z̈", "acceleration_error"))
+            if (known := [error for error in one[kind].values() if error is not None])
         )
+        say(f"Without small terms: {name} in {one['operations']} operations{said}")
     if found is not None:
         say(found["comparison"])
         if found["consistent"] is not None:
