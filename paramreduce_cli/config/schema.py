@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
 from pydantic import Field, model_validator
@@ -297,6 +298,9 @@ class ReductionSection(Section):
 
 class SelectedSection(Section):
     """The reduced model that validate judges and report shows: by its size, or the smallest that keeps to tolerances on both sets."""
+
+    USUAL: ClassVar[Mapping[str, float]] = {"torque_error": 0.01}
+    """Tolerances where none are given."""
 
     heuristic: Method | None = None
     """Whose subset; of all heuristics the best one if left out."""

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import (
+    TERMS,
     Identification,
     Model,
     ModelChoice,
@@ -19,8 +20,6 @@ from paramreduce_cli.texts import EXACT, share
 FULL, BASE = "full", "base"
 IDENTIFIED, CONSISTENT = "identified", "consistent"
 """From measured torques: all base parameters, and standard parameters that a machine can have."""
-TERMS = "terms"
-"""One function with terms left out."""
 
 
 def chosen_model(

@@ -23,8 +23,6 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.models import reduced_model
 from paramreduce_cli.texts import share
 
-_DEFAULT = {"torque_error": 0.01}
-
 
 def select(
     wanted: SelectedSection,
@@ -62,7 +60,7 @@ def select(
         heuristic, row = _of_size(wanted.n, results)
         reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
     else:
-        tolerances = wanted.tolerances() or _DEFAULT
+        tolerances = wanted.tolerances() or SelectedSection.USUAL
         choice = smallest_within(results, tolerances)
         heuristic, row = choice if choice is not None else nearest_to(results, tolerances)
         n = int(results[heuristic].n[row])

@@ -64,6 +64,7 @@ from paramreduce_cli.records.samples import Block, Recording, Recordings, Sample
 from paramreduce_cli.records.shares import UNSHARED, WHOLE, Share, Shares
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
+    TERMS,
     StoredProgram,
     TermFront,
     TermModel,
@@ -84,6 +85,7 @@ from paramreduce_cli.records.validation import (
     DataChange,
     DataVariant,
     HeuristicValidation,
+    Leanest,
     Remark,
     Selected,
     Stability,

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 
+TERMS = "terms"
+"""What the model is called of which each function has terms left out."""
 NO_OPERAND = -1
 """Where an operation has fewer than two operands."""
 

@@ -53,6 +53,17 @@ class Selected:
         return self.model.n
 
 
+@dataclass(frozen=True)
+class Leanest:
+    """The function with the fewest operations within what is asked for."""
+
+    model: str
+    """``HEURISTIC:N``, or ``terms``."""
+    operations: int
+    torque_error_estimation: float
+    torque_error_validation: float
+
+
 class DataChange(StrEnum):
     """What other data a selection is repeated on."""
 

@@ -1,5 +1,6 @@
 """summary.json: the numbers that a regression job compares."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -10,6 +11,7 @@ from paramreduce_cli.records import (
     HeuristicValidation,
     Identification,
     IntArray,
+    Leanest,
     Model,
     ModelChoice,
     Provenance,
@@ -31,6 +33,7 @@ def summary_of(
     validation: Validation,
     identification: Identification | None,
     terms: TermReduction | None,
+    leanest: Mapping[str, Leanest],
     provenance: Provenance,
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite ones become None, and so do those
@@ -65,6 +68,7 @@ def summary_of(
             "accepted": validation.accepted,
             "verdict": validation.verdict,
             "remarks": [r.text for r in validation.remarks if r.about is About.SELECTED],
+            "leanest": _leanest(leanest),
             **next(row for row in _rows(chosen, counted) if row["n"] == selected.n),
         },
         "stability": _stability(reduction, validation),
@@ -72,6 +76,20 @@ def summary_of(
     }
     plain: dict[str, Any] = _plain(data)
     return plain
+
+
+def _leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
+    return {
+        name: {
+            "model": one.model,
+            "operations": one.operations,
+            "torque_error": {
+                "estimation": one.torque_error_estimation,
+                "validation": one.torque_error_validation,
+            },
+        }
+        for name, one in found.items()
+    }
 
 
 def _model(model: Model) -> dict[str, Any]:

@@ -33,6 +33,7 @@ from paramreduce_cli.terms.judging import Errors, Judge
 from paramreduce_cli.terms.searching import LookedAt, Searcher
 from paramreduce_cli.terms.simplify import simplified
 from paramreduce_cli.terms.starts import starts_within
+from paramreduce_cli.texts import share
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
 """Samples of the estimation and the validation set that are looked at while terms are left out, at first and
@@ -140,7 +141,10 @@ def _searched(
     way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in front]
     ends = (one.refitted(fitted, budget) for one in found)
     records = (_record(one, judge, way, lean) for one in _in_order(ends, judge, budget))
-    return next((record for record in records if record is not None), None)
+    term = next((record for record in records if record is not None), None)
+    if term is not None:
+        _say_unfit(term)
+    return term
 
 
 @dataclass(frozen=True)
@@ -194,6 +198,18 @@ def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> L
     if samples.validation is None:
         return LookedAt(fitted_to, None)
     return LookedAt(fitted_to, judge.thinned(samples.validation, watched))
+
+
+def _say_unfit(term: TermModel) -> None:
+    """Of an M that is positive definite, but no more than that."""
+    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    if np.nanmax([0.0, *errors]) > 1:
+        warnings.warn(
+            f"terms: accelerations from the direct dynamics are off by {share(np.nanmax(errors))}, as nothing "
+            "asks for more than a positive definite M. Give terms.acceleration_error.",
+            ParamreduceWarning,
+            stacklevel=3,
+        )
 
 
 def _say_missing(names: list[str], others: bool) -> None:

@@ -6,12 +6,18 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.config.schema import ReductionSection, ReportSection, SamplingSection
+from paramreduce_cli.config.schema import (
+    ReductionSection,
+    ReportSection,
+    SamplingSection,
+    SelectedSection,
+)
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.running import RunningModel, speed
 from paramreduce_cli.export.writing import Exported, export
 from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
     CountedDynamics,
@@ -53,6 +59,7 @@ def report(
     section: ReportSection,
     sampling: SamplingSection,
     search: ReductionSection,
+    wanted: SelectedSection,
     counted: CountedDynamics,
     model: Model | None,
     trajectories: Trajectories | None,
@@ -101,8 +108,13 @@ def report(
         identification=identification,
         terms=terms,
     )
+    lean = {
+        name: found
+        for name in (("inverse", "direct") if model is not None else ())
+        if (found := leanest(name, wanted, validation.heuristics, terms)) is not None
+    }
     summary = summary_of(
-        model, trajectories, reduction, validation, identification, terms, provenance
+        model, trajectories, reduction, validation, identification, terms, lean, provenance
     )
     files: dict[str, bytes] = {}
     images = {}

@@ -456,7 +456,7 @@ def share_of(row, kind, part, budget):
     return 0.0 if error is None else error / budget[kind]
 
 
-def test_summary_and_page(two_link, tmp_path):
+def test_summary_and_page(two_link, tmp_path, invoke):
     shutil.copytree(two_link.store.folder, tmp_path / "r")
     runner = Runner(two_link.config, Store(tmp_path / "r"))
     for stage in ("validate", "report"):
@@ -476,7 +476,21 @@ def test_summary_and_page(two_link, tmp_path):
             for row in one["pareto"]
         ]
         assert np.all(np.diff(strains) < 0), "no leaner one is as good"
+        least = summary["selected"]["leanest"][one["function"]]
+        assert least["model"] == "terms"
+        assert least["operations"] == one["operations"]
     page = path.with_name("index.html").read_text()
+    assert "terms left out</a>, the leanest" in page
+    common = ("export", "configs/two_link.yaml", "--results", tmp_path / "r", "--what", "idm")
+    sets = [part for setting in (ONE_FORMAT, *TERMS) for part in ("--set", setting)]
+    for name in ("leanest", "terms"):
+        invoke(*common, *sets, "--model", name, "--output", tmp_path / name)
+    for file in ("two_link.c", "two_link.h"):
+        assert (tmp_path / "leanest" / file).read_text() == (tmp_path / "terms" / file).read_text()
+    nothing = ("--set", "selected={torque_error: 1e-30}")
+    invoke("validate", "configs/two_link.yaml", "--results", tmp_path / "r", *sets, *nothing)
+    refused = invoke(*common, *sets, *nothing, "--model", "leanest", code=2)
+    assert "the inverse dynamics of no model is within" in refused.err
     assert "Without small terms" in page
     term = loaded(runner, TermReduction).functions["direct"]
     ranges = (path.parent / "tables" / "term-ranges.csv").read_text()

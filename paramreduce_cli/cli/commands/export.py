@@ -7,17 +7,17 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.report_files import save_files
+from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, progress_bars, say
-from paramreduce_cli.config import load_config
-from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.config import Config, load_config
+from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.export.choice import (
     BASE,
     CONSISTENT,
     FULL,
     IDENTIFIED,
-    TERMS,
     chosen_model,
     simplified_model,
 )
@@ -26,7 +26,9 @@ from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.values import VALUES, values_file
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.export.writing import export as exported
+from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.records import (
+    TERMS,
     FloatArray,
     Identification,
     Model,
@@ -39,7 +41,11 @@ from paramreduce_cli.reduction.models import closest_standard
 
 _FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
 """What one function alone is called."""
-_OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, TERMS)
+LEANEST = "leanest"
+"""The model of whichever function is asked for that has it with the fewest operations."""
+_OF_ONE = (TERMS, LEANEST)
+"""Models of one function alone."""
+_OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
 """Models that need more than an observation matrix."""
 
 
@@ -59,7 +65,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, TERMS)
     "--model",
     "text",
     metavar="HEURISTIC:N",
-    help="Or full, or base; with a log also identified, or consistent; terms, for one function with terms left out.  [default: the selected one]",
+    help="Or full, or base; with a log also identified, or consistent; terms, for one function with terms left out; leanest, for the one with the fewest operations within what selected, or terms, allows.  [default: the selected one]",
 )
 @click.option("--constants", is_flag=True, help="Put the parameters' values into the code.")
 @click.option("--single", is_flag=True, help="Single precision, in C.")
@@ -97,17 +103,20 @@ def export(
         )
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
-    if kind in (*FORMATS, VALUES) and (what != Exported.BOTH or constants) and text != TERMS:
+    if kind in (*FORMATS, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
-    if text == TERMS and kind in FORMATS:
+    if text in _OF_ONE and kind in FORMATS:
         raise click.UsageError(
-            f"--model {TERMS}: its values are of use to one function alone, not to a robot's file; "
+            f"--model {text}: its values are of use to one function alone, not to a robot's file; "
             f"write code, or --format {VALUES}."
         )
-    if text == TERMS and what not in _FUNCTIONS:
+    if text in _OF_ONE and what not in _FUNCTIONS:
         raise click.UsageError(
-            f"--model {TERMS}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."
+            f"--model {text}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."
         )
+    if text == LEANEST:
+        assert loaded is not None
+        text = _leanest(loaded, store, _FUNCTIONS[what])
     records: list[type] = [] if loaded is None else [Model]
     if text == TERMS:
         records.append(TermReduction)
@@ -156,6 +165,22 @@ def export(
             )
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")
+
+
+def _leanest(config: Config, store: Store, function: str) -> str:
+    """Name of the model whose function has the fewest operations within what is asked for.
+
+    Raises:
+        ConfigError: There is none within it.
+    """
+    validation = up_to_date(config, store, Validation)
+    terms = up_to_date(config, store, TermReduction) if config.terms is not None else None
+    found = leanest(function, config.selected, validation.heuristics, terms)
+    if found is None:
+        raise ConfigError(
+            f"--model {LEANEST}: the {function} dynamics of no model is within what is asked for on both sets. Allow more."
+        )
+    return found.model
 
 
 def _standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) -> FloatArray:

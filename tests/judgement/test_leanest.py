@@ -1,0 +1,74 @@
+"""The leanest function within tolerances, against all that there are."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from paramreduce_cli.config.schema import SelectedSection
+from paramreduce_cli.judgement.leanest import leanest
+
+RESULTS = {
+    "qr": SimpleNamespace(
+        n=np.array([3, 5]),
+        torque_error_estimation=np.array([0.02, 0.004]),
+        torque_error_validation=np.array([0.03, 0.005]),
+        acceleration_error_estimation=np.array([0.05, 0.01]),
+        acceleration_error_validation=np.array([0.05, 0.02]),
+        operations_inverse=np.array([100, 200]),
+        operations_direct=np.array([150, 300]),
+        mass_matrix_smallest_eigenvalue=np.array([-0.1, 0.1]),
+    ),
+    "swap": SimpleNamespace(
+        n=np.array([4]),
+        torque_error_estimation=np.array([0.008]),
+        torque_error_validation=np.array([0.009]),
+        acceleration_error_estimation=np.array([0.03]),
+        acceleration_error_validation=np.array([0.04]),
+        operations_inverse=np.array([140]),
+        operations_direct=np.array([250]),
+        mass_matrix_smallest_eigenvalue=np.array([0.1]),
+    ),
+}
+
+
+def terms(torque, acceleration, operations=50):
+    """Both functions with such errors on both sets, of a budget of 4 and 10 %."""
+    one = SimpleNamespace(
+        operations=operations,
+        torque_error_estimation=torque,
+        torque_error_validation=torque,
+        acceleration_error_estimation=acceleration,
+        acceleration_error_validation=acceleration,
+    )
+    return SimpleNamespace(
+        torque_budget=0.04, acceleration_budget=0.1, functions={"inverse": one, "direct": one}
+    )
+
+
+@pytest.mark.parametrize(
+    ("wanted", "found", "inverse", "direct"),
+    [
+        ({}, None, "swap:4", "swap:4"),  # within 1 %
+        ({"torque_error": 0.03}, None, "qr:3", "swap:4"),  # the smallest M is not positive definite
+        ({"torque_error": 0.006}, None, "qr:5", "qr:5"),
+        ({"torque_error": 0.001}, None, None, None),
+        ({"torque_error": 0.03, "acceleration_error": 0.035}, None, "qr:3", "qr:5"),
+        ({}, terms(0.035, 0.09), "terms", "terms"),  # within what terms were left out within
+        ({"n": 4}, terms(0.035, 0.09), "terms", "terms"),
+        ({"torque_error": 0.03}, terms(0.035, 0.09), "qr:3", "swap:4"),
+        ({"acceleration_error": 0.045}, terms(0.035, 0.09), "terms", "swap:4"),
+        ({"torque_error": 0.03}, terms(0.02, np.nan), "terms", "terms"),
+        ({"torque_error": 0.03}, terms(0.02, 0.09, operations=120), "qr:3", "terms"),
+        ({"torque_error": 0.03, "operations": 10}, terms(np.nan, 0.01), "qr:3", "swap:4"),
+    ],
+)
+def test_the_fewest_operations_within_what_is_asked_for(wanted, found, inverse, direct):
+    for function, expected in (("inverse", inverse), ("direct", direct)):
+        one = leanest(function, SelectedSection(**wanted), RESULTS, found)
+        assert (one and one.model) == expected
+        if expected is not None and expected != "terms":
+            heuristic, _, n = expected.partition(":")
+            row = RESULTS[heuristic].n.tolist().index(int(n))
+            assert one.operations == getattr(RESULTS[heuristic], f"operations_{function}")[row]
+            assert one.torque_error_validation == RESULTS[heuristic].torque_error_validation[row]
