@@ -488,7 +488,9 @@ def test_summary_and_page(two_link, tmp_path, invoke):
     for file in ("two_link.c", "two_link.h"):
         assert (tmp_path / "leanest" / file).read_text() == (tmp_path / "terms" / file).read_text()
     nothing = ("--set", "selected={torque_error: 1e-30}")
-    invoke("validate", "configs/two_link.yaml", "--results", tmp_path / "r", *sets, *nothing)
+    invoke(
+        "validate", "configs/two_link.yaml", "--results", tmp_path / "r", *sets, *nothing, code=1
+    )
     refused = invoke(*common, *sets, *nothing, "--model", "leanest", code=2)
     assert "the inverse dynamics of no model is within" in refused.err
     assert "Without small terms" in page
