@@ -56,8 +56,8 @@ _OF_TABLES: Mapping[str, Mapping[str, str]] = {
     },
     "terms": {
         "before": "operations, heuristic and number of parameters that it started from",
-        "ε_τ random": "torque error on random states inside the ranges that it was fitted in",
-        "largest": "largest difference of a torque there, as a share of the nominal one: how large, N m or N, and of which joint",
+        "ε_τ random": "torque error on random states inside the limits of the config",
+        "ε_z̈ random": "error of the accelerations on these",
         "smallest eigenvalue": "of all mass matrices; positive where motions can be simulated",
     },
     "trajectories": {

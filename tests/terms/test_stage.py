@@ -480,7 +480,8 @@ def test_summary_and_page(two_link, tmp_path, invoke):
         assert least["model"] == "terms"
         assert least["operations"] == one["operations"]
     page = path.with_name("index.html").read_text()
-    assert "terms left out</a>, the leanest" in page
+    for one in summary["terms"]:
+        assert f"{one['operations']} with terms left out</a>, which is the leanest" in page
     common = ("export", "configs/two_link.yaml", "--results", tmp_path / "r", "--what", "idm")
     sets = [part for setting in (ONE_FORMAT, *TERMS) for part in ("--set", setting)]
     for name in ("leanest", "terms"):
