@@ -94,10 +94,6 @@ def config_and_model(robot, *overrides):
     return config, build_model(config, config.model, Run())
 
 
-def constraints_of(config, mechanism):
-    return tuple(entry.constraint(mechanism) for entry in config.trajectories.constraints)
-
-
 def summary_of(folder):
     return json.loads((folder / "report" / "summary.json").read_text())
 

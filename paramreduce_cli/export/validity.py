@@ -38,19 +38,19 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
     where = "both sets"
     if term.random_states or term.mass_states:
-        lines.append("Random states were drawn inside the limits, which are")
-        lines += within(mechanism, *term.limits)
+        lines.append("Random states inside the limits were looked at, which are")
+        lines += within(mechanism, *term.drawn)
     if term.random_states:
         where = "these"
         lines.append(
             f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
         )
-        if np.isfinite(term.random_acceleration_error):
+        if not np.isnan(term.random_acceleration_error):
             error = share(term.random_acceleration_error)
             lines.append(f"Error of the accelerations on these: {error}.")
     lines.append(f"Largest differences of torques, N m or N, on {where}:")
     differences = zip(mechanism.coordinate_names, term.largest_difference.tolist(), strict=True)
-    lines += [f"  {name}: {value:.3g}" for name, value in differences]
+    lines += [f"  {name}: {value:.3g}" for name, value in differences if value == value]
     worst = mechanism.coordinate_names[term.worst_joint]
     lines.append(f"The worst one, against the nominal torque, is that of {worst}, at")
     lines += [

@@ -5,8 +5,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from paramreduce_cli.config.schema import SelectedSection
-from paramreduce_cli.judgement.picking import ON_BOTH_SETS, excess
 from paramreduce_cli.records import TERMS, HeuristicValidation, Leanest, TermReduction
+
+_BOTH = ("estimation", "validation")
 
 Tolerances = Mapping[str, float]
 Results = Mapping[str, HeuristicValidation]
@@ -15,10 +16,10 @@ Results = Mapping[str, HeuristicValidation]
 def leanest(
     function: str, wanted: SelectedSection, results: Results, terms: TermReduction | None
 ) -> Leanest | None:
-    """The function with the fewest operations whose errors are within what is asked for on both sets.
+    """The function with the fewest operations whose errors are within what is asked for.
 
-    That are the errors under ``selected``, else those that terms were left out within, else the usual
-    ones. Errors of accelerations count for the direct dynamics alone, whose mass matrices must be
+    That are the errors under ``selected``, on both sets, else those that terms were left out within, on
+    the sets that these are of, else the usual ones. Errors of accelerations count for the direct dynamics alone, whose mass matrices must be
     positive definite on both sets.
 
     Args:
@@ -30,32 +31,43 @@ def leanest(
     Returns:
         None if there is none.
     """
-    tolerances = _tolerances(function, wanted, terms)
-    found = [*_alone(function, tolerances, results), *_without_terms(function, tolerances, terms)]
-    return min(found, key=lambda one: one.operations, default=None)
-
-
-def _tolerances(function: str, wanted: SelectedSection, terms: TermReduction | None) -> Tolerances:
-    given = {key: value for key, value in wanted.tolerances().items() if key != "operations"}
-    if not given and terms is not None:
-        given = {
+    tolerances = _tolerances(function, wanted.tolerances())
+    looked_at: tuple[str, ...] = _BOTH
+    if not tolerances and terms is not None:
+        budget = {
             "torque_error": terms.torque_budget,
             "acceleration_error": terms.acceleration_budget,
         }
-    given = given or dict(SelectedSection.USUAL)
-    if function == "inverse":
-        given.pop("acceleration_error", None)
-    return given
+        tolerances = _tolerances(function, budget)
+        looked_at = _BOTH[:1] if terms.held_out else _BOTH
+    columns = {
+        f"{key}_{part}": limit
+        for key, limit in (tolerances or SelectedSection.USUAL).items()
+        for part in looked_at
+    }
+    found = [*_alone(function, columns, results), *_without_terms(function, columns, terms)]
+    return min(found, key=_rank, default=None)
 
 
-def _alone(function: str, tolerances: Tolerances, results: Results) -> Iterator[Leanest]:
+def _tolerances(function: str, given: Tolerances) -> Tolerances:
+    """Of errors that the function has, without infinite ones."""
+    kinds = ("torque_error", "acceleration_error")[: 2 if function == "direct" else 1]
+    return {key: given[key] for key in kinds if np.isfinite(given.get(key, np.inf))}
+
+
+def _rank(one: Leanest) -> tuple[int, float]:
+    """The less the better; of as many operations the most exact one."""
+    return one.operations, one.torque_error_estimation
+
+
+def _alone(function: str, columns: Tolerances, results: Results) -> Iterator[Leanest]:
     """Functions of models with parameters alone left out."""
     for heuristic, result in results.items():
-        within = excess(result, tolerances) <= 1 if tolerances else np.ones(result.n.size, bool)
+        ways = [getattr(result, name) <= limit for name, limit in columns.items()]
         if function == "direct":
-            within &= result.mass_matrix_smallest_eigenvalue > 0
+            ways.append(result.mass_matrix_smallest_eigenvalue > 0)
         operations = getattr(result, f"operations_{function}")
-        for row in np.flatnonzero(within):
+        for row in np.flatnonzero(np.all(ways, axis=0)):
             yield Leanest(
                 f"{heuristic}:{result.n[row]}",
                 int(operations[row]),
@@ -65,17 +77,10 @@ def _alone(function: str, tolerances: Tolerances, results: Results) -> Iterator[
 
 
 def _without_terms(
-    function: str, tolerances: Tolerances, terms: TermReduction | None
+    function: str, columns: Tolerances, terms: TermReduction | None
 ) -> Iterator[Leanest]:
     one = None if terms is None else terms.functions.get(function)
-    if one is None:
-        return
-    errors = [
-        (getattr(one, name), limit)
-        for key, limit in tolerances.items()
-        for name in ON_BOTH_SETS[key]
-    ]
-    if all(error <= limit for error, limit in errors):
+    if one is not None and all(getattr(one, name) <= limit for name, limit in columns.items()):
         yield Leanest(
             TERMS, one.operations, one.torque_error_estimation, one.torque_error_validation
         )

@@ -11,12 +11,11 @@ from paramreduce_cli.texts import EXACT
 Pick = tuple[str, int]
 """A heuristic, and the row of one of its subsets."""
 
-ON_BOTH_SETS = {
+_ON_BOTH_SETS = {
     "torque_error": ("torque_error_estimation", "torque_error_validation"),
     "acceleration_error": ("acceleration_error_estimation", "acceleration_error_validation"),
     "operations": ("operations_inverse",),
 }
-"""Columns of what is judged that keep to a tolerance, by what it is on."""
 _OBJECTIVES = (
     "n",
     "torque_error_estimation",
@@ -36,7 +35,7 @@ def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> Floa
     ratios = [
         np.asarray(getattr(result, name), dtype=float) / limit
         for key, limit in tolerances.items()
-        for name in ON_BOTH_SETS[key]
+        for name in _ON_BOTH_SETS[key]
     ]
     worst: FloatArray = np.max(ratios, axis=0)
     return worst

@@ -72,9 +72,10 @@ class TermModel:
     """On random states inside the limits; not a number where the torques are not known there."""
     random_acceleration_error: float
     random_states: int
-    """How many these are; 0 where torques were measured, or no states of loops were found."""
+    """How many these are; 0 where torques were measured, or none were found."""
     largest_difference: FloatArray
-    """Largest difference of each joint's torque on those states, else on both sets, N m (N), (n_dof,)."""
+    """Largest difference of each joint's torque on those states, else on both sets, N m (N), (n_dof,); not a number where
+    it was not measured."""
     worst_joint: int
     """The joint whose largest difference is the largest share of its nominal torque."""
     worst_state: FloatArray
@@ -87,9 +88,9 @@ class TermModel:
     """Smallest z, dz and ddz of the estimation set, (3, n_dof): the model holds within."""
     upper: FloatArray
     """The largest."""
-    limits: FloatArray
-    """Smallest and largest z, dz and ddz of random states, those that the config allows; what has no limit is
-    inside what the estimation set reaches, (2, 3, n_dof)."""
+    drawn: FloatArray
+    """Between what random states were drawn, smallest and largest z, dz and ddz, (2, 3, n_dof): the limits, or what the
+    estimation set reaches where there is none; of loops what they came to. Not numbers if there are none."""
     front: TermFront
 
 
@@ -98,8 +99,10 @@ class TermReduction:
     """Functions whose terms were reduced within a budget."""
 
     torque_budget: float
-    """Torque error allowed on both sets."""
+    """Torque error allowed on both sets, or on the estimation set."""
     acceleration_budget: float
     """The same of accelerations, for the direct dynamics; infinite where none was given."""
+    held_out: bool
+    """Whether budgets are on the estimation set alone, the other one being held out."""
     functions: Mapping[str, TermModel]
     """``inverse`` and ``direct``."""

@@ -212,6 +212,7 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
             "heuristic": one.heuristic,
             "n_start": one.n_start,
             "budget": {"torque": found.torque_budget, "acceleration": found.acceleration_budget},
+            "held_out": found.held_out,
             "operations": one.operations,
             "operations_start": one.operations_start,
             **_errors(one),
@@ -224,7 +225,7 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
             "smallest_eigenvalue": one.smallest_eigenvalue,
             "mass_states": one.mass_states,
             "ranges": [one.lower, one.upper],
-            "limits": one.limits,
+            "drawn": one.drawn,
             "parameters": dict(zip(one.names, one.values, strict=True)),
             "units": dict(zip(one.names, one.units, strict=True)),
             "pareto": [

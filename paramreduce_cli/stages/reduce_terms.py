@@ -94,7 +94,7 @@ def reduce_terms(
     functions = {name: functions[name] for name in names if name in functions}
     if share.whole:
         _say_missing([name for name in names if name not in functions], bool(functions))
-    return TermReduction(budget.torque, budget.acceleration, functions)
+    return TermReduction(budget.torque, budget.acceleration, _measured(sampling), functions)
 
 
 def _searched(
@@ -110,9 +110,7 @@ def _searched(
     run: Run,
 ) -> TermModel | None:
     """A function with terms left out, None where nothing is found within the budget."""
-    measured = sampling.log is not None or (
-        sampling.estimation_file is not None and sampling.torques == "measured"
-    )
+    measured = _measured(sampling)
     projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
@@ -142,7 +140,7 @@ def _searched(
     ends = (one.refitted(fitted, budget) for one in found)
     records = (_record(one, judge, way, lean) for one in _in_order(ends, judge, budget))
     term = next((record for record in records if record is not None), None)
-    if term is not None:
+    if term is not None and not np.isfinite(budget.acceleration):
         _say_unfit(term)
     return term
 
@@ -181,6 +179,13 @@ def _in_order(ends: Iterable[Simplified], judge: Judge, budget: Budget) -> Itera
             (Judged.of(one, judge, budget) for one in alike), key=lambda one: one.strain
         )
         yield from (one for one in judged if one.strain <= 1)
+
+
+def _measured(sampling: SamplingSection) -> bool:
+    """Whether torques are those of a machine, and what is held out is not looked at."""
+    return sampling.log is not None or (
+        sampling.estimation_file is not None and sampling.torques == "measured"
+    )
 
 
 def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
@@ -263,7 +268,7 @@ def _record(judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels) -
         mass_states=states,
         lower=judge.lower,
         upper=judge.upper,
-        limits=judge.limits,
+        drawn=judge.drawn,
         front=_front([*way, judged]),
     )
 

@@ -58,7 +58,7 @@ class Strayed:
     states: int
     """How many these are; without any, what follows is of both sets."""
     largest: FloatArray
-    """Difference of each joint's torque, N m (N), (n_dof,)."""
+    """Difference of each joint's torque, N m (N), (n_dof,); not a number where it was not measured."""
     worst_joint: int
     """With the largest one as a share of the nominal torque."""
     worst_state: FloatArray
@@ -113,9 +113,20 @@ class Judge:
         """Smallest and largest z, dz and ddz of the estimation set, (3, n_dof) each."""
 
     @property
-    def limits(self) -> FloatArray:
-        """Smallest and largest z, dz and ddz of random states, (2, 3, n_dof)."""
-        return self._bounds[:, :, list(self._model.mechanism.independent)]
+    def drawn(self) -> FloatArray:
+        """Between what random states are drawn, of loops what they come to, (2, 3, n_dof); not numbers if none are looked at."""
+        mechanism = self._model.mechanism
+        independent = list(mechanism.independent)
+        nowhere = np.full((2, 3, mechanism.n_dof), np.nan)
+        if self.measured and not self.direct:
+            return nowhere
+        if mechanism.loops is None:
+            return self._bounds[:, :, independent]
+        if not self._random_sets:
+            return nowhere
+        every = np.hstack([part.states[: 3 * mechanism.n_q] for part in self._random_sets])
+        of_joints = every.reshape(3, mechanism.n_q, -1)[:, independent]
+        return np.array([of_joints.min(axis=2), of_joints.max(axis=2)])
 
     def thinned(self, part: SampleSet, most: int) -> TermSamples:
         """So many samples of a set at most, evenly spread."""
@@ -168,10 +179,11 @@ class Judge:
         errors = errors_over(zip(parts, outputs, strict=True)) if parts else _NONE
         off = np.abs(np.hstack([s.differences(o) for s, o in zip(looked_at, outputs, strict=True)]))
         joint, state = np.unravel_index(np.argmax((off.T / self._nominal_torque).T), off.shape)
+        largest = np.where(np.isfinite(self._nominal_torque), off.max(axis=1), np.nan)
         mechanism = self._model.mechanism
         worst = np.hstack([part.states for part in looked_at])[: 3 * mechanism.n_q, state]
         of_joints = worst.reshape(3, -1)[:, list(mechanism.independent)]
-        return Strayed(*errors, states, off.max(axis=1), int(joint), of_joints)
+        return Strayed(*errors, states, largest, int(joint), of_joints)
 
     @cached_property
     def _random_sets(self) -> list[TermSamples]:
@@ -204,11 +216,10 @@ class Judge:
 
     @property
     def _random_poses(self) -> Iterator[TermSamples]:
-        """Random states on which mass matrices are looked at, in parts."""
-        if self._model.mechanism.loops is not None:
-            yield from self._random_sets
-        else:
-            for some in self._random_states(_MASSES):
+        """Random states on which mass matrices are looked at, in parts: those of the errors, and of trees others."""
+        yield from self._random_sets
+        if self._model.mechanism.loops is None:
+            for some in self._random_states(_MASSES - _TORQUES):
                 yield self._made([self._block(some)])
 
     @cached_property
@@ -239,11 +250,14 @@ class Judge:
 def _bounds(
     limits: JointLimits, independent: list[int], lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """Smallest and largest q, dq and ddq inside limits, (2, 3, n_q); where there is none, what was reached, (3, n_q)."""
+    """Smallest and largest q, dq and ddq inside limits, (2, 3, n_q); rates without any are as fast as was reached, (3, n_q)."""
     rates = np.array([limits.velocity, limits.acceleration])
     known = np.array([np.vstack([limits.lower, -rates]), np.vstack([limits.upper, rates])])
-    bounds = np.array([lower, upper])
-    own = bounds[:, :, independent]
+    own = np.array([lower, upper])[:, :, independent]
+    # Either way, at most as fast as the set: it may have gone around loops one way only.
+    fastest = np.maximum(np.abs(lower), np.abs(upper))
+    fastest[0] = np.inf  # positions of loops keep to their constraints, and away from singular ones
+    bounds = np.array([-fastest, fastest])
     bounds[:, :, independent] = np.where(np.isfinite(known), known, own)
     return bounds
 

@@ -14,6 +14,8 @@ from pathlib import Path
 import numpy as np
 
 import paramreduce_cli as pr
+from paramreduce_cli.config.schema import SelectedSection
+from paramreduce_cli.judgement.leanest import leanest
 from tests.benchmarks.robots import ROBOTS
 
 ARMS = ("UR10", "TX40", "Panda")
@@ -22,15 +24,9 @@ TORQUE_ERROR = 0.01
 
 def parameters_alone(validation, direct):
     """Operations of the leanest model within the error on both sets, infinite if there is none."""
-    least = np.inf
-    for found in validation.heuristics.values():
-        within = found.torque_error_estimation <= TORQUE_ERROR
-        within &= found.torque_error_validation <= TORQUE_ERROR
-        operations = found.operations_direct if direct else found.operations_inverse
-        if direct:
-            within &= found.mass_matrix_smallest_eigenvalue > 0
-        least = min([least, *operations[within]])
-    return least
+    wanted = SelectedSection(torque_error=TORQUE_ERROR)
+    found = leanest("direct" if direct else "inverse", wanted, validation.heuristics, None)
+    return np.inf if found is None else found.operations
 
 
 def told(label, seed, folder):

@@ -124,7 +124,9 @@ def test_a_budget_of_terms_that_nothing_keeps_to_is_remarked_on(write_config):
     terms = "terms: {{acceleration_error: 0.05, functions: [{}]}}\nselected:"
     with pytest.warns(ParamreduceWarning, match="terms.acceleration_error is of the direct"):
         load_config(write_config(("selected:", terms.format("inverse"))))
-    load_config(write_config(("selected:", terms.format("inverse, direct"))))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        load_config(write_config(("selected:", terms.format("inverse, direct"))))
 
 
 @pytest.mark.parametrize(

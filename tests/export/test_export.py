@@ -249,9 +249,17 @@ def test_an_angle_that_results_use_too(tmp_path):
     outputs = [g.add(g.call("sin", angle), g.multiply(phi, angle)), g.call("cos", angle)]
     program = Program.of_graph(g, outputs).stored()
     n = model.mechanism.n_dof
+    errors = [
+        f"{kind}_error_{part}"
+        for kind in ("torque", "acceleration")
+        for part in ("estimation", "validation")
+    ]
     function = TermModel(
-        "swap", chosen.n, chosen.names, chosen.values, np.ones(chosen.n), chosen.position, program, False, 6, 6,
-        *[0.0] * 5, np.zeros(n), np.nan, 0, -np.ones((3, n)), np.ones((3, n)), None,
+        heuristic="swap", n_start=chosen.n, names=chosen.names, values=chosen.values, units=np.ones(chosen.n),
+        position=chosen.position, program=program, projected=False, operations=6, operations_start=6,
+        **dict.fromkeys(errors, 0.0), random_torque_error=0.0, random_acceleration_error=np.nan, random_states=1,
+        largest_difference=np.zeros(n), worst_joint=0, worst_state=np.zeros((3, n)), smallest_eigenvalue=np.nan,
+        mass_states=0, lower=-np.ones((3, n)), upper=np.ones((3, n)), drawn=np.zeros((2, 3, n)), front=None,
     )  # fmt: skip
     files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=function)
     for name, content in files.items():

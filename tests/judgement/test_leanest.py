@@ -10,40 +10,41 @@ from paramreduce_cli.judgement.leanest import leanest
 
 RESULTS = {
     "qr": SimpleNamespace(
-        n=np.array([3, 5]),
-        torque_error_estimation=np.array([0.02, 0.004]),
-        torque_error_validation=np.array([0.03, 0.005]),
-        acceleration_error_estimation=np.array([0.05, 0.01]),
-        acceleration_error_validation=np.array([0.05, 0.02]),
-        operations_inverse=np.array([100, 200]),
-        operations_direct=np.array([150, 300]),
-        mass_matrix_smallest_eigenvalue=np.array([-0.1, 0.1]),
+        n=np.array([1, 3, 5]),
+        torque_error_estimation=np.array([0.9, 0.02, 0.004]),
+        torque_error_validation=np.array([0.9, 0.03, 0.005]),
+        acceleration_error_estimation=np.array([np.inf, 0.05, 0.01]),
+        acceleration_error_validation=np.array([np.inf, 0.05, 0.02]),
+        operations_inverse=np.array([2, 100, 200]),
+        operations_direct=np.array([3, 150, 300]),
+        mass_matrix_smallest_eigenvalue=np.array([0.0, -0.1, 0.1]),
     ),
     "swap": SimpleNamespace(
-        n=np.array([4]),
-        torque_error_estimation=np.array([0.008]),
-        torque_error_validation=np.array([0.009]),
-        acceleration_error_estimation=np.array([0.03]),
-        acceleration_error_validation=np.array([0.04]),
-        operations_inverse=np.array([140]),
-        operations_direct=np.array([250]),
-        mass_matrix_smallest_eigenvalue=np.array([0.1]),
+        n=np.array([6, 4]),
+        torque_error_estimation=np.array([0.0085, 0.008]),
+        torque_error_validation=np.array([0.009, 0.009]),
+        acceleration_error_estimation=np.array([0.03, 0.03]),
+        acceleration_error_validation=np.array([0.04, 0.04]),
+        operations_inverse=np.array([140, 140]),
+        operations_direct=np.array([250, 250]),
+        mass_matrix_smallest_eigenvalue=np.array([0.1, 0.1]),
     ),
 }
 
 
-def terms(torque, acceleration, operations=50):
-    """Both functions with such errors on both sets, of a budget of 4 and 10 %."""
+def terms(torque, acceleration, operations=50, held_out=None, budget=0.1):
+    """Both functions with such errors, of a budget of 4 % and so much of accelerations."""
     one = SimpleNamespace(
         operations=operations,
         torque_error_estimation=torque,
-        torque_error_validation=torque,
+        torque_error_validation=torque if held_out is None else held_out,
         acceleration_error_estimation=acceleration,
         acceleration_error_validation=acceleration,
     )
     return SimpleNamespace(
-        torque_budget=0.04, acceleration_budget=0.1, functions={"inverse": one, "direct": one}
-    )
+        torque_budget=0.04, acceleration_budget=budget, held_out=held_out is not None,
+        functions={"inverse": one, "direct": one},
+    )  # fmt: skip
 
 
 @pytest.mark.parametrize(
@@ -58,6 +59,16 @@ def terms(torque, acceleration, operations=50):
         ({"n": 4}, terms(0.035, 0.09), "terms", "terms"),
         ({"torque_error": 0.03}, terms(0.035, 0.09), "qr:3", "swap:4"),
         ({"acceleration_error": 0.045}, terms(0.035, 0.09), "terms", "swap:4"),
+        ({"acceleration_error": 0.045}, None, "swap:4", "swap:4"),  # d within 1 %, as it has none
+        ({}, terms(0.035, np.inf, budget=np.inf), "terms", "terms"),
+        ({}, terms(0.05, 0.09, budget=np.inf), "qr:3", "swap:4"),
+        (
+            {},
+            terms(0.035, 0.09, held_out=0.06),
+            "terms",
+            "terms",
+        ),  # the budget is not on what is held out
+        ({"torque_error": 0.04}, terms(0.035, 0.09, held_out=0.06), "qr:3", "swap:4"),
         ({"torque_error": 0.03}, terms(0.02, np.nan), "terms", "terms"),
         ({"torque_error": 0.03}, terms(0.02, 0.09, operations=120), "qr:3", "terms"),
         ({"torque_error": 0.03, "operations": 10}, terms(np.nan, 0.01), "qr:3", "swap:4"),

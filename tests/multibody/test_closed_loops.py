@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 import pytest
 import scipy.linalg
-from conftest import CLOSED_LOOPS, config_of, constraints_of, slope
+from conftest import CLOSED_LOOPS, config_of, slope
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
 from paramreduce_cli.errors import ConcernError, DataError, ParamreduceWarning
@@ -269,7 +269,7 @@ def test_follower_finds_what_a_fresh_start_finds():
 
 def test_constraints_of_the_six_legged_robot_at_home():
     mechanism = closed("hexaglide")
-    constraints = constraints_of(config_of("hexaglide"), mechanism)
+    constraints = config_of("hexaglide").trajectories.bounded(mechanism)
     values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
     assert values[0] == pytest.approx(0, abs=1e-9)
     assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)

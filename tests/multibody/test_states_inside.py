@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from conftest import config_of, constraints_of, model_of
+from conftest import config_of, model_of
 
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -68,7 +68,7 @@ def test_states_of_loops_are_assembled_inside_limits_and_constraints(robot):
     lower = -upper
     lower[0, independent], upper[0, independent] = limits.lower, limits.upper
     lower[1, independent], upper[1, independent] = -limits.velocity, limits.velocity
-    constraints = constraints_of(config, mechanism)
+    constraints = config.trajectories.bounded(mechanism)
     _, (q, dq, ddq) = drawn(robot, (lower, upper), constraints, known, 60)
     for values, low, high in zip((q, dq, ddq), lower, upper, strict=True):
         assert 30 <= len(values) <= 60

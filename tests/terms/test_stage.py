@@ -281,11 +281,11 @@ def test_random_states_are_inside_the_limits_and_have_the_errors_that_are_said(t
     """Drawn anew, other states of the same limits are as far off; the worst one is exactly."""
     model, samples = loaded(two_link, Model), loaded(two_link, Samples)
     term, given = loaded(two_link, TermReduction).functions[name], given_by(two_link, name)
-    (low, dlow, ddlow), (high, dhigh, ddhigh) = term.limits
+    (low, dlow, ddlow), (high, dhigh, ddhigh) = term.drawn
     np.testing.assert_allclose([low, high], [[-np.pi / 2] * 2, [np.pi / 2] * 2])
     np.testing.assert_allclose([dlow, dhigh], [[-3] * 2, [3] * 2])
     np.testing.assert_array_equal([ddlow, ddhigh], [term.lower[2], term.upper[2]])  # no limits
-    q, dq, ddq = np.random.default_rng(7).uniform(*term.limits, size=(20_000, 3, 2)).swapaxes(0, 1)
+    q, dq, ddq = np.random.default_rng(7).uniform(*term.drawn, size=(20_000, 3, 2)).swapaxes(0, 1)
     dynamics = Dynamics(model.mechanism)
 
     def off(q, dq, ddq):
@@ -316,7 +316,7 @@ def test_the_worst_state_of_loops_is_assembled_inside_the_limits(four_bar):
     model, found = loaded(four_bar, Model), loaded(four_bar, TermReduction)
     mechanism = model.mechanism
     for term in found.functions.values():
-        (lower, upper), (z, dz, ddz) = term.limits, term.worst_state[:, None]
+        (lower, upper), (z, dz, ddz) = term.drawn, term.worst_state[:, None]
         assert np.all((term.worst_state >= lower) & (term.worst_state <= upper))
         q, dq, ddq = Coordinates(mechanism).states(z, dz, ddz)
         tau = Dynamics(mechanism).inverse(q, dq, ddq, model.values)
@@ -339,10 +339,7 @@ def recomputed_in_c(runner, name):
     library = load(header + source.replace(f'#include "{robot}.h"', ""))
     function = getattr(library, f"{robot}_{name}_dynamics")
     (declared,) = exported_functions(model, chosen, what, simplified=term)
-    n, independent, dependent = (
-        mechanism.n_dof,
-        *map(list, (mechanism.independent, mechanism.dependent)),
-    )
+    n, dependent = mechanism.n_dof, list(mechanism.dependent)
     results = {"inverse": [np.empty(n)], "direct": [np.empty((n, n)), np.empty(n)]}[name]
     off, total = np.zeros(2), np.zeros(2)
     nominal, scale = model_weights(runner), samples.nominal_acceleration
@@ -363,7 +360,6 @@ def recomputed_in_c(runner, name):
             pairs = ((torques, tau, nominal), (motion, ddz, scale))
             off += [np.sum(((found - true) / unit) ** 2) for found, true, unit in pairs]
             total += [np.sum((true / unit) ** 2) for _, true, unit in pairs]
-    assert independent
     return term, np.sqrt(off / total)
 
 
@@ -416,7 +412,7 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
             in header
         )
         assert f"{joint}: {largest:.3g} " in header
-    for joint, (lower, upper) in zip(names, np.moveaxis(term.limits, 2, 0), strict=True):
+    for joint, (lower, upper) in zip(names, np.moveaxis(term.drawn, 2, 0), strict=True):
         assert f"{joint}: position {lower[0]:.4g} to {upper[0]:.4g} rad, velocity {lower[1]:.4g} to {upper[1]:.4g}" in header  # fmt: skip
     said = f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
     assert said in header
@@ -517,6 +513,9 @@ def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measu
         assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
         assert estimation <= 0.2
         assert np.isnan(term.random_torque_error), "torques at other states are not known"
+        assert term.random_states == 0
+        assert term.mass_states == (100_000 if name == "direct" else 0)
+        assert np.isnan(term.drawn).all() == (name == "inverse")
 
 
 def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_copy, monkeypatch):

@@ -178,7 +178,7 @@ def _leanest(config: Config, store: Store, function: str) -> str:
     found = leanest(function, config.selected, validation.heuristics, terms)
     if found is None:
         raise ConfigError(
-            f"--model {LEANEST}: the {function} dynamics of no model is within what is asked for on both sets. Allow more."
+            f"--model {LEANEST}: the {function} dynamics of no model is within what is asked for. Give selected.torque_error, and more of it."
         )
     return found.model
 

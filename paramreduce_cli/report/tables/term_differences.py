@@ -16,9 +16,11 @@ def term_differences(data: ReportData) -> Table:
     rows = []
     for name, one in functions.items():
         for j, joint in enumerate(data.model.mechanism.coordinate_names):
-            largest = one.largest_difference[j]
+            largest, nominal = one.largest_difference[j], data.reduction.nominal_torque[j]
             star = " *" if j == one.worst_joint else ""
-            of_nominal = share(largest / data.reduction.nominal_torque[j])
+            sizes = (
+                (f"{largest:.3g}", share(largest / nominal)) if largest == largest else ("-", "-")
+            )
             state = (f"{value:.4g}" for value in one.worst_state[:, j])
-            rows.append((labels[name], f"{joint}{star}", f"{largest:.3g}", of_nominal, *state))
+            rows.append((labels[name], f"{joint}{star}", *sizes, *state))
     return Table("Differences of torques without small terms", header, tuple(rows))

@@ -7,16 +7,17 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TERMS, 2)
 def term_ranges(data: ReportData) -> Table:
-    """Ranges of the estimation set, inside which functions with terms left out hold, and limits of the config, inside which random states are looked at; where there are no limits, these are the ranges."""
+    """Ranges of the estimation set, inside which functions with terms left out hold, and those of the random states that they are looked at on: the limits of the config, or what the set reaches where there is none; of loops what they come to."""
     functions = data.terms.functions if data.terms is not None else {}
     kinds = ("position", "velocity", "acceleration")
-    header = ("joint", "unit", *kinds, *(f"{kind} limits" for kind in kinds))
+    header = ("joint", "unit", *kinds, *(f"random {kind}" for kind in kinds))
     rows: list[tuple[str, ...]] = []
     if functions:
-        one = next(iter(functions.values()))
+        one = max(functions.values(), key=lambda one: one.mass_states)
         mechanism = data.model.mechanism
         for j, joint in enumerate(mechanism.coordinate_names):
-            extremes = (*zip(one.lower[:, j], one.upper[:, j], strict=True), *one.limits[:, :, j].T)
+            extremes = (*zip(one.lower[:, j], one.upper[:, j], strict=True), *one.drawn[:, :, j].T)
             unit = mechanism.bodies[mechanism.independent[j]].unit
-            rows.append((joint, unit, *(f"{low:.4g} to {high:.4g}" for low, high in extremes)))
+            shown = (f"{low:.4g} to {high:.4g}" if low == low else "-" for low, high in extremes)
+            rows.append((joint, unit, *shown))
     return Table("Ranges of functions with terms left out", header, tuple(rows))
