@@ -19,8 +19,8 @@ def leanest(
     """The function with the fewest operations whose errors are within what is asked for.
 
     That are the errors under ``selected``, on both sets, else those that terms were left out within, on
-    the sets that these are of, else the usual ones. Errors of accelerations count for the direct dynamics alone, whose mass matrices must be
-    positive definite on both sets.
+    the sets that these are of, else the usual ones. Errors of accelerations count for the direct dynamics
+    alone, whose mass matrices must be positive definite on both sets.
 
     Args:
         function: ``inverse`` or ``direct``.

@@ -103,6 +103,6 @@ class TermReduction:
     acceleration_budget: float
     """The same of accelerations, for the direct dynamics; infinite where none was given."""
     held_out: bool
-    """Whether budgets are on the estimation set alone, the other one being held out."""
+    """Whether budgets are on the estimation set alone, the other one being held out, or absent."""
     functions: Mapping[str, TermModel]
     """``inverse`` and ``direct``."""

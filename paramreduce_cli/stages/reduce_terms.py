@@ -94,7 +94,8 @@ def reduce_terms(
     functions = {name: functions[name] for name in names if name in functions}
     if share.whole:
         _say_missing([name for name in names if name not in functions], bool(functions))
-    return TermReduction(budget.torque, budget.acceleration, _measured(sampling), functions)
+    alone = _measured(sampling) or samples.validation is None
+    return TermReduction(budget.torque, budget.acceleration, alone, functions)
 
 
 def _searched(
