@@ -320,10 +320,10 @@ def test_the_worst_state_of_loops_is_assembled_inside_the_limits(four_bar):
         assert np.all((term.worst_state >= lower) & (term.worst_state <= upper))
         q, dq, ddq = Coordinates(mechanism).states(z, dz, ddz)
         tau = Dynamics(mechanism).inverse(q, dq, ddq, model.values)
-        assert np.abs(tau).max() < 5 * mechanism_reach(four_bar), "no singular one"
+        assert np.abs(tau).max() < 5 * largest_torque(four_bar), "no singular one"
 
 
-def mechanism_reach(runner):
+def largest_torque(runner):
     """Largest torque of the estimation set."""
     return max(np.abs(b.tau).max() for b in loaded(runner, Samples).estimation.blocks())
 
