@@ -363,10 +363,7 @@ def _odd_drives(config: Config) -> Iterator[str]:
     sampling = config.sampling
     missing = {name: drive.unknown() for name, drive in config.each_drive().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
-    measured = sampling.log is not None or (
-        sampling.estimation_file is not None and sampling.torques == "measured"
-    )
-    if found and not measured:
+    if found and not sampling.measured:
         yield f"unknown, and so zero in the torques of the model: {', '.join(found)}"
     for name, drive in config.each_drive().items():
         for kind, value in drive.effects().items():

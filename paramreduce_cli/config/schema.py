@@ -189,6 +189,12 @@ class SamplingSection(Section):
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic accelerations, one for all joints or a list, rad/s^2 (m/s^2 if prismatic); or their standard deviation over the estimation set."""
 
+    @property
+    def measured(self) -> bool:
+        """Whether torques of the estimation set are those of a machine."""
+        recorded = self.estimation_file is not None and self.torques == "measured"
+        return self.log is not None or recorded
+
 
 class GroupSection(Section):
     """Parameters that play the same role on several bodies: selected or dropped together."""

@@ -38,7 +38,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
     where = "both sets"
     if term.random_states or term.mass_states:
-        lines.append("Random states inside the limits were looked at, which are")
+        lines.append("Random states inside the limits were looked at, with these ranges:")
         lines += within(mechanism, *term.drawn)
     if term.random_states:
         where = "these"
@@ -50,7 +50,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
             lines.append(f"Error of the accelerations on these: {error}.")
     lines.append(f"Largest differences of torques, N m or N, on {where}:")
     differences = zip(mechanism.coordinate_names, term.largest_difference.tolist(), strict=True)
-    lines += [f"  {name}: {value:.3g}" for name, value in differences if value == value]
+    lines += [f"  {name}: {value:.3g}" for name, value in differences if not np.isnan(value)]
     worst = mechanism.coordinate_names[term.worst_joint]
     lines.append(f"The worst one, against the nominal torque, is that of {worst}, at")
     lines += [

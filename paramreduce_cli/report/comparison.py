@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 
@@ -249,16 +250,14 @@ def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
 
 def _kept_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
     """What must hold of a function however its terms were left out, as far as it held at first."""
-    for kind, allowed in x["budget"].items():
-        for part, before in x[f"{kind}_error"].items():
-            if part == "validation" and x.get("held_out"):
-                continue
-            now = y[f"{kind}_error"][part]
-            if before is not None and allowed is not None and before <= allowed:
-                holds = now is not None and now <= allowed
-                if not holds:
-                    what = f"{kind} error without small terms, {name}, {part}"
-                    yield Difference(what, f"{before:.6g} of {allowed:.6g}", _text(now), False)
+    parts = ("estimation",) if x.get("held_out") else ("estimation", "validation")
+    for kind, part in product(("torque", "acceleration"), parts):
+        allowed, (before, now) = x["budget"][kind], (one[f"{kind}_error"][part] for one in (x, y))
+        if before is None or allowed is None or before > allowed:
+            continue
+        if now is None or now > allowed:
+            what = f"{kind} error without small terms, {name}, {part}"
+            yield Difference(what, f"{before:.6g} of {allowed:.6g}", _text(now), False)
     before, now = x["smallest_eigenvalue"], y["smallest_eigenvalue"]
     if before is not None and (now is None or now <= 0 < before):
         what = f"smallest eigenvalue without small terms, {name}"

@@ -94,7 +94,7 @@ def reduce_terms(
     functions = {name: functions[name] for name in names if name in functions}
     if share.whole:
         _say_missing([name for name in names if name not in functions], bool(functions))
-    alone = _measured(sampling) or samples.validation is None
+    alone = sampling.measured or samples.validation is None
     return TermReduction(budget.torque, budget.acceleration, alone, functions)
 
 
@@ -111,7 +111,6 @@ def _searched(
     run: Run,
 ) -> TermModel | None:
     """A function with terms left out, None where nothing is found within the budget."""
-    measured = _measured(sampling)
     projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
@@ -123,7 +122,7 @@ def _searched(
     judge = Judge(
         model, samples, reduction.nominal_torque,
         trajectories.limits(mechanism.n_dof), trajectories.bounded(mechanism),
-        direct=direct, projected=projected, measured=measured,
+        direct=direct, projected=projected, measured=sampling.measured,
     )  # fmt: skip
 
     def progress(share: float, remark: str) -> None:
@@ -180,13 +179,6 @@ def _in_order(ends: Iterable[Simplified], judge: Judge, budget: Budget) -> Itera
             (Judged.of(one, judge, budget) for one in alike), key=lambda one: one.strain
         )
         yield from (one for one in judged if one.strain <= 1)
-
-
-def _measured(sampling: SamplingSection) -> bool:
-    """Whether torques are those of a machine, and what is held out is not looked at."""
-    return sampling.log is not None or (
-        sampling.estimation_file is not None and sampling.torques == "measured"
-    )
 
 
 def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:

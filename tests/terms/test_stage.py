@@ -257,7 +257,7 @@ def test_units_of_parameters_are_said(two_link):
 
 
 def given_by(runner, name):
-    """What the stored program gives for states, in plain NumPy: torques, or M and delta, of the tree or projected."""
+    """What the stored program gives for states, in plain NumPy: torques, and M of the direct dynamics; of trees."""
     model, term = loaded(runner, Model), loaded(runner, TermReduction).functions[name]
     assert model.mechanism.loops is None
     program = Program.of_stored(term.program)
@@ -350,7 +350,7 @@ def recomputed_in_c(runner, name):
         for k, (tau, ddz) in enumerate(zip(block.tau, block.ddz, strict=True)):
             state = {"q": block.q[k], "dq": block.dq[k], "ddq": block.ddq[k], "R": R[k], "b": b[k]}
             arrays = [
-                np.ascontiguousarray({**state}.get(a.name, term.values)) for a in declared.arguments
+                np.ascontiguousarray(state.get(a.name, term.values)) for a in declared.arguments
             ]
             function(*[ctypes.c_void_p(one.ctypes.data) for one in (*arrays, *results)])
             torques, motion = results[0], ddz

@@ -1,5 +1,7 @@
 """How far torques of functions with terms left out stray."""
 
+import numpy as np
+
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS
@@ -19,7 +21,9 @@ def term_differences(data: ReportData) -> Table:
             largest, nominal = one.largest_difference[j], data.reduction.nominal_torque[j]
             star = " *" if j == one.worst_joint else ""
             sizes = (
-                (f"{largest:.3g}", share(largest / nominal)) if largest == largest else ("-", "-")
+                (f"{largest:.3g}", share(largest / nominal))
+                if not np.isnan(largest)
+                else ("-", "-")
             )
             state = (f"{value:.4g}" for value in one.worst_state[:, j])
             rows.append((labels[name], f"{joint}{star}", *sizes, *state))

@@ -1,5 +1,7 @@
 """Where functions with terms left out hold, and where they were looked at besides."""
 
+import numpy as np
+
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
@@ -18,6 +20,8 @@ def term_ranges(data: ReportData) -> Table:
         for j, joint in enumerate(mechanism.coordinate_names):
             extremes = (*zip(one.lower[:, j], one.upper[:, j], strict=True), *one.drawn[:, :, j].T)
             unit = mechanism.bodies[mechanism.independent[j]].unit
-            shown = (f"{low:.4g} to {high:.4g}" if low == low else "-" for low, high in extremes)
+            shown = (
+                f"{low:.4g} to {high:.4g}" if not np.isnan(low) else "-" for low, high in extremes
+            )
             rows.append((joint, unit, *shown))
     return Table("Ranges of functions with terms left out", header, tuple(rows))
