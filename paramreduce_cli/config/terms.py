@@ -22,5 +22,7 @@ class TermsSection(Section):
     """The same of accelerations, a share, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
     rounds: Annotated[Whole, Field(ge=0, le=100_000)] | None = None
     """How many times terms are left out once more, of the best subsets in formulations changed at random; without it 40 times, fewer for long functions. Then as many descents from shortly before the best ends may bring nothing in a row."""
+    time_limit: Annotated[Number, Field(gt=0)] | None = None
+    """For the search of each function, s: then no more descents are begun, and what is found depends on the machine; without it they end by themselves."""
     seed: Annotated[Whole, Field(ge=0)] = 0
     """Of what is random there."""

@@ -132,12 +132,15 @@ def _searched(
         lean, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
         judge.poses(_POSES), budget, direct, section.seed,
     )  # fmt: skip
-    found, front = simplified(
-        searcher, starts, rounds=section.rounds, jobs=run.jobs, progress=progress
-    )
+    found = simplified(
+        searcher, starts, rounds=section.rounds, seconds=section.time_limit or np.inf,
+        jobs=run.jobs, progress=progress,
+    )  # fmt: skip
+    if not found.in_time:
+        _say_late(name)
     fitted = judge.thinned(samples.estimation, _FITTED)
-    way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in front]
-    ends = (one.refitted(fitted, budget) for one in found)
+    way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in found.front]
+    ends = (one.refitted(fitted, budget) for one in found.ends)
     records = (_record(one, judge, way, lean) for one in _in_order(ends, judge, budget))
     term = next((record for record in records if record is not None), None)
     if term is not None and not np.isfinite(budget.acceleration):
@@ -196,6 +199,16 @@ def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> L
     if samples.validation is None:
         return LookedAt(fitted_to, None)
     return LookedAt(fitted_to, judge.thinned(samples.validation, watched))
+
+
+def _say_late(name: str) -> None:
+    """Of a search that might have found less."""
+    warnings.warn(
+        f"terms.time_limit: it ended the search for the {name} dynamics; with more time it may have found fewer "
+        "operations.",
+        ParamreduceWarning,
+        stacklevel=3,
+    )
 
 
 def _say_unfit(term: TermModel) -> None:

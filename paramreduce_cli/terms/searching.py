@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import math
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
@@ -123,6 +125,7 @@ class Hands:
     Args:
         searcher: What works.
         told: Of what is found on an item, as soon as it is.
+        deadline: On the clock of `time.monotonic`, s.
         pool: Of processes that know the searcher; without them it is done here.
     """
 
@@ -130,19 +133,32 @@ class Hands:
         self,
         searcher: Searcher,
         told: Callable[[Way | None], None],
+        deadline: float = math.inf,
         pool: ProcessPoolExecutor | None = None,
     ) -> None:
         self._searcher, self._told, self._pool = searcher, told, pool
+        self._deadline = deadline
+
+    @property
+    def late(self) -> bool:
+        """Whether the deadline has passed."""
+        return time.monotonic() > self._deadline
 
     def each(
-        self, work: Callable[[Searcher, Item], Way | None], items: Iterable[Item]
+        self,
+        work: Callable[[Searcher, Item], Way | None],
+        items: Iterable[Item],
+        *,
+        however_late: bool = False,
     ) -> list[Way]:
-        """What is found on items, in their order."""
+        """What is found on items, in their order; of one at least, and no more than are done by the deadline."""
         found: dict[int, Way] = {}
         for number, way in self._done(work, items):
             self._told(way)
             if way is not None:
                 found[number] = way
+            if self.late and not however_late:
+                break
         return [found[number] for number in sorted(found)]
 
     def _done(
@@ -157,13 +173,18 @@ class Hands:
 
 
 @contextlib.contextmanager
-def hands(searcher: Searcher, jobs: int, told: Callable[[Way | None], None]) -> Iterator[Hands]:
-    """Work here, or in so many other processes; what is found does not depend on how many."""
+def hands(
+    searcher: Searcher,
+    jobs: int,
+    told: Callable[[Way | None], None],
+    deadline: float = math.inf,
+) -> Iterator[Hands]:
+    """Work here, or in so many other processes; what is found by no deadline does not depend on how many."""
     if jobs < 2:
-        yield Hands(searcher, told)
+        yield Hands(searcher, told, deadline)
         return
     with workers(jobs, _start_worker, searcher) as pool:
-        yield Hands(searcher, told, pool)
+        yield Hands(searcher, told, deadline, pool)
 
 
 class _Worker:

@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import heapq
+import math
+import time
 from collections.abc import Callable, Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,14 +38,26 @@ _LEANEST = 12
 """Programs that are judged, the leanest of all searches."""
 
 
+class Found(NamedTuple):
+    """What a search has come to; both are empty where no start is within the budget."""
+
+    ends: list[Simplified]
+    """Programs, the leanest first."""
+    front: list[Simplified]
+    """Programs on the way to them, by operations."""
+    in_time: bool = True
+    """Whether it was over before its time was."""
+
+
 def simplified(
     searcher: Searcher,
     starts: list[Start],
     *,
     rounds: int | None,
+    seconds: float = math.inf,
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
-) -> tuple[list[Simplified], list[Simplified]]:
+) -> Found:
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
     Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
@@ -54,20 +69,19 @@ def simplified(
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
         rounds: How many starts near the best ones are gone down from, and how many descents once more may bring
             nothing until these end; None for as many as their operations allow.
-        jobs: Processes; what is found does not depend on them.
+        seconds: After which no more descents are begun, but the last ones, with more samples; then what is found
+            depends on the machine.
+        jobs: Processes; what is found in time does not depend on them.
         progress: Told what share is done, and the fewest operations so far.
-
-    Returns:
-        Programs, the leanest first, and programs on the way to them, by operations; both are empty
-        where no start is within the budget.
 
     Raises:
         DataError: A process died.
     """
+    deadline = time.monotonic() + seconds
     every = map(searcher.begun, starts[:_LOOKED_AT])
     smallest = next((one.start for one in every if one.end.fit.within), None)
     if smallest is None:
-        return [], []
+        return Found([], [])
     begins = _first(searcher, promising(starts, smallest.model.n))
     work = _work(searcher, begins)
     if rounds is None:
@@ -81,20 +95,23 @@ def simplified(
         return Near(parent.start, [one.start for one in best], turn)
 
     pays = told.ahead * work > _MANY
-    with hands(searcher, jobs if pays else 1, told) as working:
+    with hands(searcher, jobs if pays else 1, told, deadline) as working:
         ends = working.each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
+            if working.late:
+                break
             turns = range(first, min(first + _AT_ONCE, rounds))
             ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
             ends = slimmed(ends, _CLOSELY)
         ends = _again(working, ends, rounds, told)
-        close = working.each(Searcher.closer, leanest(ends, _CLOSELY))
+        in_time = not working.late
+        close = working.each(Searcher.closer, leanest(ends, _CLOSELY), however_late=True)
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
     )
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
-    return found, front(ends + close)
+    return Found(found, front(ends + close), in_time)
 
 
 class _Told:
@@ -121,9 +138,9 @@ class _Told:
 
 
 def _again(working: Hands, ends: list[Way], patience: int, told: _Told) -> list[Way]:
-    """Down once more from shortly before the best ends, until so many descents in a row have brought nothing."""
+    """Down once more from shortly before the best ends, while in time, until so many in a row have brought nothing."""
     turn = since = 0
-    while since < patience:
+    while since < patience and not working.late:
         best = leanest(ends, _BEST)
         some = [
             Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience - since))

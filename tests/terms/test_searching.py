@@ -1,8 +1,10 @@
 """Descents in this process and in others."""
 
+import time
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.searching import Again, Near, Searcher, hands
@@ -23,6 +25,14 @@ def test_what_is_found_does_not_depend_on_the_number_of_processes(searcher, star
     here = found(searcher, start, 1)
     assert found(searcher, start, 2) == here
     assert len(set(here)) > 1
+
+
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_after_the_deadline_one_is_done_unless_all_are_asked_for(searcher, start, jobs):
+    with hands(searcher, jobs, lambda way: None, time.monotonic()) as working:
+        assert working.late
+        assert len(working.each(Searcher.down, [start] * 6)) == 1
+        assert len(working.each(Searcher.down, [start] * 3, however_late=True)) == 3
 
 
 def test_what_is_at_the_edge_of_the_budget_may_be_out_of_it_near_there(searcher, start):

@@ -21,7 +21,8 @@ def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
     monkeypatch.setattr(Searcher, "again", lambda self, what: None)
     whole = 2 * searcher.begun(start).way.fewest
     monkeypatch.setattr(simplify, "_WORK_NEARBY", allowed * whole)
-    found, front = simplify.simplified(searcher, [start], rounds=rounds)
+    found, front, in_time = simplify.simplified(searcher, [start], rounds=rounds)
+    assert in_time
     assert turns == list(range(expected))
     assert found[0].program.n_operations == min(one.program.n_operations for one in found)
     assert front
@@ -30,9 +31,9 @@ def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
 def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_samples(
     searcher, start, monkeypatch
 ):
-    found, _ = simplify.simplified(searcher, [start], rounds=8)
+    found = simplify.simplified(searcher, [start], rounds=8).ends
     monkeypatch.setattr(Searcher, "again", lambda self, what: None)
-    without, _ = simplify.simplified(searcher, [start], rounds=8)
+    without = simplify.simplified(searcher, [start], rounds=8).ends
     assert found[0].program.n_operations <= without[0].program.n_operations
 
 
@@ -57,3 +58,24 @@ def test_descents_once_more_go_on_until_so_many_in_a_row_bring_nothing(
     )
     assert turns == list(range(expected))
     assert max(told) <= 1.0
+
+
+def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
+    searcher, start, monkeypatch
+):
+    begun = []
+    for name in ("down", "nearby", "again", "closer"):
+        work = getattr(Searcher, name)
+        monkeypatch.setattr(
+            Searcher, name, lambda self, what, n=name, work=work: begun.append(n) or work(self, what)
+        )
+    whole = simplify.simplified(searcher, [start], rounds=8)
+    assert whole.in_time
+    assert {"nearby", "again"} < set(begun)
+    begun.clear()
+    found = simplify.simplified(searcher, [start], rounds=8, seconds=1e-9)
+    assert begun == ["down", "closer"]
+    assert not found.in_time
+    least = min(one.program.n_operations for one in found.ends)
+    assert least < searcher.begun(start).way.fewest
+    assert least >= whole.ends[0].program.n_operations

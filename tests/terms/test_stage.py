@@ -434,7 +434,7 @@ def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypa
     monkeypatch.setattr(simplify, "_MANY", 0)
     started, hands = [], simplify.hands
     monkeypatch.setattr(
-        simplify, "hands", lambda one, jobs, told: started.append(jobs) or hands(one, jobs, told)
+        simplify, "hands", lambda one, jobs, *more: started.append(jobs) or hands(one, jobs, *more)
     )
     shutil.copytree(two_link.store.folder, tmp_path / "r")
     runner = Runner(two_link.config, Store(tmp_path / "r"), jobs=2)
@@ -444,6 +444,20 @@ def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypa
     for name in ("inverse", "direct"):
         np.testing.assert_array_equal(one.functions[name].values, two.functions[name].values)
         assert one.functions[name].operations == two.functions[name].operations
+
+
+def test_a_search_that_its_time_ended_is_said(two_link, tmp_path):
+    shutil.copytree(two_link.store.folder, tmp_path / "r")
+    config = config_of("two_link", ONE_FORMAT, *TERMS, "terms.time_limit=1e-6")
+    runner = Runner(config, Store(tmp_path / "r"))
+    ended = r"terms\.time_limit: it ended the search for the inverse"
+    with pytest.warns(ParamreduceWarning, match=ended):
+        runner.run(STAGES["reduce-terms"])
+    before, after = loaded(two_link, TermReduction), loaded(runner, TermReduction)
+    for name, whole in before.functions.items():
+        found = after.functions[name]
+        assert whole.operations <= found.operations < whole.operations_start
+        assert found.torque_error_validation <= config.terms.torque_error
 
 
 def share_of(row, kind, part, budget):
