@@ -20,7 +20,8 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import ParamreduceError
-from paramreduce_cli.export.writing import export
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import exported_model
 from paramreduce_cli.frames import frame
 from paramreduce_cli.in_memory import made_in_memory
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -251,10 +252,12 @@ def code(
     Raises:
         ParamreduceError: The functions do not compute what the straightforward model does.
     """
-    return export(
-        model, parameters, title=title or f"{parameters.n} parameters", language=language,
+    exported = exported_model(
+        model, parameters, title=title or f"{parameters.n} parameters",
         constant=constant, single=single, origin="from Python", validation=validation,
     )  # fmt: skip
+    files: dict[str, bytes] = languages[language](exported)
+    return files
 
 
 def inverse_dynamics(

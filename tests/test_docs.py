@@ -22,7 +22,8 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import config_schema
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.export.choice import chosen_model
-from paramreduce_cli.export.writing import export
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import exported_model
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.sweep import SweepSection
 
@@ -161,7 +162,7 @@ def test_calls_of_exported_c_compile(tmp_path):
     """Those that the docs show, of another robot with loops."""
     model = model_of("four_bar")
     chosen, title = chosen_model("full", model, None, None)
-    for name, content in export(model, chosen, title=title, language="c").items():
+    for name, content in languages["c"](exported_model(model, chosen, title=title)).items():
         (tmp_path / name).write_bytes(content)
     (text,) = (text for _, text in blocks("c"))
     arrays = ["phi", "z", "q", "dq", "ddq", "dz", "ddz", "R", "b", "tau", "M", "delta"]

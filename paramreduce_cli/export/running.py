@@ -8,7 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.writing import Exported, export, exported_functions
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.functions import Argument
 from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
@@ -40,8 +41,9 @@ class RunningModel:
         self._phi = np.ascontiguousarray(chosen.values)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # nothing is simulated with it
-            files = export(model, chosen, title="", language="c", what=what)
-        (self._function,) = exported_functions(model, chosen, what)
+            exported = exported_model(model, chosen, title="", what=what)
+        files: dict[str, bytes] = languages["c"](exported)
+        (self._function,) = exported.functions
         stem = next(file[:-2] for file in files if file.endswith(".h"))
         header, source = (files[f"{stem}.{end}"].decode() for end in ("h", "c"))
         text = header + source.replace(f'#include "{stem}.h"', "")

@@ -1,4 +1,4 @@
-"""A reduced model as files in some language, checked before they are written."""
+"""A reduced model with all that its code says, checked before it is written in some language."""
 
 import warnings
 from collections.abc import Mapping
@@ -16,7 +16,6 @@ from paramreduce_cli.export.check import (
     single_precision_errors,
 )
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
-from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.validity import validity, within
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
@@ -59,12 +58,11 @@ _FUNCTIONS = {
 }
 
 
-def export(
+def exported_model(
     model: Model,
     chosen: ReducedModel,
     *,
     title: str,
-    language: str,
     what: Exported = Exported.BOTH,
     constant: bool = False,
     single: bool = False,
@@ -72,14 +70,13 @@ def export(
     simplified: TermModel | None = None,
     validation: Validation | None = None,
     tell: Tell = lambda _: None,
-) -> dict[str, bytes]:
-    """Files of a model in some language.
+) -> ExportedModel:
+    """A model for :data:`paramreduce_cli.export.languages.languages` to write, its functions checked.
 
     Args:
         model: Of the robot.
         chosen: The model that is exported, with expressions.
         title: What it is called.
-        language: Of :data:`paramreduce_cli.export.languages.languages`.
         what: Which functions.
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
@@ -93,12 +90,12 @@ def export(
         FormulationError: The functions do not compute what the straightforward model does.
     """
     mechanism = model.mechanism
-    tell(Progress(_TASK, 0, 3, "functions"))
+    tell(Progress(_TASK, 0, 2, "functions"))
     functions = exported_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
     if mechanism.loops is not None:
         closures = tuple(LeanFunctions(model, chosen, constant=constant).closures())
-    tell(Progress(_TASK, 1, 3, "checks"))
+    tell(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
     checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
     check(functions, checked)
@@ -114,7 +111,8 @@ def export(
     if mechanism.loops is not None:
         used |= _LOOPS
     stored = random_cases(mechanism, chosen, _CASES, rng, simplified)
-    exported = ExportedModel(
+    tell(Progress(_TASK, 2, 2))
+    return ExportedModel(
         robot=mechanism.robot,
         heading=(f"{mechanism.robot}: {title}.", *worth, *_made(mechanism, origin)),
         frames=_frames(mechanism),
@@ -129,10 +127,6 @@ def export(
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
     )
-    tell(Progress(_TASK, 2, 3, "files"))
-    files: dict[str, bytes] = languages[language](exported)
-    tell(Progress(_TASK, 3, 3))
-    return files
 
 
 def _worth(

@@ -14,8 +14,9 @@ from paramreduce_cli.config.schema import (
 )
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.running import RunningModel, speed
-from paramreduce_cli.export.writing import Exported, export
+from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -29,9 +30,9 @@ from paramreduce_cli.records import (
     Provenance,
     Reduction,
     Report,
+    Run,
     Samples,
     Selected,
-    Tell,
     TermReduction,
     Tracking,
     Trajectories,
@@ -70,7 +71,7 @@ def report(
     identification: Identification | None,
     terms: TermReduction | None,
     provenance: Provenance,
-    tell: Tell = lambda _: None,
+    run: Run,
 ) -> Report:
     """Draw the figures, set the tables and write the page and summary.json.
 
@@ -79,7 +80,7 @@ def report(
     """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
     from paramreduce_cli.report.page import render_page
-    from paramreduce_cli.report.style import render
+    from paramreduce_cli.report.rendering import rendered
 
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
@@ -116,17 +117,14 @@ def report(
     summary = summary_of(
         model, trajectories, reduction, validation, identification, terms, lean, provenance
     )
-    files: dict[str, bytes] = {}
-    images = {}
     formats = [str(name) for name in section.formats]
-    drawn = _shown(figures, model)
-    steps = len(drawn) + 1
-    for k, (name, draw) in enumerate(drawn):
-        tell(Progress("figures, tables and page", k, steps, name))
-        encoded = render(draw, data, sorted({*formats, "svg"}))
-        if encoded:
-            images[name] = encoded["svg"]
-            files |= {f"figures/{name}.{kind}": encoded[kind] for kind in formats}
+    drawn = [name for name, _ in _shown(figures, model)]
+    told = _Told(run, len(drawn))
+    encoded = rendered(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=told)
+    images = {name: one["svg"] for name, one in encoded.items()}
+    files = {
+        f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats
+    }
     every = ((name, make(data)) for name, make in _shown(tables, model))
     made = {name: table for name, table in every if table.rows}
     symbols = {} if model is None else model.mechanism.symbols
@@ -136,8 +134,29 @@ def report(
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
-    tell(Progress("figures, tables and page", steps, steps))
+    told("page")
     return Report(summary, files)
+
+
+class _Told:
+    """Tells how far the report is.
+
+    Args:
+        run: Has the audience.
+        figures: How many are drawn; the page comes after them.
+    """
+
+    def __init__(self, run: Run, figures: int) -> None:
+        self._run, self._done, self._steps = run, 0, figures + 1
+        self._say("")
+
+    def __call__(self, name: str) -> None:
+        """Of something that is done."""
+        self._done += 1
+        self._say(name)
+
+    def _say(self, name: str) -> None:
+        self._run.progress(Progress("figures, tables and page", self._done, self._steps, name))
 
 
 def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
@@ -197,12 +216,14 @@ def _code(
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
-            return export(
-                model, chosen, title=title, language="c", validation=validation, origin=origin
+            exported = exported_model(
+                model, chosen, title=title, validation=validation, origin=origin
             )
     except FormulationError as error:
         warnings.warn(f"the page has no code: {error}", ParamreduceWarning, stacklevel=2)
         return {}
+    files: Mapping[str, bytes] = languages["c"](exported)
+    return files
 
 
 def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:

@@ -174,10 +174,7 @@ class Hands:
 
 @contextlib.contextmanager
 def hands(
-    searcher: Searcher,
-    jobs: int,
-    told: Callable[[Way | None], None],
-    deadline: float = math.inf,
+    searcher: Searcher, jobs: int, told: Callable[[Way | None], None], deadline: float = math.inf
 ) -> Iterator[Hands]:
     """Work here, or in so many other processes; what is found by no deadline does not depend on how many."""
     if jobs < 2:

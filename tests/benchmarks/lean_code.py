@@ -18,7 +18,8 @@ import numpy as np
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.choice import chosen_model, simplified_model
-from paramreduce_cli.export.writing import Exported, export
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.records import Kind, TermReduction
 from tests.conftest import ROOT, model_of, whole
 
@@ -63,7 +64,7 @@ def sources():
         for what, robot in ((Exported.BOTH, name), (Exported.REGRESSOR, f"{name}_K")):
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
-            made = export(named, one, title=name, language="c", what=what)
+            made = languages["c"](exported_model(named, one, title=name, what=what))
             files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
     found = without_small_terms()
     for function, what, ending in (("inverse", Exported.IDM, "d"), ("direct", Exported.DDM, "M")):
@@ -72,10 +73,10 @@ def sources():
             robot = f"{kind}_{ending}"
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
-            made = export(
-                named, one, title=title, language="c", what=what, single=kind == "single",
+            made = languages["c"](exported_model(
+                named, one, title=title, what=what, single=kind == "single",
                 simplified=term,
-            )  # fmt: skip
+            ))  # fmt: skip
             files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
     return files
 

@@ -17,7 +17,7 @@ from paramreduce_cli.export.check import check, random_cases
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.exported import identifier, plain, wrapped
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import Exported, export, exported_functions
+from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import TermModel
@@ -34,7 +34,9 @@ def model(request):
 
 def files_of(model, kind, what="both", text="full", **options):
     chosen, title = chosen_model(text, model, None, None)
-    return export(model, chosen, title=title, language=kind, what=Exported(what), **options)
+    return languages[kind](
+        exported_model(model, chosen, title=title, what=Exported(what), **options)
+    )
 
 
 def write(model, folder, *what, **options):
@@ -261,7 +263,9 @@ def test_an_angle_that_results_use_too(tmp_path):
         largest_difference=np.zeros(n), worst_joint=0, worst_state=np.zeros((3, n)), smallest_eigenvalue=np.nan,
         mass_states=0, lower=-np.ones((3, n)), upper=np.ones((3, n)), drawn=np.zeros((2, 3, n)), front=None,
     )  # fmt: skip
-    files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=function)
+    files = languages["c"](
+        exported_model(model, chosen, title=title, what=Exported.IDM, simplified=function)
+    )
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
     assert "FAIL" not in c_test("two_link", tmp_path)
@@ -403,9 +407,9 @@ def test_models_that_are_unsafe_for_direct_dynamics_say_so(tmp_path):
     chosen, title = chosen_model("base", model, None, None)
     wrong = dataclasses.replace(chosen, values=-np.asarray(chosen.values))
     with pytest.warns(ParamreduceWarning, match="not positive definite on 200 of 200"):
-        files = export(model, wrong, title=title, language="c", what=Exported.DDM)
+        files = languages["c"](exported_model(model, wrong, title=title, what=Exported.DDM))
     assert b"NOT SAFE FOR DIRECT DYNAMICS" in files["two_link.h"]
-    files = export(model, wrong, title=title, language="c", what=Exported.IDM)
+    files = languages["c"](exported_model(model, wrong, title=title, what=Exported.IDM))
     assert b"NOT SAFE" not in files["two_link.h"]
 
 

@@ -12,7 +12,8 @@ from oracles.selection import all_best_errors, error_by_definition
 from selecting import problem, subsets
 
 from paramreduce_cli.export.choice import chosen_model
-from paramreduce_cli.export.writing import export
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.writing import exported_model
 from paramreduce_cli.multibody.dynamics import Dynamics
 
 
@@ -76,7 +77,7 @@ def test_best_subsets(data):
 def test_c_code(puma, tmp_path):
     _, model = puma
     chosen, _ = chosen_model("full", model, None, None)
-    for name, content in export(model, chosen, title="full", language="c").items():
+    for name, content in languages["c"](exported_model(model, chosen, title="full")).items():
         (tmp_path / name).write_bytes(content)
     z, dz, ddz = states_of(model.mechanism, 20)
     rows = np.hstack([z, dz, ddz])

@@ -67,7 +67,9 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
     for name in ("down", "nearby", "again", "closer"):
         work = getattr(Searcher, name)
         monkeypatch.setattr(
-            Searcher, name, lambda self, what, n=name, work=work: begun.append(n) or work(self, what)
+            Searcher,
+            name,
+            lambda self, what, n=name, work=work: begun.append(n) or work(self, what),
         )
     whole = simplify.simplified(searcher, [start], rounds=8)
     assert whole.in_time

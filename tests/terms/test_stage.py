@@ -15,8 +15,9 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.export.choice import simplified_model
+from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.values import values_file
-from paramreduce_cli.export.writing import Exported, export, exported_functions
+from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -228,14 +229,10 @@ def test_exported_functions_compute_the_same(four_bar, name):
     chosen, term, title = simplified_model(found, name)
     what = {"inverse": Exported.IDM, "direct": Exported.DDM}[name]
     for constant in (False, True):
-        files = export(
-            model,
-            chosen,
-            title=title,
-            language="python",
-            what=what,
-            constant=constant,
-            simplified=term,
+        files = languages["python"](
+            exported_model(
+                model, chosen, title=title, what=what, constant=constant, simplified=term
+            )
         )
         assert any(name.endswith(".py") for name in files)
 
@@ -243,7 +240,9 @@ def test_exported_functions_compute_the_same(four_bar, name):
 def test_units_of_parameters_are_said(two_link):
     model = loaded(two_link, Model)
     chosen, term, title = simplified_model(loaded(two_link, TermReduction), "inverse")
-    files = export(model, chosen, title=title, language="c", what=Exported.IDM, simplified=term)
+    files = languages["c"](
+        exported_model(model, chosen, title=title, what=Exported.IDM, simplified=term)
+    )
     header = files["two_link.h"].decode()
     values = json.loads(values_file(chosen, title, "", model.mechanism)["parameters.json"])
     for k, (name, value, size) in enumerate(zip(term.names, term.values, term.units, strict=True)):
@@ -334,7 +333,7 @@ def recomputed_in_c(runner, name):
     mechanism, robot = model.mechanism, model.mechanism.robot
     chosen, term, title = simplified_model(loaded(runner, TermReduction), name)
     what = Exported.IDM if name == "inverse" else Exported.DDM
-    files = export(model, chosen, title=title, language="c", what=what, simplified=term)
+    files = languages["c"](exported_model(model, chosen, title=title, what=what, simplified=term))
     header, source = files[f"{robot}.h"].decode(), files[f"{robot}.c"].decode()
     library = load(header + source.replace(f'#include "{robot}.h"', ""))
     function = getattr(library, f"{robot}_{name}_dynamics")
@@ -398,7 +397,7 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
     model = loaded(two_link, Model)
     chosen, term, title = simplified_model(loaded(two_link, TermReduction), name)
     what = Exported.IDM if name == "inverse" else Exported.DDM
-    files = export(model, chosen, title=title, language="c", what=what, simplified=term)
+    files = languages["c"](exported_model(model, chosen, title=title, what=what, simplified=term))
     header = " ".join(files["two_link.h"].decode().replace("*", " ").split())
     assert "TERMS WERE LEFT OUT" in header
     names = model.mechanism.coordinate_names

@@ -24,8 +24,7 @@ from paramreduce_cli.export.choice import (
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import FORMATS, robot_file
 from paramreduce_cli.export.values import VALUES, values_file
-from paramreduce_cli.export.writing import Exported
-from paramreduce_cli.export.writing import export as exported
+from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.records import (
     TERMS,
@@ -150,11 +149,10 @@ def export(
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:
         with progress_bars(quiet=False) as tell:
-            files = exported(
+            checked = exported_model(
                 loading[Model],
                 chosen,
                 title=title,
-                language=kind,
                 what=Exported(what),
                 constant=constants,
                 single=single,
@@ -163,6 +161,7 @@ def export(
                 validation=loading.get(Validation),
                 tell=tell,
             )
+        files = languages[kind](checked)
     save_files(folder, files)
     say(f"{title}: {', '.join(files)} in {folder}")
 

@@ -1,0 +1,64 @@
+"""All figures of a report, drawn in this process or in several."""
+
+from collections.abc import Callable, Iterator, Sequence
+
+from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.report.data import ReportData
+from paramreduce_cli.report.figures import figures
+from paramreduce_cli.report.style import render
+
+Encoded = dict[str, bytes]
+"""A figure in each format; empty where there is nothing to draw."""
+
+
+def rendered(
+    names: Sequence[str],
+    data: ReportData,
+    formats: list[str],
+    *,
+    jobs: int = 1,
+    told: Callable[[str], None] = lambda _: None,
+) -> dict[str, Encoded]:
+    """Figures by name, in the order that is asked for, without those that have nothing to draw.
+
+    Args:
+        names: Of :data:`paramreduce_cli.report.figures.figures`.
+        data: What they show.
+        formats: In which they are encoded.
+        jobs: Processes; starting them pays where there are several formats.
+        told: Name of each figure that is done.
+
+    Raises:
+        DataError: A process died.
+    """
+    found: dict[str, Encoded] = {}
+    for name, encoded in _drawn(names, data, formats, jobs if len(formats) > 1 else 1):
+        told(name)
+        found[name] = encoded
+    return {name: found[name] for name in names if found[name]}
+
+
+def _drawn(
+    names: Sequence[str], data: ReportData, formats: list[str], jobs: int
+) -> Iterator[tuple[str, Encoded]]:
+    """In any order."""
+    if jobs < 2:
+        yield from ((name, render(figures[name], data, formats)) for name in names)
+        return
+    with workers(jobs, _start_worker, data, formats) as pool:
+        yield from as_done(pool, _in_worker, names)
+
+
+class _Worker:
+    """What a worker process knows; set once when it starts."""
+
+    data: ReportData
+    formats: list[str]
+
+
+def _start_worker(data: ReportData, formats: list[str]) -> None:
+    _Worker.data, _Worker.formats = data, formats
+
+
+def _in_worker(name: str) -> Encoded:
+    return render(figures[name], _Worker.data, _Worker.formats)

@@ -1,0 +1,43 @@
+"""Figures of a report, drawn here and in other processes."""
+
+import pytest
+from conftest import run_stages
+
+from paramreduce_cli.report import rendering
+
+NAMES = ["torques", "identified-parameters", "poses", "log-motion"]
+"""The second and the last have nothing to draw here."""
+
+
+class Stop(Exception):
+    """Of a report of which no more is wanted."""
+
+
+@pytest.fixture
+def data(two_link_copy, monkeypatch):
+    """What the report of the small case shows."""
+    kept = []
+
+    def instead(names, data, formats, **how):
+        kept.append(data)
+        raise Stop
+
+    with monkeypatch.context() as patched, pytest.raises(Stop):
+        patched.setattr(rendering, "rendered", instead)
+        run_stages(two_link_copy, "report.title=Other")
+    return kept[0]
+
+
+def test_figures_do_not_depend_on_processes(data, monkeypatch):
+    told = []
+    here = rendering.rendered(NAMES, data, ["png", "svg"], jobs=1, told=told.append)
+    assert told == NAMES
+    assert list(here) == ["torques", "poses"]
+    assert all(set(one) == {"png", "svg"} for one in here.values())
+    told.clear()
+    elsewhere = rendering.rendered(NAMES, data, ["png", "svg"], jobs=2, told=told.append)
+    assert sorted(told) == sorted(NAMES)
+    assert list(elsewhere) == list(here)
+    assert elsewhere == here
+    monkeypatch.setattr(rendering, "workers", None)  # one format does not pay
+    assert set(rendering.rendered(["poses"], data, ["svg"], jobs=2)["poses"]) == {"svg"}
