@@ -228,7 +228,8 @@ def test_init_writes_a_config_that_runs(invoke, tmp_path):
     invoke("init", "--dh", "my_arm", "--joints", 3, "--output", path)
     assert "exists already" in invoke("init", "--dh", "my_arm", "--output", path, code=2).err
     small = (
-        "trajectories.count=1", "trajectories.starts=1", "trajectories.polished=1", ONE_FORMAT,
+        "trajectories.count=1", "trajectories.starts=1", "trajectories.polished=1",
+        "reduction.best_subset.time_limit=1", ONE_FORMAT,
     )  # fmt: skip
     invoke("run", path, "--results", tmp_path / "r", "--quiet", settings=small)
 

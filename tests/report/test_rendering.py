@@ -9,7 +9,7 @@ NAMES = ["torques", "identified-parameters", "poses", "log-motion"]
 """The second and the last have nothing to draw here."""
 
 
-class Stop(Exception):
+class StoppedError(Exception):
     """Of a report of which no more is wanted."""
 
 
@@ -20,11 +20,12 @@ def data(two_link_copy, monkeypatch):
 
     def instead(names, data, formats, **how):
         kept.append(data)
-        raise Stop
+        raise StoppedError
 
-    with monkeypatch.context() as patched, pytest.raises(Stop):
+    with monkeypatch.context() as patched:
         patched.setattr(rendering, "rendered", instead)
-        run_stages(two_link_copy, "report.title=Other")
+        with pytest.raises(StoppedError):
+            run_stages(two_link_copy, "report.title=Other")
     return kept[0]
 
 

@@ -536,7 +536,7 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
 
     def nothing(searcher, starts, **__):
         seen.extend([searcher.looked_at, searcher.closely])
-        return [], []
+        return simplify.Found([], [])
 
     module = sys.modules["paramreduce_cli.stages.reduce_terms"]
     monkeypatch.setattr(module, "simplified", nothing)
