@@ -45,7 +45,7 @@ def workers(
 def as_done(
     pool: ProcessPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item]
 ) -> Iterator[tuple[Item, Result]]:
-    """Work on items in any order; those not begun are left alone once nobody asks for more.
+    """Work on items in any order.
 
     Yields:
         Each item with its result, when it is done.
@@ -53,9 +53,9 @@ def as_done(
     Raises:
         DataError: A process died.
     """
-    with _interruption_held():  # so that new processes are born without it
-        futures = {pool.submit(work, item): item for item in items}
     try:
+        with _interruption_held():  # so that new processes are born without it
+            futures = {pool.submit(work, item): item for item in items}
         for future in as_completed(futures):
             yield futures[future], future.result()
     except BrokenProcessPool as error:
@@ -63,9 +63,6 @@ def as_done(
             "a worker process died, for want of memory, or because a script asks for jobs outside of "
             '`if __name__ == "__main__":`, which each of them runs again. Run it again, with fewer jobs.'
         ) from error
-    finally:
-        for future in futures:
-            future.cancel()
 
 
 @contextlib.contextmanager

@@ -160,7 +160,9 @@ class Runner:
         unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
         parts = self._lend_run(stage, arguments, inputs, unchanged)
         shares = StoredShares(path)
-        found, before = ((), 0.0) if force else self._shares(stage, inputs, shares)
+        found, before, said = ((), 0.0, ()) if force else self._shares(stage, inputs, shares)
+        for text in said:
+            self.remark(text)
         self._hand(
             stage,
             arguments,
@@ -169,7 +171,8 @@ class Runner:
         with noted_warnings() as warnings:
             record = called(stage, arguments)
         self.check()
-        self.store.save(record, self._stamp(stage, inputs, started - before, warnings))
+        texts = tuple(dict.fromkeys([*said, *warnings]))
+        self.store.save(record, self._stamp(stage, inputs, started - before, texts))
         if parts is not None:
             parts.clear()
         shares.clear()
@@ -214,20 +217,22 @@ class Runner:
 
     def _shares(
         self, stage: Stage, inputs: Inputs, shares: StoredShares
-    ) -> tuple[tuple[Any, ...], float]:
-        """Records of all shares of a stage that were made from the same, and the seconds that all took.
+    ) -> tuple[tuple[Any, ...], float, tuple[str, ...]]:
+        """Records of all shares of a stage that were made from the same, the seconds that all took, and their warnings.
 
         None where it is done as a whole.
         """
         if not stage.in_shares:
-            return (), 0.0
+            return (), 0.0, ()
         command = f"{stage.name} {self.asked}".rstrip()
         if self.samples is not None:
             command += f" --samples {shlex.quote(str(self.samples))}"
         paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), command)
         loaded = [load_file(path, stage.output, self._robot, stage.name) for path in paths]
-        seconds = sum(stamp.seconds for _, stamp in loaded if stamp is not None)
-        return tuple(record for record, _ in loaded), seconds
+        stamps = [stamp for _, stamp in loaded if stamp is not None]
+        said = dict.fromkeys(text for stamp in stamps for text in stamp.warnings)
+        seconds = sum(stamp.seconds for stamp in stamps)
+        return tuple(record for record, _ in loaded), seconds, tuple(said)
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""

@@ -9,7 +9,7 @@ import pytest
 from conftest import ONE_FORMAT, TWO_LINK, config_of
 
 from paramreduce_cli.artifacts.store import Store
-from paramreduce_cli.errors import ArtifactError, DataError
+from paramreduce_cli.errors import ArtifactError, DataError, ParamreduceWarning
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import (
     Proofs,
@@ -124,6 +124,21 @@ def test_functions_whose_terms_are_reduced_by_several_jobs(two_link_results, tmp
         runner.run(STAGES["reduce-terms"], share=Share(number, 3))
     runner.run(STAGES["reduce-terms"])
     assert digest(tmp_path, "terms.h5") == whole
+
+
+def test_what_jobs_were_warned_of_is_said_of_the_whole(two_link_results, tmp_path):
+    rough = ["terms.torque_error=0.5", "terms.functions=[inverse]", "terms.time_limit=1e-9"]
+    for name in ("model.h5", "trajectories.h5", "samples.h5", "reduction.h5"):
+        shutil.copy(two_link_results / name, tmp_path / name)
+    told = []
+    runner = Runner(config_of("two_link", ONE_FORMAT, *rough), Store(tmp_path), remark=told.append)
+    with pytest.warns(ParamreduceWarning, match="time_limit"):
+        runner.run(STAGES["reduce-terms"], share=Share(1, 1))
+    assert not told
+    runner.run(STAGES["reduce-terms"])
+    (text,) = runner.store.stamp(TermReduction).warnings
+    assert "terms.time_limit: it ended the search" in text
+    assert told == [text]
 
 
 @pytest.fixture(scope="module")

@@ -23,6 +23,6 @@ class TermsSection(Section):
     rounds: Annotated[Whole, Field(ge=0, le=100_000)] | None = None
     """How many times terms are left out once more, of the best subsets in formulations changed at random; without it 40 times, fewer for long functions. Then as many descents from shortly before the best ends may bring nothing in a row."""
     time_limit: Annotated[Number, Field(gt=0)] | None = None
-    """For the search of each function, s: then no more descents are begun, and what is found depends on the machine; without it they end by themselves."""
+    """For the descents of each function, s, which takes somewhat longer as a whole: then no more are begun, and what is found depends on the machine; without it they end by themselves."""
     seed: Annotated[Whole, Field(ge=0)] = 0
     """Of what is random there."""

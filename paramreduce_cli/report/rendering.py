@@ -1,6 +1,7 @@
 """All figures of a report, drawn in this process or in several."""
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 from paramreduce_cli.processes import as_done, workers
 from paramreduce_cli.report.data import ReportData
@@ -9,6 +10,8 @@ from paramreduce_cli.report.style import render
 
 Encoded = dict[str, bytes]
 """A figure in each format; empty where there is nothing to draw."""
+_AT_LEAST = 4
+"""Figures for which the start of a process pays."""
 
 
 def rendered(
@@ -25,14 +28,15 @@ def rendered(
         names: Of :data:`paramreduce_cli.report.figures.figures`.
         data: What they show.
         formats: In which they are encoded.
-        jobs: Processes; starting them pays where there are several formats.
+        jobs: Processes at most; starting them pays where there are several formats.
         told: Name of each figure that is done.
 
     Raises:
         DataError: A process died.
     """
     found: dict[str, Encoded] = {}
-    for name, encoded in _drawn(names, data, formats, jobs if len(formats) > 1 else 1):
+    jobs = min(jobs, len(names) // _AT_LEAST) if len(formats) > 1 else 1
+    for name, encoded in _drawn(names, data, formats, jobs):
         told(name)
         found[name] = encoded
     return {name: found[name] for name in names if found[name]}
@@ -45,6 +49,7 @@ def _drawn(
     if jobs < 2:
         yield from ((name, render(figures[name], data, formats)) for name in names)
         return
+    data = replace(data, animation=None)  # the page's alone, and large
     with workers(jobs, _start_worker, data, formats) as pool:
         yield from as_done(pool, _in_worker, names)
 

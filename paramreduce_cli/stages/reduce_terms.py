@@ -136,7 +136,7 @@ def _searched(
         searcher, starts, rounds=section.rounds, seconds=section.time_limit or np.inf,
         jobs=run.jobs, progress=progress,
     )  # fmt: skip
-    if not found.in_time:
+    if found.cut_short:
         _say_late(name)
     fitted = judge.thinned(samples.estimation, _FITTED)
     way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in found.front]

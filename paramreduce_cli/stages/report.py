@@ -134,7 +134,7 @@ def report(
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
-    told("page")
+    told("")
     return Report(summary, files)
 
 

@@ -26,6 +26,7 @@ _NOISY = 0.5
 """How often there is noise in the choice of terms, but from the first starts."""
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)
@@ -125,7 +126,7 @@ class Hands:
     Args:
         searcher: What works.
         told: Of what is found on an item, as soon as it is.
-        deadline: On the clock of `time.monotonic`, s.
+        deadline: After which nothing is begun, on the clock of `time.monotonic`, which processes share, s.
         pool: Of processes that know the searcher; without them it is done here.
     """
 
@@ -138,11 +139,13 @@ class Hands:
     ) -> None:
         self._searcher, self._told, self._pool = searcher, told, pool
         self._deadline = deadline
+        self.cut_short = False
+        """Whether anything was not begun for the deadline."""
 
-    @property
-    def late(self) -> bool:
-        """Whether the deadline has passed."""
-        return time.monotonic() > self._deadline
+    def in_time(self) -> bool:
+        """Whether there is time for what is asked for; if not, the search is cut short."""
+        self.cut_short |= time.monotonic() > self._deadline
+        return not self.cut_short
 
     def each(
         self,
@@ -151,25 +154,39 @@ class Hands:
         *,
         however_late: bool = False,
     ) -> list[Way]:
-        """What is found on items, in their order; of one at least, and no more than are done by the deadline."""
+        """What is found on items, in their order; on one of them at least, and no others when it is too late."""
+        in_time = partial(_begun, work, math.inf if however_late else self._deadline)
         found: dict[int, Way] = {}
-        for number, way in self._done(work, items):
+        for number, (begun, way) in self._done(in_time, items):
+            self.cut_short |= not begun
             self._told(way)
             if way is not None:
                 found[number] = way
-            if self.late and not however_late:
-                break
         return [found[number] for number in sorted(found)]
 
     def _done(
-        self, work: Callable[[Searcher, Item], Way | None], items: Iterable[Item]
-    ) -> Iterator[tuple[int, Way | None]]:
-        """The same in any order, with the numbers of the items."""
+        self, work: Callable[[Searcher, tuple[int, Item]], Result], items: Iterable[Item]
+    ) -> Iterator[tuple[int, Result]]:
+        """What comes of them in any order, with the numbers of the items."""
+        numbered = enumerate(items)
         if self._pool is None:
-            yield from ((k, work(self._searcher, item)) for k, item in enumerate(items))
+            yield from ((item[0], work(self._searcher, item)) for item in numbered)
             return
-        for (k, _), way in as_done(self._pool, partial(_in_worker, work), enumerate(items)):
-            yield k, way
+        for (k, _), result in as_done(self._pool, partial(_in_worker, work), numbered):
+            yield k, result
+
+
+def _begun(
+    work: Callable[[Searcher, Item], Way | None],
+    deadline: float,
+    searcher: Searcher,
+    numbered: tuple[int, Item],
+) -> tuple[bool, Way | None]:
+    """Whether an item was begun before the deadline, as the first one always is, and what was found on it."""
+    number, item = numbered
+    if number and time.monotonic() > deadline:
+        return False, None
+    return True, work(searcher, item)
 
 
 @contextlib.contextmanager
@@ -195,6 +212,6 @@ def _start_worker(searcher: Searcher) -> None:
 
 
 def _in_worker(
-    work: Callable[[Searcher, Item], Way | None], numbered: tuple[int, Item]
-) -> Way | None:
-    return work(_Worker.searcher, numbered[1])
+    work: Callable[[Searcher, tuple[int, Item]], Result], numbered: tuple[int, Item]
+) -> Result:
+    return work(_Worker.searcher, numbered)

@@ -45,8 +45,8 @@ class Found(NamedTuple):
     """Programs, the leanest first."""
     front: list[Simplified]
     """Programs on the way to them, by operations."""
-    in_time: bool = True
-    """Whether it was over before its time was."""
+    cut_short: bool = False
+    """Whether its time was over before it was."""
 
 
 def simplified(
@@ -98,20 +98,21 @@ def simplified(
     with hands(searcher, jobs if pays else 1, told, deadline) as working:
         ends = working.each(Searcher.down, [one.start for one in begins])
         for first in range(0, rounds, _AT_ONCE):
-            if working.late:
+            if not working.in_time():
                 break
             turns = range(first, min(first + _AT_ONCE, rounds))
             ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
             ends = slimmed(ends, _CLOSELY)
         ends = _again(working, ends, rounds, told)
-        in_time = not working.late
-        close = working.each(Searcher.closer, leanest(ends, _CLOSELY), however_late=True)
+        best = leanest(ends, _CLOSELY)
+        told.ahead = len(best)
+        close = working.each(Searcher.closer, best, however_late=True)
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
     )
     found = [close[k].simplified(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
-    return Found(found, front(ends + close), in_time)
+    return Found(found, front(ends + close), working.cut_short)
 
 
 class _Told:
@@ -140,7 +141,7 @@ class _Told:
 def _again(working: Hands, ends: list[Way], patience: int, told: _Told) -> list[Way]:
     """Down once more from shortly before the best ends, while in time, until so many in a row have brought nothing."""
     turn = since = 0
-    while since < patience and not working.late:
+    while since < patience and working.in_time():
         best = leanest(ends, _BEST)
         some = [
             Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience - since))

@@ -5,8 +5,17 @@ from conftest import run_stages
 
 from paramreduce_cli.report import rendering
 
-NAMES = ["torques", "identified-parameters", "poses", "log-motion"]
-"""The second and the last have nothing to draw here."""
+NAMES = [
+    "torques",
+    "identified-parameters",
+    "poses",
+    "log-motion",
+    "log-spectra",
+    "log-torques",
+    "measured-torques",
+    "terms",
+]
+"""Two that have something to draw here, and enough others for two processes."""
 
 
 class StoppedError(Exception):

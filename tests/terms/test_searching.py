@@ -30,9 +30,11 @@ def test_what_is_found_does_not_depend_on_the_number_of_processes(searcher, star
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_the_deadline_one_is_done_unless_all_are_asked_for(searcher, start, jobs):
     with hands(searcher, jobs, lambda way: None, time.monotonic()) as working:
-        assert working.late
-        assert len(working.each(Searcher.down, [start] * 6)) == 1
         assert len(working.each(Searcher.down, [start] * 3, however_late=True)) == 3
+        assert not working.cut_short
+        assert len(working.each(Searcher.down, [start] * 6)) == 1
+        assert working.cut_short
+        assert not working.in_time()
 
 
 def test_what_is_at_the_edge_of_the_budget_may_be_out_of_it_near_there(searcher, start):

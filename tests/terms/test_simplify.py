@@ -21,8 +21,8 @@ def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
     monkeypatch.setattr(Searcher, "again", lambda self, what: None)
     whole = 2 * searcher.begun(start).way.fewest
     monkeypatch.setattr(simplify, "_WORK_NEARBY", allowed * whole)
-    found, front, in_time = simplify.simplified(searcher, [start], rounds=rounds)
-    assert in_time
+    found, front, cut_short = simplify.simplified(searcher, [start], rounds=rounds)
+    assert not cut_short
     assert turns == list(range(expected))
     assert found[0].program.n_operations == min(one.program.n_operations for one in found)
     assert front
@@ -72,12 +72,12 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
             lambda self, what, n=name, work=work: begun.append(n) or work(self, what),
         )
     whole = simplify.simplified(searcher, [start], rounds=8)
-    assert whole.in_time
+    assert not whole.cut_short
     assert {"nearby", "again"} < set(begun)
     begun.clear()
     found = simplify.simplified(searcher, [start], rounds=8, seconds=1e-9)
     assert begun == ["down", "closer"]
-    assert not found.in_time
+    assert found.cut_short
     least = min(one.program.n_operations for one in found.ends)
     assert least < searcher.begun(start).way.fewest
     assert least >= whole.ends[0].program.n_operations

@@ -22,7 +22,7 @@ _PATIENCE = 5.0
 def start(folder, config=CONFIG):
     command = [sys.executable, "-m", "paramreduce_cli", "run", config, "--results", folder]
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    settings = ["--quiet", "--jobs", "2", "--set", "report.formats=[svg]"]
+    settings = ["--quiet", "--jobs", "2", "--set", "report.formats=[png,svg]"]
     return subprocess.Popen([*command, *settings], start_new_session=True, **quiet)
 
 
