@@ -205,7 +205,7 @@ def _say_late(name: str) -> None:
     """Of a search that might have found less."""
     warnings.warn(
         f"terms.time_limit: it ended the search for the {name} dynamics; with more time it may have found fewer "
-        "operations.",
+        "operations",
         ParamreduceWarning,
         stacklevel=3,
     )
@@ -217,7 +217,7 @@ def _say_unfit(term: TermModel) -> None:
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
             f"terms: accelerations from the direct dynamics are off by {share(np.nanmax(errors))}, as nothing "
-            "asks for more than a positive definite M. Give terms.acceleration_error.",
+            "asks for more than a positive definite M. Give terms.acceleration_error",
             ParamreduceWarning,
             stacklevel=3,
         )
@@ -233,10 +233,10 @@ def _say_missing(names: list[str], others: bool) -> None:
         return
     text = (
         f"nothing within it was found for the {' and the '.join(names)} dynamics. Allow more, or let "
-        "reduction find subsets that are better than that."
+        "reduction find subsets that are better than that"
     )
     if not others:
-        raise ConfigError(text, ("terms", "torque_error"))
+        raise ConfigError(f"{text}.", ("terms", "torque_error"))
     warnings.warn(f"terms.torque_error: {text}", ParamreduceWarning, stacklevel=3)
 
 
