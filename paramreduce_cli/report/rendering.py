@@ -20,7 +20,7 @@ def rendered(
     formats: list[str],
     *,
     jobs: int = 1,
-    told: Callable[[str], None] = lambda _: None,
+    told: Callable[[int, str], None] = lambda *_: None,
 ) -> dict[str, Encoded]:
     """Figures by name, in the order that is asked for, without those that have nothing to draw.
 
@@ -29,7 +29,7 @@ def rendered(
         data: What they show.
         formats: In which they are encoded.
         jobs: Processes at most; starting them pays where there are several formats.
-        told: Name of each figure that is done.
+        told: How many figures are done, and the name of the last one.
 
     Raises:
         DataError: A process died.
@@ -37,8 +37,8 @@ def rendered(
     found: dict[str, Encoded] = {}
     jobs = min(jobs, len(names) // _AT_LEAST) if len(formats) > 1 else 1
     for name, encoded in _drawn(names, data, formats, jobs):
-        told(name)
         found[name] = encoded
+        told(len(found), name)
     return {name: found[name] for name in names if found[name]}
 
 

@@ -119,8 +119,12 @@ def report(
     )
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _shown(figures, model)]
-    told = _Told(run, len(drawn))
-    encoded = rendered(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=told)
+
+    def tell(done: int, name: str = "") -> None:
+        run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
+
+    tell(0)
+    encoded = rendered(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=tell)
     images = {name: one["svg"] for name, one in encoded.items()}
     files = {
         f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats
@@ -134,29 +138,8 @@ def report(
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
-    told("")
+    tell(len(drawn) + 1)
     return Report(summary, files)
-
-
-class _Told:
-    """Tells how far the report is.
-
-    Args:
-        run: Has the audience.
-        figures: How many are drawn; the page comes after them.
-    """
-
-    def __init__(self, run: Run, figures: int) -> None:
-        self._run, self._done, self._steps = run, 0, figures + 1
-        self._say("")
-
-    def __call__(self, name: str) -> None:
-        """Of something that is done."""
-        self._done += 1
-        self._say(name)
-
-    def _say(self, name: str) -> None:
-        self._run.progress(Progress("figures, tables and page", self._done, self._steps, name))
 
 
 def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:

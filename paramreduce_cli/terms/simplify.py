@@ -39,7 +39,7 @@ _LEANEST = 12
 
 
 class Found(NamedTuple):
-    """What a search has come to; both are empty where no start is within the budget."""
+    """What a search has come to: no programs where no start is within the budget."""
 
     ends: list[Simplified]
     """Programs, the leanest first."""

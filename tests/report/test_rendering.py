@@ -40,12 +40,17 @@ def data(two_link_copy, monkeypatch):
 
 def test_figures_do_not_depend_on_processes(data, monkeypatch):
     told = []
-    here = rendering.rendered(NAMES, data, ["png", "svg"], jobs=1, told=told.append)
+
+    def note(done, name):
+        told.append(name)
+        assert done == len(told)
+
+    here = rendering.rendered(NAMES, data, ["png", "svg"], jobs=1, told=note)
     assert told == NAMES
     assert list(here) == ["torques", "poses"]
     assert all(set(one) == {"png", "svg"} for one in here.values())
     told.clear()
-    elsewhere = rendering.rendered(NAMES, data, ["png", "svg"], jobs=2, told=told.append)
+    elsewhere = rendering.rendered(NAMES, data, ["png", "svg"], jobs=2, told=note)
     assert sorted(told) == sorted(NAMES)
     assert list(elsewhere) == list(here)
     assert elsewhere == here
