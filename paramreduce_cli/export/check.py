@@ -27,7 +27,7 @@ def random_cases(
     """Random states with the results of plain recursion, by the names of the functions' arrays.
 
     Where terms were left out, results are those of the simplified program, which plain recursion does
-    not know; states are inside the ranges that it holds in.
+    not know; states are inside the ranges that it holds in, those of loops anywhere.
 
     Args:
         mechanism: Of the robot.

@@ -102,7 +102,10 @@ def exported_model(
     if closures:
         check_closures(closures, checked)
     unsafe = ""
-    if "direct" in _FUNCTIONS[what] and (unsafe := doubtful_mass_matrices(checked["M"])):
+    # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
+    if simplified is None and "direct" in _FUNCTIONS[what]:
+        unsafe = doubtful_mass_matrices(checked["M"])
+    if unsafe:
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     worth = _worth(model, unsafe, simplified, validation)
     if single:

@@ -5,6 +5,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
 import casadi as ca
@@ -240,6 +241,26 @@ def test_any_name_of_a_robot_is_one_in_cpp(tmp_path, name):
     run([*command, f"{identifier(name)}_example.cpp"], tmp_path)
 
 
+def function_without_terms(chosen, graph, outputs, n, **more):
+    """As reduce-terms leaves one, of the parameters of a model."""
+    errors = [
+        f"{kind}_error_{part}"
+        for kind in ("torque", "acceleration")
+        for part in ("estimation", "validation")
+    ]
+    known = dict.fromkeys([*errors, "random_torque_error"], 0.0) | {
+        "random_acceleration_error": np.nan, "random_states": 1, "largest_difference": np.zeros(n),
+        "worst_joint": 0, "worst_state": np.zeros((3, n)), "smallest_eigenvalue": np.nan, "mass_states": 0,
+        "lower": -np.ones((3, n)), "upper": np.ones((3, n)), "drawn": np.zeros((2, 3, n)), "projected": False,
+    }  # fmt: skip
+    program = Program.of_graph(graph, outputs)
+    return TermModel(
+        heuristic="swap", n_start=chosen.n, names=chosen.names, values=chosen.values, units=np.ones(chosen.n),
+        position=chosen.position, program=program.stored(), operations=program.n_operations,
+        operations_start=program.n_operations, front=None, **(known | more),
+    )  # fmt: skip
+
+
 @needs_gcc
 def test_an_angle_that_results_use_too(tmp_path):
     """A sum of coordinates in a sine and in a spring, whose parts only the angle is made of."""
@@ -249,20 +270,7 @@ def test_an_angle_that_results_use_too(tmp_path):
     phi, q1, q2, dq1 = (g.input(chosen.n * (k > 0) + max(k - 1, 0)) for k in range(4))
     angle = g.add(g.add(q1, q2), dq1)
     outputs = [g.add(g.call("sin", angle), g.multiply(phi, angle)), g.call("cos", angle)]
-    program = Program.of_graph(g, outputs).stored()
-    n = model.mechanism.n_dof
-    errors = [
-        f"{kind}_error_{part}"
-        for kind in ("torque", "acceleration")
-        for part in ("estimation", "validation")
-    ]
-    function = TermModel(
-        heuristic="swap", n_start=chosen.n, names=chosen.names, values=chosen.values, units=np.ones(chosen.n),
-        position=chosen.position, program=program, projected=False, operations=6, operations_start=6,
-        **dict.fromkeys(errors, 0.0), random_torque_error=0.0, random_acceleration_error=np.nan, random_states=1,
-        largest_difference=np.zeros(n), worst_joint=0, worst_state=np.zeros((3, n)), smallest_eigenvalue=np.nan,
-        mass_states=0, lower=-np.ones((3, n)), upper=np.ones((3, n)), drawn=np.zeros((2, 3, n)), front=None,
-    )  # fmt: skip
+    function = function_without_terms(chosen, g, outputs, model.mechanism.n_dof)
     files = languages["c"](
         exported_model(model, chosen, title=title, what=Exported.IDM, simplified=function)
     )
@@ -411,6 +419,28 @@ def test_models_that_are_unsafe_for_direct_dynamics_say_so(tmp_path):
     assert b"NOT SAFE FOR DIRECT DYNAMICS" in files["two_link.h"]
     files = languages["c"](exported_model(model, wrong, title=title, what=Exported.IDM))
     assert b"NOT SAFE" not in files["two_link.h"]
+
+
+def test_a_mass_matrix_without_terms_need_not_be_positive_where_it_does_not_hold():
+    """States of loops are reached from the assembly, wherever that leads."""
+    model = model_of("four_bar")
+    chosen, title = chosen_model("full", model, None, None)
+    (crank,) = model.mechanism.independent
+    g = Graph()
+    outputs = [g.call("cos", g.input(chosen.n + crank)), g.input(0)]
+    function = function_without_terms(
+        chosen, g, outputs, 1, projected=True, smallest_eigenvalue=np.cos(1), mass_states=100
+    )
+    cases = random_cases(model.mechanism, chosen, 200, np.random.default_rng(0), function)
+    assert cases["M"].min() < 0
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        files = languages["c"](
+            exported_model(model, chosen, title=title, what=Exported.DDM, simplified=function)
+        )
+    header = files["four_bar.h"]
+    assert b"NOT SAFE" not in header
+    assert b"Smallest eigenvalue of M on both sets and on 100 random states: 0.54." in header
 
 
 def test_the_header_lists_orders_and_units(hexaglide):
