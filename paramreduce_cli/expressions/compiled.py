@@ -60,6 +60,8 @@ class BatchFunction:
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
         self._out_sizes = [x.numel() for x in outputs]
+        self._in_lengths, self._out_lengths = _numbers(self._in_sizes), _numbers(self._out_sizes)
+        self._work_size = max(1, self._function.sz_w())
         self._library = None if once else load(_c_text(self._function))
 
     def __call__(self, *arrays: FloatArray) -> list[FloatArray]:
@@ -80,14 +82,14 @@ class BatchFunction:
         if self._library is None:
             return self._interpret(n, ins)
         outs = [np.empty((n, size)) for size in self._out_sizes]
-        work = np.empty(max(1, self._function.sz_w()))
+        work = np.empty(self._work_size)
         self._library.paramreduce_batch(
             ctypes.c_longlong(n),
             _pointers(ins),
-            (ctypes.c_longlong * len(ins))(*self._in_sizes),
+            self._in_lengths,
             _pointers(outs),
-            (ctypes.c_longlong * len(outs))(*self._out_sizes),
-            work.ctypes.data_as(ctypes.POINTER(ctypes.c_double)),
+            self._out_lengths,
+            ctypes.c_void_p(work.__array_interface__["data"][0]),
         )
         return outs
 
@@ -104,8 +106,13 @@ class BatchFunction:
         return [np.ascontiguousarray(result.full().T) for result in results]
 
 
+def _numbers(values: list[int]) -> ctypes.Array:
+    return (ctypes.c_longlong * len(values))(*values)
+
+
 def _pointers(arrays: list[FloatArray]) -> ctypes.Array:
-    return (ctypes.c_void_p * len(arrays))(*[a.ctypes.data for a in arrays])
+    """Addresses, as quickly as a call of one sample asks for."""
+    return (ctypes.c_void_p * len(arrays))(*[a.__array_interface__["data"][0] for a in arrays])
 
 
 @cache

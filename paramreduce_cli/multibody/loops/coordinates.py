@@ -116,7 +116,8 @@ class Coordinates:
         if self.mechanism.loops is None:
             return z
         near = start is not None and start.ndim == 2
-        q, reached = self.follow(z, start) if near else self._march(z, start)
+        single = z.shape[0] == 1  # no motion to be followed in steps
+        q, reached = self.follow(z, start) if near or single else self._march(z, start)
         self._check_reached(z, reached)
         return q
 
