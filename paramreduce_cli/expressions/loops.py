@@ -62,6 +62,15 @@ def _stamps(source: Path) -> tuple[tuple[str, float, int], ...]:
     return tuple((file.name, stat.st_mtime, stat.st_size) for file, stat in stats)
 
 
+def inlined(function: Loop) -> Loop:
+    """Have a function written out in the compiled ones that call it, where these are few.
+
+    What is compiled by itself is so once more, with all that it calls, in each of those that call it.
+    """
+    made: Loop = numba.njit(inline="always")(function)
+    return made
+
+
 def compiled(*, within: bool = False, makes_arrays: bool = True) -> Callable[[Loop], Loop]:
     """Have a function compiled when it is first called, and kept; others run on while it does.
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compiled, inlined
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 
 CONSTANT, INPUT, SUM, PRODUCT, SIN, COS, TANH, SIGN = range(8)
@@ -46,6 +46,13 @@ def needed(
     return used
 
 
+@inlined
+def _multiple(factor: float, values: FloatArray, result: FloatArray) -> None:
+    """A vector times a factor; assigned as a whole it takes Numba seconds to compile that shapes are compared."""
+    for i in range(result.size):
+        result[i] = factor * values[i]
+
+
 @compiled(within=True)
 def _made(
     k: int,
@@ -65,7 +72,7 @@ def _made(
     if code == CONSTANT:
         result[:] = numbers[k]
     elif code == INPUT:
-        result[:] = inputs[int(numbers[k])]
+        _multiple(1.0, inputs[int(numbers[k])], result)
     elif code == SUM:
         if not kept[k, FIRST]:
             s = 0.0
@@ -110,8 +117,7 @@ def values(
         elif source[k] == NUMBER:
             v[k] = factor[k]
         else:
-            for i in range(v.shape[1]):
-                v[k, i] = factor[k] * v[source[k], i]
+            _multiple(factor[k], v[source[k]], v[k])
     return v
 
 
@@ -225,18 +231,17 @@ def effects(
         given[:] = 0.0
         if what == WHOLE:
             if source[k] == k:
-                given[:] = own[k]
+                _multiple(1.0, own[k], given)
             elif source[k] == NUMBER:
                 given[:] = factor[k]
             else:
-                given[:] = factor[k] * v[source[k]]
+                _multiple(factor[k], v[source[k]], given)
         elif what == ITSELF:
             if kept[k, WHOLE]:
-                given[:] = own[k] - v[k]
+                for i in range(m):
+                    given[i] = own[k, i] - v[k, i]
         elif kept[k, WHOLE] and source[k] == k:
-            given[:] = v[operands[k, what] >> 1]
-            if operands[k, what] & 1:
-                given *= -1.0
+            _multiple(-1.0 if operands[k, what] & 1 else 1.0, v[operands[k, what] >> 1], given)
         for q in range(quantities):
             for i in range(m):
                 result[c, q * m + i] = adjoints[k, q, i] * given[i]
@@ -270,7 +275,7 @@ def combinations(
             number[k] = factor[k]
         elif source[k] != k:
             found[k] = found[source[k]]
-            coefficients[k] = factor[k] * coefficients[source[k]]
+            _multiple(factor[k], coefficients[source[k]], coefficients[k])
         elif code == CONSTANT:
             number[k] = numbers[k]
         elif code == INPUT and numbers[k] < n:
@@ -284,14 +289,15 @@ def combinations(
             second = found[b] if code == PRODUCT or kept[k, SECOND] else NONE
             if code == PRODUCT:
                 found[k] = first if second == NONE else second
-                coefficients[k] = (
-                    s * t * (number[a] * coefficients[b] + number[b] * coefficients[a])
-                )
+                for j in range(n):
+                    of_both = number[a] * coefficients[b, j] + number[b] * coefficients[a, j]
+                    coefficients[k, j] = s * t * of_both
                 continue
-            if first != NONE:
-                coefficients[k] += s * coefficients[a]
-            if second != NONE:
-                coefficients[k] += t * coefficients[b]
+            for j in range(n):
+                if first != NONE:
+                    coefficients[k, j] += s * coefficients[a, j]
+                if second != NONE:
+                    coefficients[k, j] += t * coefficients[b, j]
             plain = (first == NONE or np.any(coefficients[a])) and (
                 second == NONE or np.any(coefficients[b])
             )

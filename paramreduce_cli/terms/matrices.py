@@ -64,19 +64,19 @@ def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 @compiled(within=True)
-def _factored(a: FloatArray) -> bool:
-    """The lower triangle by Cholesky, in place; whether there is one."""
-    n = a.shape[0]
+def _factored(matrix: FloatArray, lower: FloatArray) -> bool:
+    """The lower triangle by Cholesky; whether there is one."""
+    n = matrix.shape[0]
     for i in range(n):
-        least = _SINGULAR * a[i, i]
+        least = _SINGULAR * matrix[i, i]
         for j in range(i + 1):
-            total = a[i, j]
+            total = matrix[i, j]
             for k in range(j):
-                total -= a[i, k] * a[j, k]
+                total -= lower[i, k] * lower[j, k]
             if j < i:
-                a[i, j] = total / a[j, j]
+                lower[i, j] = total / lower[j, j]
             elif total > least and total > 0:
-                a[i, i] = np.sqrt(total)
+                lower[i, i] = np.sqrt(total)
             else:
                 return False
     return True
@@ -85,11 +85,10 @@ def _factored(a: FloatArray) -> bool:
 @compiled()
 def _positive_definite(matrices: FloatArray) -> bool:
     lower = np.empty(matrices.shape[1:])
-    for s in range(matrices.shape[0]):
-        lower[:] = matrices[s]
-        if not _factored(lower):
-            return False
-    return True
+    s = 0
+    while s < matrices.shape[0] and _factored(matrices[s], lower):
+        s += 1
+    return s == matrices.shape[0]
 
 
 @compiled()
@@ -98,8 +97,7 @@ def _inverses(matrices: FloatArray) -> tuple[FloatArray, bool]:
     result = np.zeros((m, n, n))
     lower = np.empty((n, n))
     for s in range(m):
-        lower[:] = matrices[s]
-        if not _factored(lower):
+        if not _factored(matrices[s], lower):
             return result, False
         for i in range(n):  # the inverse of the triangle, in place
             lower[i, i] = 1 / lower[i, i]

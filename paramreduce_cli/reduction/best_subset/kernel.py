@@ -26,7 +26,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compiled, inlined
 from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
 
@@ -55,6 +55,7 @@ LEVEL, GOING_BACK, LOGGED, SPANNED, DOUBTFUL = 0, 1, 2, 3, 4
 DONE, PAUSED = 0, 1
 # What is handed on is not written as a plain number: for each of those Numba compiles a function anew.
 _NO_COLUMN = cast("int", np.int64(-1))
+_GRAM = cast("int", np.int64(0))
 _INCLUDE, _EXCLUDE = cast("tuple[bool, bool]", (np.bool_(True), np.bool_(False)))
 
 _within = compiled(within=True, makes_arrays=False)
@@ -109,6 +110,13 @@ class State(NamedTuple):
     """Its columns, then -1, (n_columns,)."""
     spare: FloatArray
     """Room to work in, (n_columns,)."""
+
+
+@inlined
+def _copied(given: FloatArray | IntArray, to: FloatArray | IntArray) -> None:
+    """Copy a vector; assigned as a whole it takes Numba seconds to compile that shapes are compared."""
+    for i in range(to.size):
+        to[i] = given[i]
 
 
 @_within
@@ -167,7 +175,7 @@ def _share(sheet: FloatArray, nullity: int, j: int) -> float:
     return share
 
 
-@_within
+@inlined
 def _exclude(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
@@ -197,9 +205,9 @@ def _fit_anew(
     n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
     rows = np.empty((free + count, data.chi.size))
     for j in range(free):
-        rows[j] = data.columns[numbers[FIRST + j]]
+        _copied(data.columns[numbers[FIRST + j]], rows[j])
     for k in range(count):
-        rows[free + k] = data.columns[s.included[k]]
+        _copied(data.columns[s.included[k]], rows[free + k])
     left, values, right = np.empty((0, 0)), np.empty(0), np.empty((0, 0))
     converged = True
     try:
@@ -216,11 +224,13 @@ def _fit_anew(
     inner = spanned @ data.chi
     rest = data.chi - inner @ spanned
     own = np.ascontiguousarray(left[:free, :rank])
-    sheet[n : n + free, :free] = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
+    inverse = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
+    for i in range(free):
+        _copied(inverse[i], sheet[n + i, :free])
     numbers[NULLITY] = min(free + count - rank, sheet.shape[0] - 2 * n - 2)
     for c in range(numbers[NULLITY]):
-        sheet[2 * n + c, :free] = left[:free, rank + c]
-    sheet[sheet.shape[0] - 1, :free] = own @ (inner / values[:rank])
+        _copied(left[:free, rank + c], sheet[2 * n + c, :free])
+    _copied(own @ (inner / values[:rank]), sheet[sheet.shape[0] - 1, :free])
     ratio = values[rank - 1] / values[0]
     numbers[NEAR] = 1 if ratio < NEARLY else 0
     length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
@@ -273,18 +283,18 @@ def _span(s: State, data: Data, count: int) -> None:
         length = np.sqrt(np.dot(left, left))
         if DEPENDENT < length < REAL:
             s.progress[DOUBTFUL] += 1
-        s.basis[k] = left / length if length > DEPENDENT else 0.0 * left
+        _copied(left / length if length > DEPENDENT else 0.0 * left, s.basis[k])
     s.progress[SPANNED] = max(s.progress[SPANNED], count)
 
 
-@_within
+@inlined
 def _include(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
     own, row = sheet[j, j], sheet.shape[0] - 2
     if own > SURE:
         errors[INSIDE] -= sheet[row, j] ** 2 / own
-        _sweep(sheet, 0, row, j, s.spare[: numbers[FREE]])
+        _sweep(sheet, _GRAM, row, j, s.spare[: numbers[FREE]])
     _drop(sheet, numbers, j)
     if GONE < own <= SURE:
         _calculate_anew(sheet, numbers, errors, s, data)
@@ -301,7 +311,7 @@ def _calculate_anew(
     left = _left(s.basis, count, data.chi)
     rest = np.empty((free, left.size))
     for j in range(free):
-        rest[j] = _left(s.basis, count, data.columns[numbers[FIRST + j]])
+        _copied(_left(s.basis, count, data.columns[numbers[FIRST + j]]), rest[j])
         sheet[row, j] = np.dot(rest[j], left)
         for i in range(j + 1):
             sheet[i, j] = sheet[j, i] = np.dot(rest[i], rest[j])
@@ -329,7 +339,7 @@ def _decide(
             _exclude(sheet, numbers, errors, s, data, j)
 
 
-@_within
+@inlined
 def _branch(s: State, data: Data, unit: int) -> None:
     """Keep the node for later and go on with a copy of it that includes a unit."""
     level = s.progress[LEVEL]
@@ -367,7 +377,7 @@ def _parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
     return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
 
 
-@_within
+@inlined
 def _exclude_parallel(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
 ) -> None:
@@ -386,8 +396,8 @@ def _exclude_parallel(
             own = _position(numbers, data.first[unit])
 
 
-@compiled(makes_arrays=False)
-def go_back(s: State, data: Data) -> None:
+@inlined
+def _go_back(s: State, data: Data) -> None:
     """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
     level = s.progress[LEVEL]
@@ -414,25 +424,26 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
     It is calculated by orthogonalisation; -1 stands for no column.
     """
     subset = np.full(data.unit.size, -1, np.int64)
-    subset[:count] = s.included[:count]
+    _copied(s.included[:count], subset[:count])
     _span(s, data, count)
     basis = np.empty((count + 2, data.chi.size))
-    basis[:count] = s.basis[:count]
+    for k in range(count):
+        _copied(s.basis[k], basis[k])
     for column in (first, second):
         if column >= 0:
             subset[count] = column
             direction = _left(basis, count, data.columns[column])
             length = np.sqrt(np.dot(direction, direction))
-            basis[count] = direction / length if length > DEPENDENT else 0.0 * direction
+            _copied(direction / length if length > DEPENDENT else 0.0 * direction, basis[count])
             count += 1
     left = _left(basis, count, data.chi)
     error = np.dot(left, left)
     if error < s.best[0] * (1 - 1e-12):
         s.best[0] = error
-        s.subset[:] = subset
+        _copied(subset, s.subset)
 
 
-@_within
+@inlined
 def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
@@ -470,12 +481,12 @@ def _needed(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
     return _share(sheet, nullity, j) <= APART
 
 
-@_within
+@inlined
 def _needed_and_useless(
     sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
 ) -> tuple[int, int, int]:
     """Places of the units that cannot be missed, one of them, and a useless unit; -1 for none."""
-    needed, must, nullity = 0, -1, numbers[NULLITY]
+    needed, must, nullity = 0, _NO_COLUMN, numbers[NULLITY]
     for j in range(numbers[FREE]):
         own = unit[numbers[FIRST + j]]
         if size[own] > places or (size[own] == 1 and sheet[j, j] <= GONE):
@@ -488,10 +499,10 @@ def _needed_and_useless(
             if not counted:
                 needed += size[own]
                 must = own
-    return needed, must, -1
+    return needed, must, _NO_COLUMN
 
 
-@_within
+@inlined
 def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data) -> None:
     """Try every free column in the last place."""
     row = sheet.shape[0] - 2
@@ -503,7 +514,7 @@ def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, d
             limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
-@_within
+@inlined
 def _last_two_places(
     sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
 ) -> None:
@@ -561,21 +572,42 @@ def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
     return int(chosen)
 
 
+@inlined
+def _repeat(s: State, data: Data, log: IntArray) -> None:
+    """Go the way that another search has logged."""
+    for k in range(log.size):
+        decision, level = log[k], s.progress[LEVEL]
+        if decision == 0:
+            _branch(s, data, log[k + 1] - 1)
+        elif decision < 0 or k == 0 or log[k - 1] != 0:  # a branch has included its unit already
+            _decide(
+                s.sheets[level], s.numbers[level], s.errors[level], s, data,
+                abs(decision) - 1, decision > 0,
+            )  # fmt: skip
+
+
 @compiled(makes_arrays=False)
-def search(s: State, data: Data, most: int) -> tuple[int, int]:
-    """Go on for at most so many nodes.
+def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
+    """Go the way that another search has logged, then on for at most so many nodes.
+
+    It is one function, as whatever calls the others is compiled together with all of them.
 
     Returns:
         DONE or PAUSED, and the number of nodes visited.
     """
+    _repeat(s, data, log)
     singles = data.size.size == data.unit.size
-    for nodes in range(most):
+    nodes = 0
+    while True:
         if s.progress[GOING_BACK] == 1:
-            go_back(s, data)
+            _go_back(s, data)
             s.progress[GOING_BACK] = 0
         level = s.progress[LEVEL]
         if level < 0:
             return DONE, nodes
+        if nodes == most:
+            return PAUSED, nodes
+        nodes += 1
         sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
         open_ = _settle(sheet, numbers, errors, s, data)
         places = data.places - numbers[INCLUDED]
@@ -589,18 +621,3 @@ def search(s: State, data: Data, most: int) -> tuple[int, int]:
             _branch(s, data, data.unit[_most_promising(sheet, numbers)])
         else:
             s.progress[GOING_BACK] = 1
-    return PAUSED, most
-
-
-@compiled()
-def repeat(s: State, data: Data, log: IntArray) -> None:
-    """Go the way that another search has logged."""
-    for k in range(log.size):
-        decision, level = log[k], s.progress[LEVEL]
-        if decision == 0:
-            _branch(s, data, log[k + 1] - 1)
-        elif decision < 0 or k == 0 or log[k - 1] != 0:  # a branch has included its unit already
-            _decide(
-                s.sheets[level], s.numbers[level], s.errors[level], s, data,
-                abs(decision) - 1, decision > 0,
-            )  # fmt: skip

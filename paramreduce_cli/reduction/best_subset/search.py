@@ -124,7 +124,7 @@ class Search:
         self._state = self._root(problem, places, squared_error, subset)
         self.finished = False
         self.nodes = 0
-        kernel.repeat(self._state, self._data, log.astype(np.int64))
+        kernel.search(self._state, self._data, log.astype(np.int64), 0)
 
     def _root(
         self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
@@ -156,7 +156,7 @@ class Search:
 
     def advance(self, nodes: int) -> None:
         """Go on for at most so many nodes."""
-        status, visited = self._kernel.search(self._state, self._data, nodes)
+        status, visited = self._kernel.search(self._state, self._data, BEGINNING, nodes)
         self.nodes += visited
         self.finished = status == self._kernel.DONE
 
@@ -172,7 +172,8 @@ class Search:
         if first is None:
             return None
         given = self._from(log[: first + 2])
-        self._kernel.go_back(given._state, given._data)
+        given._state.progress[self._kernel.GOING_BACK] = 1
+        given.advance(0)
         # Without its mark the branch is a decision like those before it, and nothing waits there.
         own = self._from(np.delete(log, first))._state
         own.progress[self._kernel.DOUBTFUL] += self._state.progress[self._kernel.DOUBTFUL]
