@@ -41,6 +41,7 @@ from paramreduce_cli.records import (
     FloatArray,
     MeasuredLog,
     Model,
+    Progress,
     Recording,
     Recordings,
     Samples,
@@ -86,7 +87,7 @@ def sample(
         if sampling.log is not None:
             return _logged(model, dynamics, log, name)
         if sampling.simulation is not None:
-            return _simulated(sampling.simulation, model, dynamics, name)
+            return _simulated(sampling.simulation, model, dynamics, name, tell)
         if recording is not None:
             return _recorded(sampling, model, dynamics, recording)
         if trajectories is None:
@@ -230,7 +231,7 @@ def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str
 
 
 def _simulated(
-    wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str
+    wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str, tell: Tell
 ) -> ObservedSet:
     """Samples of the full model's motions under the inputs that the config gives."""
     mechanism = model.mechanism
@@ -239,8 +240,9 @@ def _simulated(
     z = np.zeros(mechanism.n_dof)
     if mechanism.loops is not None:
         z = mechanism.loops.assembly[list(mechanism.independent)]
-    motions = []
-    for _ in range(wanted.runs if name == "estimation" else wanted.validation_runs):
+    motions: list[SimulatedMotion] = []
+    runs = wanted.runs if name == "estimation" else wanted.validation_runs
+    for done in range(runs):
         inputs = [_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
         start = z.copy()
         for coordinate, (lower, upper) in wanted.start.items():
@@ -249,6 +251,7 @@ def _simulated(
             motions.append(simulate(dynamics, model.values, inputs, start, time))
         except DataError as error:
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
+        tell(Progress(f"simulate motions of the {name} set", done + 1, runs))
     return ObservedSet(
         spans([time.size] * len(motions)),
         _motion_states(motions),

@@ -21,6 +21,17 @@ def simulated(request):
     return model, sample(config.sampling, model, None, Recordings(None, None))
 
 
+def test_how_many_motions_are_simulated_is_told():
+    config, model = config_and_model("cart_pole", *SHORT, "sampling.simulation.validation_runs=1")
+    told = []
+    sample(config.sampling, model, None, Recordings(None, None), tell=told.append)
+    assert [(one.task, one.done, one.total) for one in told] == [
+        ("simulate motions of the estimation set", 1, 2),
+        ("simulate motions of the estimation set", 2, 2),
+        ("simulate motions of the validation set", 1, 1),
+    ]
+
+
 def test_accelerations_are_those_of_the_oracle(simulated):
     model, samples = simulated
     mechanism, oracle = model.mechanism, Lagrange(model.mechanism)
