@@ -6,15 +6,15 @@ given subsets where that is worth it.
 """
 
 import heapq
-import itertools
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import (
     JointFormulation,
     Place,
@@ -26,6 +26,7 @@ from paramreduce_cli.lean.choices import (
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.search import best_choices
 from paramreduce_cli.lean.tree import Tree, lean_tree
+from paramreduce_cli.processes import as_done, workers
 from paramreduce_cli.records import (
     BoolArray,
     Formulation,
@@ -35,6 +36,7 @@ from paramreduce_cli.records import (
     Mechanism,
     Model,
     Progress,
+    Run,
 )
 
 _FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
@@ -62,13 +64,25 @@ _COMPOSITE = JointFormulation(
 _DIRECT_STARTS = (_COMPOSITE, replace(_COMPOSITE, aligned=True), _AT_REST, *_INVERSE_STARTS)
 """The same at all joints: the search starts from the first, and all stay beside what it finds, as
 they suit odd sets of few parameters."""
+_MANY = 5
+"""Joints from which on the start of processes pays."""
+
+
+_Choices = tuple[JointFormulation, ...]
+"""One for each joint."""
+
+
+class _Searches(NamedTuple):
+    """Searches of which each begins where the one before has ended."""
+
+    direct: bool
+    """Of the direct dynamics, not of the inverse."""
+    dropped: tuple[frozenset[int], ...]
+    """Parameters that are zero in each."""
 
 
 def formulations(
-    mechanism: Mechanism,
-    affecting: BoolArray,
-    base: IntArray,
-    progress: Callable[[Progress], None] = lambda _: None,
+    mechanism: Mechanism, affecting: BoolArray, base: IntArray, run: Run | None = None
 ) -> Formulations:
     """Search the formulations of a mechanism.
 
@@ -76,39 +90,78 @@ def formulations(
         mechanism: Its tree is what counts.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
-        progress: Told when one of the six searches has ended.
+        run: Workers, and an audience that is told when one of the six searches has ended.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.
+
+    Raises:
+        DataError: A process died.
     """
+    run = run or Run()
     tree = lean_tree(mechanism)
     everything = set(range(affecting.size))
     useless = everything - set(affecting.nonzero()[0].tolist())
     regrouped = everything - set(base.tolist())
     minor = useless | (everything - _main_parameters(tree))
+    asked = [
+        _Searches(direct, dropped)
+        for direct in (False, True)
+        for dropped in ((frozenset(useless), frozenset(regrouped)), (frozenset(minor),))
+    ]
+    found: dict[_Searches, list[_Choices]] = {}
+    total = sum(len(one.dropped) for one in asked)
+    for one, best in _searched(mechanism, asked, run.jobs if len(tree.joints) >= _MANY else 1):
+        found[one] = best
+        run.progress(Progress("search for formulations", sum(map(len, found.values())), total))
 
-    ended = itertools.count(1)
+    def all_of(direct: bool) -> tuple[Formulation, ...]:
+        best = [choices for one in asked if one.direct == direct for choices in found[one]]
+        same = [(start,) * len(tree.joints) for start in _starts(direct)]
+        return tuple(tuple(map(to_data, choices)) for choices in dict.fromkeys(best + same))
 
-    def best(
-        build: Build, start: list[JointFormulation], dropped: set[int]
-    ) -> list[JointFormulation]:
-        choices = best_choices(tree, build, start, dropped)
-        progress(Progress("search for formulations", next(ended), 6))
-        return choices
+    return Formulations(all_of(False), all_of(True))
 
-    def searched(build: Build, starts: tuple[JointFormulation, ...]) -> tuple[Formulation, ...]:
-        same, *others = ([start] * len(tree.joints) for start in starts)
-        full = best(build, same, useless)
-        of_base = best(build, full, regrouped)
-        of_few = best(build, same, minor)
-        found = dict.fromkeys(map(tuple, [full, of_base, of_few, same, *others]))
-        return tuple(tuple(map(to_data, one)) for one in found)
 
-    found = Formulations(
-        searched(inverse_outputs, _INVERSE_STARTS), searched(direct_outputs, _DIRECT_STARTS)
-    )
-    forget()
+def _starts(direct: bool) -> tuple[JointFormulation, ...]:
+    return _DIRECT_STARTS if direct else _INVERSE_STARTS
+
+
+def _searched(
+    mechanism: Mechanism, asked: Sequence[_Searches], jobs: int
+) -> Iterator[tuple[_Searches, list[_Choices]]]:
+    """In any order."""
+    if jobs < 2:
+        yield from ((one, _best(mechanism, one)) for one in asked)
+        forget()
+        return
+    with workers(min(jobs, len(asked)), _start_worker, mechanism) as pool:
+        yield from as_done(pool, _in_worker, asked)
+
+
+def _best(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
+    """What each search ends with."""
+    tree, start = lean_tree(mechanism), _starts(asked.direct)[0]
+    build = direct_outputs if asked.direct else inverse_outputs
+    choices, found = [start] * len(tree.joints), []
+    for dropped in asked.dropped:
+        choices = best_choices(tree, build, choices, dropped)
+        found.append(tuple(choices))
     return found
+
+
+class _Worker:
+    """What a worker process knows; set once when it starts."""
+
+    mechanism: Mechanism
+
+
+def _start_worker(mechanism: Mechanism) -> None:
+    _Worker.mechanism = mechanism
+
+
+def _in_worker(asked: _Searches) -> list[_Choices]:
+    return _best(_Worker.mechanism, asked)
 
 
 def formulations_for(model: Model, subsets: Iterable[IntArray], *, direct: bool) -> Formulations:

@@ -51,7 +51,7 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     _check_named(model, mechanism, base)
     texts = _expressions(robot, mechanism, base, states, rng)
     affecting = affecting_columns(W)
-    lean = formulations(mechanism, affecting, base.columns, run.progress)
+    lean = formulations(mechanism, affecting, base.columns, run)
     check_formulations(mechanism, lean, np.flatnonzero(affecting), states, rng)
     return Model(
         mechanism=mechanism,

@@ -13,6 +13,7 @@ from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
+from paramreduce_cli.lean import formulations as module
 from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
 from paramreduce_cli.lean.formulations import formulations, formulations_for, varied
@@ -20,7 +21,7 @@ from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.lean.tree import lean_tree
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.plain import PlainDynamics
-from paramreduce_cli.records import Formulations
+from paramreduce_cli.records import Formulations, Run
 
 
 def random_choices(count, rng):
@@ -200,6 +201,15 @@ def test_the_search_repeats_itself(hexaglide, monkeypatch):
     monkeypatch.setattr(search, "_found", {})
     again = formulations(hexaglide.mechanism, hexaglide.affecting, hexaglide.base.columns)
     assert again == hexaglide.formulations
+
+
+def test_processes_find_what_one_finds(puma, monkeypatch):
+    monkeypatch.setattr(module, "_MANY", 0)
+    told = []
+    run = Run(jobs=2, progress=told.append)
+    found = formulations(puma.mechanism, puma.affecting, puma.base.columns, run)
+    assert found == puma.formulations
+    assert (told[-1].done, told[-1].total) == (6, 6)
 
 
 def test_unknown_choices_are_refused():
