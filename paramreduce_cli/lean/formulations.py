@@ -90,7 +90,7 @@ def formulations(
         mechanism: Its tree is what counts.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
-        run: Workers, and an audience that is told when one of the six searches has ended.
+        run: Workers, and an audience that is told how many of the six searches have ended.
 
     Returns:
         Choices for the inverse and for the direct dynamics, each different set once.

@@ -90,7 +90,7 @@ def proofs(folder):
 
 def test_proofs_are_continued_on_the_same_data_alone(invoke, two_link_copy):
     """Groups change what is chosen among, but not the data."""
-    limited = ["reduction.best_subset.node_limit=1"]
+    limited = ["reduction.best_subset.time_limit=0"]
     grouped = ['reduction.groups=[{"name": "g", "bodies": ["upper", "fore"]}]']
     (two_link_copy / "reduction.h5").unlink()
     reduce = ("reduce", TWO_LINK, "--results", two_link_copy, "--quiet")
