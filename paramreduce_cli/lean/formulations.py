@@ -67,7 +67,6 @@ they suit odd sets of few parameters."""
 _MANY = 5
 """Joints from which on the start of processes pays."""
 
-
 _Choices = tuple[JointFormulation, ...]
 """One for each joint."""
 

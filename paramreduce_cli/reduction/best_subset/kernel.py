@@ -588,7 +588,7 @@ def _repeat(s: State, data: Data, log: IntArray) -> None:
 
 @compiled(makes_arrays=False)
 def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
-    """Go the way that another search has logged, then on for at most so many nodes.
+    """Go the way that another search has logged, then on for at most so many nodes, and back from the last one.
 
     It is one function, as whatever calls the others is compiled together with all of them.
 
