@@ -20,8 +20,8 @@ class TermsSection(Section):
     """Allowed on the estimation set, and on the validation set where its torques are not held out, a share (0.01 is 1 %)."""
     acceleration_error: Annotated[Number, Field(gt=0)] | None = None
     """The same of accelerations, a share, for the direct dynamics; without it only a positive definite mass matrix is asked for."""
-    rounds: Annotated[Whole, Field(ge=0, le=100_000)] | None = None
-    """How many times terms are left out once more, of the best subsets in formulations changed at random; without it 40 times, fewer for long functions. Then as many descents from shortly before the best ends may bring nothing in a row."""
+    rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 8
+    """How many times in a row it may bring nothing to leave terms out once more: first of the best subsets, in formulations changed at random, then from shortly before the best ends. What saves less than one operation in two hundred brings nothing."""
     time_limit: Annotated[Number, Field(gt=0)] | None = None
     """For the descents of each function, s, which takes somewhat longer as a whole: then no more are begun, and what is found depends on the machine; without it they end by themselves."""
     seed: Annotated[Whole, Field(ge=0)] = 0

@@ -14,7 +14,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import (
     JointFormulation,
     Place,
@@ -76,6 +76,8 @@ class _Searches(NamedTuple):
 
     direct: bool
     """Of the direct dynamics, not of the inverse."""
+    start: _Choices
+    """Where the first begins."""
     dropped: tuple[frozenset[int], ...]
     """Parameters that are zero in each."""
 
@@ -104,13 +106,13 @@ def formulations(
     regrouped = everything - set(base.tolist())
     minor = useless | (everything - _main_parameters(tree))
     asked = [
-        _Searches(direct, dropped)
+        _Searches(direct, (_starts(direct)[0],) * len(tree.joints), dropped)
         for direct in (False, True)
         for dropped in ((frozenset(useless), frozenset(regrouped)), (frozenset(minor),))
     ]
     found: dict[_Searches, list[_Choices]] = {}
     total = sum(len(one.dropped) for one in asked)
-    for one, best in _searched(mechanism, asked, run.jobs if len(tree.joints) >= _MANY else 1):
+    for one, best in _searched(mechanism, asked, run.jobs):
         found[one] = best
         run.progress(Progress("search for formulations", sum(map(len, found.values())), total))
 
@@ -130,7 +132,7 @@ def _searched(
     mechanism: Mechanism, asked: Sequence[_Searches], jobs: int
 ) -> Iterator[tuple[_Searches, list[_Choices]]]:
     """In any order."""
-    if jobs < 2:
+    if jobs < 2 or len(lean_tree(mechanism).joints) < _MANY:
         yield from ((one, _best(mechanism, one)) for one in asked)
         forget()
         return
@@ -140,13 +142,16 @@ def _searched(
 
 def _best(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
     """What each search ends with."""
-    tree, start = lean_tree(mechanism), _starts(asked.direct)[0]
-    build = direct_outputs if asked.direct else inverse_outputs
-    choices, found = [start] * len(tree.joints), []
+    tree, build = lean_tree(mechanism), _build(asked.direct)
+    choices, found = list(asked.start), []
     for dropped in asked.dropped:
         choices = best_choices(tree, build, choices, dropped)
         found.append(tuple(choices))
     return found
+
+
+def _build(direct: bool) -> Build:
+    return direct_outputs if direct else inverse_outputs
 
 
 class _Worker:
@@ -163,34 +168,41 @@ def _in_worker(asked: _Searches) -> list[_Choices]:
     return _best(_Worker.mechanism, asked)
 
 
-def formulations_for(model: Model, subsets: Iterable[IntArray], *, direct: bool) -> Formulations:
+def formulations_for(
+    model: Model, subsets: Iterable[IntArray], *, direct: bool, jobs: int = 1
+) -> Formulations:
     """The formulations of a model, and more that suit some subsets of its parameters.
 
     Args:
         model: Of the robot, with formulations.
         subsets: Indices of the parameters that are not zero, of each.
         direct: Whether they are for the direct dynamics, not for the inverse.
+        jobs: Processes.
 
     Returns:
         Those of the model first, each different set once.
+
+    Raises:
+        DataError: A process died.
     """
-    tree = lean_tree(model.mechanism)
-    everything = set(range(model.affecting.size))
-    build = direct_outputs if direct else inverse_outputs
+    tree, build = lean_tree(model.mechanism), _build(direct)
+    everything = frozenset(range(model.affecting.size))
     known = model.formulations.direct if direct else model.formulations.inverse
     starts = [tuple(map(from_data, choices)) for choices in known]
-    found = dict.fromkeys(starts)
+    asked = []
     for kept in subsets:
-        dropped = everything - set(kept.tolist())
+        dropped = everything - frozenset(kept.tolist())
 
-        def count(choices: Sequence[JointFormulation], dropped: set[int] = dropped) -> int:
+        def count(choices: _Choices, dropped: frozenset[int] = dropped) -> int:
             graph = Graph()
             return graph.count(build(tree, choices, graph, dropped))
 
-        for start in heapq.nsmallest(_SUITED, starts, key=count):
-            found[tuple(best_choices(tree, build, start, dropped))] = None
+        suited = heapq.nsmallest(_SUITED, starts, key=count)
+        asked += [_Searches(direct, start, (dropped,)) for start in suited]
     forget()
-    data = tuple(tuple(map(to_data, choices)) for choices in found)
+    found = dict(_searched(model.mechanism, asked, jobs))
+    different = dict.fromkeys([*starts, *(best for one in asked for best in found[one])])
+    data = tuple(tuple(map(to_data, choices)) for choices in different)
     return replace(model.formulations, **{"direct" if direct else "inverse": data})
 
 

@@ -116,7 +116,9 @@ def _searched(
     direct = name == "direct"
     starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
     smallest = [start.model.kept for start in starts[:_SMALLEST]]
-    suited = replace(model, formulations=formulations_for(model, smallest, direct=direct))
+    suited = replace(
+        model, formulations=formulations_for(model, smallest, direct=direct, jobs=run.jobs)
+    )
     lean = LeanModels(suited, independent=projected)
     mechanism = model.mechanism
     judge = Judge(

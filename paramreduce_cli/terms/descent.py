@@ -16,7 +16,7 @@ from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import Search, Step
 from paramreduce_cli.terms.starts import Start
-from paramreduce_cli.terms.tape import Remains, Tape
+from paramreduce_cli.terms.tape import Outputs, Remains, Tape
 
 _LEG = 0.88
 """Share of the operations that are left when a program is rewritten on its way down."""
@@ -53,12 +53,12 @@ class Simplified:
         fitting = Fitting(tape, self.beta.size, samples, budget)
         return replace(self, beta=fitting.fit(tape.everything(), self.beta, looks=_LOOKS).beta)
 
-    def outputs(self, states: FloatArray) -> FloatArray:
-        """What it gives, (n_outputs, n_samples), for states (n_states, n_samples)."""
+    def outputs(self, states: FloatArray) -> Outputs:
+        """What it gives for states (n_states, n_samples)."""
         m = states.shape[1]
         values = np.broadcast_to(self.beta[:, None], (self.beta.size, m))
         given = self.program.evaluated([*values, *states])
-        return np.array([np.broadcast_to(value, m) for value in given])
+        return Outputs.of(np.array([np.broadcast_to(value, m) for value in given]))
 
     def compact(self) -> tuple[ReducedModel, Program]:
         """The same with the parameters that the program uses, and no others."""

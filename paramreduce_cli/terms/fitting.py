@@ -9,9 +9,9 @@ import numpy as np
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.terms.kernels import WHOLE
 from paramreduce_cli.terms.likeness import Ways, alike
-from paramreduce_cli.terms.matrices import positive_definite, roots, times
+from paramreduce_cli.terms.matrices import positive_definite, roots, times, whitening
 from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.tape import Remains, Tape
+from paramreduce_cli.terms.tape import Outputs, Remains, Tape
 
 _LARGEST = 1e100
 """Share of an allowed error from which on it does not matter how large it is."""
@@ -166,11 +166,12 @@ class Fitting:
         samples = self.samples
         needed = self.tape.needed(left)
         values = self.tape.values(left, self._inputs(beta, samples), needed)
-        adjoints = self.tape.adjoints(left, values, samples.seeds, self._in_parameters)
         present = self._parameters >= 0
         present[present] = left.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
-        W[present] = adjoints[self._parameters[present]]
+        W[present] = self.tape.adjoints_of(
+            self._parameters[present], left, values, samples.seeds, self._in_parameters
+        )
         inverse = samples.inverse_masses(self.tape.outputs(values))
         for _ in range(looks):
             metric = self._metric(inverse)
@@ -226,8 +227,8 @@ class Fitting:
         """Errors of torques and of accelerations on other samples."""
         return samples.errors(self._outputs(left, beta, samples))
 
-    def _outputs(self, left: Remains, beta: FloatArray, samples: TermSamples) -> FloatArray:
-        """Of the program, (n_outputs, n_samples)."""
+    def _outputs(self, left: Remains, beta: FloatArray, samples: TermSamples) -> Outputs:
+        """Of the program."""
         values = self.tape.values(left, self._inputs(beta, samples), self.tape.needed(left))
         return self.tape.outputs(values)
 
@@ -286,9 +287,5 @@ def _solved(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArra
     Returns:
         The parameters, and the inverse of the triangular factor of their Gram matrix.
     """
-    size = np.linalg.norm(rows, axis=1)
-    size[size == 0] = 1.0
-    gram = (rows @ rows.T) / np.outer(size, size)
-    gram[np.diag_indices_from(gram)] += _RIDGE
-    factor = np.linalg.inv(np.linalg.cholesky(gram)) / size
+    factor = whitening(rows @ rows.T, _RIDGE)
     return factor.T @ (factor @ (rows @ target)), factor

@@ -137,6 +137,15 @@ def own_values(
     return own
 
 
+@inlined
+def _reach(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
+    """Have derivatives be zero before anything is added to them."""
+    if not reached[q]:
+        reached[q] = True
+        for i in range(derivatives.size):
+            derivatives[i] = 0.0
+
+
 @compiled()
 def adjoints(
     codes: IntArray,
@@ -148,10 +157,15 @@ def adjoints(
     v: FloatArray,
     seeds: FloatArray,
     which: BoolArray,
-) -> FloatArray:
-    """Derivatives by the nodes that are asked for, zero for others, (n_nodes, n_quantities, n_samples)."""
+) -> tuple[FloatArray, BoolArray]:
+    """Derivatives by the nodes that are asked for.
+
+    Returns:
+        Derivatives, (n_nodes, n_quantities, n_samples), and which of them there are, (n_nodes, n_quantities): to
+        clear the others takes longer than all that is done here.
+    """
     n, quantities, m = codes.size, seeds.shape[1], v.shape[1]
-    found = np.zeros((n, quantities, m))
+    found = np.empty((n, quantities, m))
     reached = np.zeros((n, quantities), dtype=np.bool_)
     for o in range(outputs.size):
         k = outputs[o] >> 1
@@ -160,7 +174,7 @@ def adjoints(
         s = -1.0 if outputs[o] & 1 else 1.0
         for q in range(quantities):
             if np.any(seeds[o, q]):
-                reached[k, q] = True
+                _reach(found[k, q], reached[k], q)
                 for i in range(m):
                     found[k, q, i] += s * seeds[o, q, i]
     for k in range(n - 1, -1, -1):
@@ -175,29 +189,29 @@ def adjoints(
                 continue
             if source[k] != k:
                 if which[source[k]]:
-                    reached[source[k], q] = True
+                    _reach(found[source[k], q], reached[source[k]], q)
                     for i in range(m):
                         found[source[k], q, i] += factor[k] * found[k, q, i]
             elif code == SUM:
                 if kept[k, FIRST] and which[a]:
-                    reached[a, q] = True
+                    _reach(found[a, q], reached[a], q)
                     for i in range(m):
                         found[a, q, i] += s * found[k, q, i]
                 if kept[k, SECOND] and which[b]:
-                    reached[b, q] = True
+                    _reach(found[b, q], reached[b], q)
                     for i in range(m):
                         found[b, q, i] += t * found[k, q, i]
             elif code == PRODUCT:
                 if which[a]:
-                    reached[a, q] = True
+                    _reach(found[a, q], reached[a], q)
                     for i in range(m):
                         found[a, q, i] += s * t * found[k, q, i] * v[b, i]
                 if which[b]:
-                    reached[b, q] = True
+                    _reach(found[b, q], reached[b], q)
                     for i in range(m):
                         found[b, q, i] += s * t * found[k, q, i] * v[a, i]
             elif code != SIGN and which[a]:
-                reached[a, q] = True
+                _reach(found[a, q], reached[a], q)
                 for i in range(m):
                     x = s * v[a, i]
                     if code == SIN:
@@ -207,7 +221,7 @@ def adjoints(
                     else:
                         slope = 1.0 - v[k, i] ** 2
                     found[a, q, i] += s * slope * found[k, q, i]
-    return found
+    return found, reached
 
 
 @compiled()

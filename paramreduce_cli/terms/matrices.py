@@ -1,4 +1,4 @@
-"""Symmetric matrices of a few rows, one for each sample: what a search does thousands of times."""
+"""Symmetric matrices of a few rows, mostly one for each sample: what a search does thousands of times."""
 
 from __future__ import annotations
 
@@ -61,6 +61,37 @@ def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
                 for s in range(m):
                     result[c, i, s] += triangles[i, j, s] * vectors[c, j, s]
     return result
+
+
+@compiled()
+def whitening(gram: FloatArray, ridge: float) -> FloatArray:
+    """The lower triangle that times columns makes them orthonormal, from their products with each other, (n, n).
+
+    Args:
+        gram: (n, n)
+        ridge: Added to the squares of columns, as a share of them; of what is no more than that nothing is said.
+    """
+    n = gram.shape[0]
+    size = np.empty(n)
+    for i in range(n):
+        size[i] = np.sqrt(gram[i, i]) if gram[i, i] > 0 else 1.0
+    lower, inverse = np.zeros((n, n)), np.zeros((n, n))
+    for i in range(n):
+        for j in range(i + 1):
+            total = gram[i, j] / (size[i] * size[j])
+            for k in range(j):
+                total -= lower[i, k] * lower[j, k]
+            lower[i, j] = total / lower[j, j] if j < i else np.sqrt(max(total, 0.0) + ridge)
+    for i in range(n):
+        for j in range(i + 1):
+            total = 1.0 if i == j else 0.0
+            for k in range(j, i):
+                total -= lower[i, k] * inverse[k, j]
+            inverse[i, j] = total / lower[i, i]
+    for i in range(n):
+        for j in range(i + 1):
+            inverse[i, j] /= size[j]
+    return inverse
 
 
 @compiled(within=True)

@@ -12,6 +12,7 @@ from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
 from paramreduce_cli.terms.matrices import inverses
+from paramreduce_cli.terms.tape import Outputs
 
 
 @dataclass(frozen=True)
@@ -51,10 +52,9 @@ class TermSamples:
     def seeds(self) -> FloatArray:
         """Torques by outputs of the program, (n_outputs, n_dof, n_samples)."""
         n, count = self.ddq.shape
-        tangent = (
-            np.broadcast_to(np.eye(n), (count, n, n)) if self.tangent is None else self.tangent
-        )
-        across = np.moveaxis(tangent, 0, 2)
+        across = self._across
+        if across is None:
+            across = np.broadcast_to(np.eye(n)[:, :, None], (n, n, count))
         if not self.direct:
             return np.ascontiguousarray(across)
         i, j = self._places
@@ -64,42 +64,44 @@ class TermSamples:
         return np.concatenate([lower, across])
 
     @cached_property
+    def _across(self) -> FloatArray | None:
+        """The tangent, samples last, (n, n_dof, n_samples)."""
+        return (
+            None if self.tangent is None else np.ascontiguousarray(np.moveaxis(self.tangent, 0, 2))
+        )
+
+    @cached_property
     def _places(self) -> tuple[IntArray, IntArray]:
-        """Rows and columns of the entries of M that a program gives, (n_entries,) each."""
-        return np.tril_indices(len(self.ddq))
+        """Rows and columns of the entries of M that a program gives, (n_entries,) each; none for torques."""
+        return np.tril_indices(len(self.ddq) if self.direct else 0)
 
-    def differences(self, outputs: FloatArray) -> FloatArray:
-        """Torques to be met less those of a program, (n_dof, n_samples).
-
-        Args:
-            outputs: Of the program, (n_outputs, n_samples).
-        """
-        torques = outputs
-        if self.direct:
-            n = len(self.ddq)
-            torques = outputs[-n:].copy()
-            rows, columns = self._places
-            for entry in np.flatnonzero(outputs[:-n].any(axis=1)):
-                i, j = rows[entry], columns[entry]
-                torques[i] += outputs[entry] * self.ddq[j]
-                if i != j:
-                    torques[j] += outputs[entry] * self.ddq[i]
+    def differences(self, outputs: Outputs) -> FloatArray:
+        """Torques to be met less those of a program, (n_dof, n_samples)."""
+        rows, columns = self._places
+        torques = np.zeros(self.ddq.shape)
+        for place, value in zip(outputs.places.tolist(), outputs.values, strict=True):
+            if place >= rows.size:
+                torques[place - rows.size] += value
+                continue
+            i, j = rows[place], columns[place]
+            torques[i] += value * self.ddq[j]
+            if i != j:
+                torques[j] += value * self.ddq[i]
         if self.tangent is not None:
             torques = np.einsum("mij,im->jm", self.tangent, torques)
         result: FloatArray = self.tau - torques
         return result
 
-    def mass_matrices(self, outputs: FloatArray) -> FloatArray:
+    def mass_matrices(self, outputs: Outputs) -> FloatArray:
         """Of the independent coordinates, (n_samples, n_dof, n_dof)."""
         rows, columns = self._places
-        lower = outputs[: rows.size]
-        if self.tangent is None:
-            return np.asarray(_mirrored(lower, rows, columns))
-        live = np.flatnonzero(lower.any(axis=1))
-        entries = np.ascontiguousarray(lower[live].T)
-        return np.asarray(_projected(entries, rows[live], columns[live], self.tangent))
+        number = int(np.searchsorted(outputs.places, rows.size))
+        lower, places = outputs.values[:number], outputs.places[:number]
+        if self._across is None:
+            return np.asarray(_mirrored(lower, rows[places], columns[places], len(self.ddq)))
+        return np.asarray(_projected(lower, rows[places], columns[places], self._across))
 
-    def inverse_masses(self, outputs: FloatArray) -> FloatArray | None:
+    def inverse_masses(self, outputs: Outputs) -> FloatArray | None:
         """Inverses of the mass matrices, (n_samples, n_dof, n_dof).
 
         None for the inverse dynamics, or where a matrix is not positive definite.
@@ -108,7 +110,7 @@ class TermSamples:
             return None
         return inverses(self.mass_matrices(outputs))
 
-    def errors(self, outputs: FloatArray) -> tuple[float, float]:
+    def errors(self, outputs: Outputs) -> tuple[float, float]:
         """Normalised errors of torques and of accelerations [Ros2019].
 
         The latter is infinite where a mass matrix is not positive definite, and not a number where
@@ -117,7 +119,7 @@ class TermSamples:
         return errors_over([(self, outputs)])
 
 
-def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float, float]:
+def errors_over(parts: Iterable[tuple[TermSamples, Outputs]]) -> tuple[float, float]:
     """The same over several parts of a set together, each with the outputs on it."""
     squares = np.zeros(4)
     for part, given in parts:
@@ -139,10 +141,10 @@ def errors_over(parts: Iterable[tuple[TermSamples, FloatArray]]) -> tuple[float,
 
 
 @compiled()
-def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray) -> FloatArray:
-    """Symmetric matrices, (n_samples, n, n), of the entries of their lower triangles, (n_entries, n_samples)."""
-    count, n = lower.shape[1], rows[-1] + 1
-    result = np.empty((count, n, n))
+def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray, n: int) -> FloatArray:
+    """Symmetric matrices, (n_samples, n, n), of some entries of their lower triangles, (n_entries, n_samples)."""
+    count = lower.shape[1]
+    result = np.zeros((count, n, n))
     for m in range(count):
         for e in range(rows.size):
             result[m, rows[e], columns[e]] = result[m, columns[e], rows[e]] = lower[e, m]
@@ -151,32 +153,39 @@ def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray) -> FloatArra
 
 @compiled()
 def _projected(
-    entries: FloatArray, rows: IntArray, columns: IntArray, tangent: FloatArray
+    lower: FloatArray, rows: IntArray, columns: IntArray, across: FloatArray
 ) -> FloatArray:
-    """J^T M J of symmetric matrices, most of whose entries are zero.
+    """J^T M J of symmetric matrices, most of whose entries are zero, (n_samples, n_dof, n_dof).
 
     Args:
-        entries: Of their lower triangles, (n_samples, n_entries).
+        lower: Some entries of their lower triangles, (n_entries, n_samples).
         rows: Of these, (n_entries,).
         columns: Of these, (n_entries,).
-        tangent: J, (n_samples, n, n_dof).
+        across: J, (n, n_dof, n_samples).
     """
-    count, n, n_dof = tangent.shape
-    result = np.zeros((count, n_dof, n_dof))
-    across = np.empty((n, n_dof))
-    for m in range(count):
-        across[:] = 0.0
-        for e in range(rows.size):
-            i, j, x = rows[e], columns[e], entries[m, e]
-            for a in range(n_dof):
-                across[i, a] += x * tangent[m, j, a]
+    n, n_dof, count = across.shape
+    half, live = np.zeros(across.shape), np.zeros(n, dtype=np.bool_)
+    for e in range(rows.size):
+        i, j = rows[e], columns[e]
+        live[i] = live[j] = True
+        for a in range(n_dof):
+            for m in range(count):
+                half[i, a, m] += lower[e, m] * across[j, a, m]
             if i != j:
-                for a in range(n_dof):
-                    across[j, a] += x * tangent[m, i, a]
-        for i in range(n):
+                for m in range(count):
+                    half[j, a, m] += lower[e, m] * across[i, a, m]
+    found = np.zeros((n_dof, n_dof, count))
+    for i in range(n):
+        if live[i]:
             for a in range(n_dof):
-                for b in range(n_dof):
-                    result[m, a, b] += tangent[m, i, a] * across[i, b]
+                for b in range(a + 1):
+                    for m in range(count):
+                        found[a, b, m] += across[i, a, m] * half[i, b, m]
+    result = np.empty((count, n_dof, n_dof))
+    for m in range(count):
+        for a in range(n_dof):
+            for b in range(a + 1):
+                result[m, a, b] = result[m, b, a] = found[a, b, m]
     return result
 
 

@@ -6,7 +6,7 @@ import heapq
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -20,22 +20,22 @@ _WORK = 40_000
 """Operations times torques, of all programs that are gone down from first: time grows a little faster."""
 _FEWEST, _MOST = 12, 30
 """How many these are at the least, and at most."""
-_WORK_NEARBY = 400_000
-"""The same of those near the best ones, unless it is said how many they are."""
-_FEWEST_NEARBY, _MOST_NEARBY = 8, 40
-"""How many these are at the least, and at most."""
 _BEST = 4
 """Starts with the leanest ends, near which others are gone down from."""
 _DRAWN = 0.25
 """How often this is done near one of all, so that what is no better at once is gone on from too."""
 _AT_ONCE = 8
-"""Of these others, before the best are looked for again."""
+"""Descents before the best are looked for again."""
+_HARDLY = 200
+"""One operation in so many: what brings less than that brings nothing."""
 _CLOSELY = 8
 """Leanest ends of all descents, gone on from with more samples."""
 _MANY = 20_000
 """Operations times torques, of all programs that are gone down from, from which on the start of processes pays."""
 _LEANEST = 12
 """Programs that are judged, the leanest of all searches."""
+
+Item = TypeVar("Item")
 
 
 class Found(NamedTuple):
@@ -53,7 +53,7 @@ def simplified(
     searcher: Searcher,
     starts: list[Start],
     *,
-    rounds: int | None,
+    rounds: int,
     seconds: float = math.inf,
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
@@ -61,14 +61,13 @@ def simplified(
     """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
 
     Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
-    formulations are changed at random; then once more from programs shortly before the best ends, written in other
-    ways, as long as that helps; from the best ends it goes on with more samples.
+    formulations are changed at random, as long as that helps; then, as long as that helps, once more from programs
+    shortly before the best ends, written in other ways; from the best ends it goes on with more samples.
 
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        rounds: How many starts near the best ones are gone down from, and how many descents once more may bring
-            nothing until these end; None for as many as their operations allow.
+        rounds: How many descents in a row may bring nothing, of those near the best ones and of those once more.
         seconds: After which no more descents are begun, but the last ones, with more samples; then what is found
             depends on the machine.
         jobs: Processes; what is found in time does not depend on them.
@@ -83,9 +82,6 @@ def simplified(
     if smallest is None:
         return Found([], [])
     begins = _first(searcher, promising(starts, smallest.model.n))
-    work = _work(searcher, begins)
-    if rounds is None:
-        rounds = int(np.clip(_WORK_NEARBY / work, _FEWEST_NEARBY, _MOST_NEARBY))
     told = _Told(progress, len(begins) + 2 * rounds + _CLOSELY)
 
     def beside(ends: Sequence[Way], turn: int) -> Near:
@@ -94,16 +90,15 @@ def simplified(
         parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
         return Near(parent.start, [one.start for one in best], turn)
 
-    pays = told.ahead * work > _MANY
+    def before(ends: Sequence[Way], turn: int) -> Again:
+        best = leanest(ends, _BEST)
+        return Again(best[turn % len(best)], turn)
+
+    pays = told.ahead * _work(searcher, begins) > _MANY
     with hands(searcher, jobs if pays else 1, told, deadline) as working:
         ends = working.each(Searcher.down, [one.start for one in begins])
-        for first in range(0, rounds, _AT_ONCE):
-            if not working.in_time():
-                break
-            turns = range(first, min(first + _AT_ONCE, rounds))
-            ends += working.each(Searcher.nearby, [beside(ends, turn) for turn in turns])
-            ends = slimmed(ends, _CLOSELY)
-        ends = _again(working, ends, rounds, told)
+        ends = _more(working, ends, Searcher.nearby, beside, rounds, told)
+        ends = _more(working, ends, Searcher.again, before, rounds, told)
         best = leanest(ends, _CLOSELY)
         told.ahead = len(best)
         close = working.each(Searcher.closer, best, however_late=True)
@@ -138,20 +133,38 @@ class _Told:
         self.ahead += ahead
 
 
-def _again(working: Hands, ends: list[Way], patience: int, told: _Told) -> list[Way]:
-    """Down once more from shortly before the best ends, while in time, until so many in a row have brought nothing."""
+def _more(
+    working: Hands,
+    ends: list[Way],
+    work: Callable[[Searcher, Item], Way | None],
+    item: Callable[[Sequence[Way], int], Item],
+    patience: int,
+    told: _Told,
+) -> list[Way]:
+    """More descents, while in time, until so many in a row have brought nothing.
+
+    Args:
+        working: Makes them.
+        ends: Of those before.
+        work: What they are.
+        item: What one is made from, from the ends of those before and its number.
+        patience: How many may bring nothing.
+        told: Of those that are still to be made, too.
+    """
     turn = since = 0
+    fewest = _fewest(ends)
     while since < patience and working.in_time():
-        best = leanest(ends, _BEST)
-        some = [
-            Again(best[k % len(best)], turn + k) for k in range(min(_AT_ONCE, patience - since))
-        ]
-        ends = slimmed(ends + working.each(Searcher.again, some), _CLOSELY)
-        turn, since = turn + len(some), since + len(some)
-        if min(way.fewest for way in ends) < best[0].fewest:
+        turns = range(turn, turn + min(_AT_ONCE, patience - since))
+        ends = slimmed(ends + working.each(work, [item(ends, k) for k in turns]), _CLOSELY)
+        turn, since = turns.stop, since + len(turns)
+        if _fewest(ends) < fewest - fewest // _HARDLY:
             told.more(since)
-            since = 0
+            since, fewest = 0, _fewest(ends)
     return ends
+
+
+def _fewest(ends: Iterable[Way]) -> int:
+    return min(way.fewest for way in ends)
 
 
 def _first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:

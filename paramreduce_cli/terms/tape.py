@@ -8,6 +8,7 @@ parameters, which are their first inputs, and stay so.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -62,6 +63,21 @@ class Remains:
         return Remains(self.kept, sources, factors)
 
 
+class Outputs(NamedTuple):
+    """Of a program, those that are not zero: of the mass matrices of loops most are."""
+
+    values: FloatArray
+    """(k, n_samples)"""
+    places: IntArray
+    """Among all outputs, rising, (k,)."""
+
+    @classmethod
+    def of(cls, everything: FloatArray) -> Outputs:
+        """Of all outputs, (n_outputs, n_samples)."""
+        places = np.flatnonzero(everything.any(axis=1))
+        return cls(everything[places], places)
+
+
 class Tape:
     """A program whose terms can be left out, and whose nodes can stand for others.
 
@@ -81,7 +97,8 @@ class Tape:
         self._operands = np.array(operands, dtype=np.int64).reshape(-1, 2)
         self._numbers = np.array(numbers)
         self._outputs = np.array(program.outputs, dtype=np.int64)
-        self._signs = np.where(self._outputs & 1, -1.0, 1.0)
+        zero = [program.nodes[value >> 1] == Node("constant") for value in program.outputs]
+        self._places = np.flatnonzero(~np.array(zero, dtype=np.bool_))
 
     def everything(self) -> Remains:
         """The whole program."""
@@ -152,10 +169,10 @@ class Tape:
         )  # fmt: skip
         return values
 
-    def outputs(self, values: FloatArray) -> FloatArray:
-        """Outputs from the values of nodes, (n_outputs, n_samples)."""
-        outputs: FloatArray = values[self._outputs >> 1] * self._signs[:, None]
-        return outputs
+    def outputs(self, values: FloatArray) -> Outputs:
+        """Outputs from the values of nodes, (n_nodes, n_samples)."""
+        some = self._outputs[self._places]
+        return Outputs(values[some >> 1] * np.where(some & 1, -1.0, 1.0)[:, None], self._places)
 
     def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
@@ -184,6 +201,28 @@ class Tape:
         Returns:
             Zero for other nodes, (n_nodes, n_quantities, n_samples).
         """
+        found, reached = self._adjoints(left, values, seeds, which)
+        found[~reached] = 0.0
+        return found
+
+    def adjoints_of(
+        self,
+        nodes: IntArray,
+        left: Remains,
+        values: FloatArray,
+        seeds: FloatArray,
+        which: BoolArray,
+    ) -> FloatArray:
+        """The same for some of the nodes that are asked for, (k, n_quantities, n_samples)."""
+        found, reached = self._adjoints(left, values, seeds, which)
+        some = found[nodes]
+        some[~reached[nodes]] = 0.0
+        return some
+
+    def _adjoints(
+        self, left: Remains, values: FloatArray, seeds: FloatArray, which: BoolArray
+    ) -> tuple[FloatArray, BoolArray]:
+        """Anything where there are none."""
         return kernels.adjoints(
             self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
             values, seeds, which,

@@ -5,7 +5,7 @@ import json
 import h5py
 import numpy as np
 import pytest
-from conftest import TWO_LINK, summary_of
+from conftest import CONFIGS, TWO_LINK, summary_of
 
 ANY = ["selected.n=null", "selected.heuristic=null"]
 
@@ -88,24 +88,24 @@ def proofs(folder):
         )  # fmt: skip
 
 
-def test_proofs_are_continued_on_the_same_data_alone(invoke, two_link_copy):
+def test_proofs_are_continued_on_the_same_data_alone(invoke, tmp_path):
     """Groups change what is chosen among, but not the data."""
-    limited = ["reduction.best_subset.time_limit=0"]
-    grouped = ['reduction.groups=[{"name": "g", "bodies": ["upper", "fore"]}]']
-    (two_link_copy / "reduction.h5").unlink()
-    reduce = ("reduce", TWO_LINK, "--results", two_link_copy, "--quiet")
-    invoke(*reduce, settings=limited)
-    assert "best-found" in proofs(two_link_copy)[2]
-    invoke(*reduce, settings=limited)  # not up to date: more can be proven
-    first = proofs(two_link_copy)
-    invoke(*reduce)
-    second = proofs(two_link_copy)
+    four_bar = (CONFIGS / "four_bar.yaml", "--results", tmp_path, "--quiet")
+    limited = ["reduction.best_subset.node_limit=1"]
+    grouped = ['reduction.groups=[{"name": "g", "bodies": ["crank", "rocker"]}]']
+    invoke("sample", *four_bar)
+    invoke("reduce", *four_bar, settings=limited)
+    assert {"best-found", "optimal"} == set(proofs(tmp_path)[2])
+    invoke("reduce", *four_bar, settings=limited)  # not up to date: more can be proven
+    first = proofs(tmp_path)
+    invoke("reduce", *four_bar)
+    second = proofs(tmp_path)
     assert set(second[2]) == {"optimal"}
     assert second[3] > first[3]
     assert np.all(first[0] <= second[1] * (1 + 1e-9) + 1e-12)
-    invoke(*reduce, settings=grouped)
-    invoke(*reduce)
-    last = proofs(two_link_copy)
+    invoke("reduce", *four_bar, settings=grouped)
+    invoke("reduce", *four_bar)
+    last = proofs(tmp_path)
     assert np.allclose(last[1], second[1], atol=1e-12)
     assert np.all(last[0] <= last[1] * (1 + 1e-9))
 

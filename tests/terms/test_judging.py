@@ -11,6 +11,7 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, Constraint
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Judge
+from paramreduce_cli.terms.tape import Outputs
 
 OFF = np.array([0.5, -2.0])
 
@@ -23,7 +24,7 @@ class Moved:
 
     def outputs(self, states):
         q, dq, ddq = np.split(states, 3)
-        return (self.dynamics.inverse(q.T, dq.T, ddq.T, self.values) + self.off).T
+        return Outputs.of((self.dynamics.inverse(q.T, dq.T, ddq.T, self.values) + self.off).T)
 
 
 def judge(robot, z, dz, ddz, nominal, constraints=(), **more):

@@ -47,3 +47,19 @@ def test_roots_of_large_factors_keep_the_weights():
     R = matrices.roots(factors, np.ones(3)).transpose(2, 0, 1)
     across = np.array([1.0, -1.0, 0.0]) / np.sqrt(2)
     np.testing.assert_allclose(np.linalg.norm(R @ across, axis=1), 1.0, rtol=1e-6)
+
+
+@pytest.mark.parametrize("dependent", [False, True])
+def test_whitened_columns_are_orthonormal_but_for_those_that_are_made_of_others(dependent):
+    columns = np.random.default_rng(2).normal(size=(5, 40)) * [[1e-3], [1], [1e3], [1], [1]]
+    if dependent:
+        columns[3] = 2 * columns[1] - columns[0]
+        columns[4] = 0.0
+    found = matrices.whitening(columns @ columns.T, 1e-13) @ columns
+    expected = np.eye(5) * ([1, 1, 1, 0, 0] if dependent else 1)
+    np.testing.assert_allclose(found @ found.T, expected, atol=2e-3 if dependent else 1e-10)
+    target = np.random.default_rng(3).normal(size=40)
+    best, *_ = np.linalg.lstsq(columns.T, target, rcond=1e-9)
+    np.testing.assert_allclose(
+        found.T @ (found @ target), best @ columns, atol=1e-3 if dependent else 1e-10
+    )

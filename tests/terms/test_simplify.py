@@ -2,30 +2,10 @@
 
 from dataclasses import replace
 
-import numpy as np
 import pytest
 
 from paramreduce_cli.terms import simplify
 from paramreduce_cli.terms.searching import Searcher
-
-
-@pytest.mark.parametrize(
-    ("rounds", "allowed", "expected"),
-    [(None, 0, 8), (None, 20, 20), (None, np.inf, 40), (3, np.inf, 3), (0, np.inf, 0)],
-)
-def test_fewer_near_the_best_are_gone_down_from_where_functions_are_long(
-    searcher, start, monkeypatch, rounds, allowed, expected
-):
-    turns = []
-    monkeypatch.setattr(Searcher, "nearby", lambda self, what: turns.append(what.turn))
-    monkeypatch.setattr(Searcher, "again", lambda self, what: None)
-    whole = 2 * searcher.begun(start).way.fewest
-    monkeypatch.setattr(simplify, "_WORK_NEARBY", allowed * whole)
-    found, front, cut_short = simplify.simplified(searcher, [start], rounds=rounds)
-    assert not cut_short
-    assert turns == list(range(expected))
-    assert found[0].program.n_operations == min(one.program.n_operations for one in found)
-    assert front
 
 
 def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_samples(
@@ -37,27 +17,48 @@ def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_sam
     assert found[0].program.n_operations <= without[0].program.n_operations
 
 
+@pytest.mark.parametrize("kind", ["nearby", "again"])
 @pytest.mark.parametrize(
     ("rounds", "gains", "expected"),
-    [(24, (), 24), (24, (3,), 32), (24, (3, 20), 48), (24, (30,), 24), (12, (), 12), (3, (), 3)],
-)
-def test_descents_once_more_go_on_until_so_many_in_a_row_bring_nothing(
-    searcher, start, monkeypatch, rounds, gains, expected
+    [
+        (24, {}, 24), (24, {3: 1}, 32), (24, {3: 1, 20: 1}, 48), (24, {30: 1}, 24),
+        (12, {}, 12), (3, {}, 3), (0, {}, 0),
+    ],
+)  # fmt: skip
+def test_more_descents_are_made_until_so_many_in_a_row_bring_nothing(
+    searcher, start, monkeypatch, kind, rounds, gains, expected
 ):
+    turns, told = gone_down(searcher, start, monkeypatch, kind, rounds, gains)
+    assert turns == list(range(expected))
+    assert max(told) <= 1.0
+
+
+@pytest.mark.parametrize(("gain", "expected"), [(3, 8), (4, 16)])
+def test_less_than_one_operation_in_so_many_is_nothing(
+    searcher, start, monkeypatch, gain, expected
+):
+    monkeypatch.setattr(simplify, "_HARDLY", searcher.down(start).fewest // 3)
+    turns, _ = gone_down(searcher, start, monkeypatch, "again", 8, {3: gain})
+    assert turns == list(range(expected))
+
+
+def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
+    """Numbers of the descents of one kind, some of which save so many operations, and what progress was told."""
     turns, told = [], []
+    way = searcher.down(start)
+    fewest = [way.fewest]
 
-    def again(self, what):
+    def work(self, what):
         turns.append(what.turn)
-        fewest = what.way.fewest - 1 if what.turn in gains else what.way.fewest + 1
-        return replace(what.way, fewest=fewest)
+        fewest[0] -= gains.get(what.turn, 0)
+        return replace(way, fewest=fewest[0] if what.turn in gains else way.fewest + 1)
 
-    monkeypatch.setattr(Searcher, "nearby", lambda self, what: None)
-    monkeypatch.setattr(Searcher, "again", again)
+    for name in ("nearby", "again"):
+        monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)
     simplify.simplified(
         searcher, [start], rounds=rounds, progress=lambda share, remark: told.append(share)
     )
-    assert turns == list(range(expected))
-    assert max(told) <= 1.0
+    return turns, told
 
 
 def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(

@@ -169,3 +169,13 @@ def test_counts_of_single_changes(program, seed):
     counts = tape.counts_standing(left, nodes, sources, factors)
     for *way, count in zip(nodes, sources, factors, counts, strict=True):
         assert count == tape.count(left.standing(*way))
+
+
+def test_outputs_are_those_that_are_not_zero(inputs):
+    g = Graph()
+    a, x = g.input(0), g.input(2)
+    tape = Tape(Program.of_graph(g, [g.constant(0.0), g.negate(g.multiply(a, x)), g.constant(0.0)]))
+    left = tape.everything()
+    found = tape.outputs(tape.values(left, inputs, tape.needed(left)))
+    assert found.places.tolist() == [1]
+    np.testing.assert_allclose(found.values, -inputs[:1] * inputs[2:3])
