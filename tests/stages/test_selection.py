@@ -93,7 +93,8 @@ def test_proofs_are_continued_on_the_same_data_alone(invoke, tmp_path):
     four_bar = (CONFIGS / "four_bar.yaml", "--results", tmp_path, "--quiet")
     limited = ["reduction.best_subset.node_limit=1"]
     grouped = ['reduction.groups=[{"name": "g", "bodies": ["crank", "rocker"]}]']
-    invoke("sample", *four_bar)
+    for stage in ("build-model", "optimize-trajectories", "sample"):
+        invoke(stage, *four_bar)
     invoke("reduce", *four_bar, settings=limited)
     assert {"best-found", "optimal"} == set(proofs(tmp_path)[2])
     invoke("reduce", *four_bar, settings=limited)  # not up to date: more can be proven
