@@ -132,11 +132,12 @@ def _searched(
     mechanism: Mechanism, asked: Sequence[_Searches], jobs: int
 ) -> Iterator[tuple[_Searches, list[_Choices]]]:
     """In any order."""
+    jobs = min(jobs, len(asked))
     if jobs < 2 or len(lean_tree(mechanism).joints) < _MANY:
         yield from ((one, _best(mechanism, one)) for one in asked)
         forget()
         return
-    with workers(min(jobs, len(asked)), _start_worker, mechanism) as pool:
+    with workers(jobs, _start_worker, mechanism) as pool:
         yield from as_done(pool, _in_worker, asked)
 
 

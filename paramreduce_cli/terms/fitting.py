@@ -170,7 +170,7 @@ class Fitting:
         present[present] = left.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
         W[present] = self.tape.adjoints_of(
-            self._parameters[present], left, values, samples.seeds, self._in_parameters
+            left, values, samples.seeds, self._in_parameters, self._parameters[present]
         )
         inverse = samples.inverse_masses(self.tape.outputs(values))
         for _ in range(looks):

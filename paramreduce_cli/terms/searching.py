@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import Item, Result, as_done, workers
 from paramreduce_cli.terms.descent import Descent, Way, gone_on
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
@@ -24,9 +24,6 @@ from paramreduce_cli.terms.tape import Tape
 
 _NOISY = 0.5
 """How often there is noise in the choice of terms, but from the first starts."""
-
-Item = TypeVar("Item")
-Result = TypeVar("Result")
 
 
 @dataclass(frozen=True)

@@ -6,10 +6,11 @@ import heapq
 import math
 import time
 from collections.abc import Callable, Iterable, Sequence
-from typing import NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
+from paramreduce_cli.processes import Item
 from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
 from paramreduce_cli.terms.searching import Again, Hands, Near, Searcher, hands
 from paramreduce_cli.terms.starts import Start, promising
@@ -31,11 +32,9 @@ _HARDLY = 200
 _CLOSELY = 8
 """Leanest ends of all descents, gone on from with more samples."""
 _MANY = 20_000
-"""Operations times torques, of all programs that are gone down from, from which on the start of processes pays."""
+"""Operations times torques, of all programs that are gone down from at the least, from which on the start of processes pays."""
 _LEANEST = 12
 """Programs that are judged, the leanest of all searches."""
-
-Item = TypeVar("Item")
 
 
 class Found(NamedTuple):
@@ -157,9 +156,10 @@ def _more(
         turns = range(turn, turn + min(_AT_ONCE, patience - since))
         ends = slimmed(ends + working.each(work, [item(ends, k) for k in turns]), _CLOSELY)
         turn, since = turns.stop, since + len(turns)
-        if _fewest(ends) < fewest - fewest // _HARDLY:
+        saved = fewest - _fewest(ends)
+        if saved and saved * _HARDLY >= fewest:
             told.more(since)
-            since, fewest = 0, _fewest(ends)
+            since, fewest = 0, fewest - saved
     return ends
 
 

@@ -64,7 +64,7 @@ class Remains:
 
 
 class Outputs(NamedTuple):
-    """Of a program, those that are not zero: of the mass matrices of loops most are."""
+    """Of a program, but for those that are known to be zero, as most entries of loops' mass matrices are."""
 
     values: FloatArray
     """(k, n_samples)"""
@@ -73,7 +73,7 @@ class Outputs(NamedTuple):
 
     @classmethod
     def of(cls, everything: FloatArray) -> Outputs:
-        """Of all outputs, (n_outputs, n_samples)."""
+        """Of all outputs, (n_outputs, n_samples), but for those that are zero for every sample."""
         places = np.flatnonzero(everything.any(axis=1))
         return cls(everything[places], places)
 
@@ -98,7 +98,8 @@ class Tape:
         self._numbers = np.array(numbers)
         self._outputs = np.array(program.outputs, dtype=np.int64)
         zero = [program.nodes[value >> 1] == Node("constant") for value in program.outputs]
-        self._places = np.flatnonzero(~np.array(zero, dtype=np.bool_))
+        self._some = np.flatnonzero(~np.array(zero, dtype=np.bool_))
+        self._signs = np.where(self._outputs[self._some] & 1, -1.0, 1.0)
 
     def everything(self) -> Remains:
         """The whole program."""
@@ -171,8 +172,8 @@ class Tape:
 
     def outputs(self, values: FloatArray) -> Outputs:
         """Outputs from the values of nodes, (n_nodes, n_samples)."""
-        some = self._outputs[self._places]
-        return Outputs(values[some >> 1] * np.where(some & 1, -1.0, 1.0)[:, None], self._places)
+        nodes = self._outputs[self._some] >> 1
+        return Outputs(values[nodes] * self._signs[:, None], self._some)
 
     def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
@@ -207,11 +208,11 @@ class Tape:
 
     def adjoints_of(
         self,
-        nodes: IntArray,
         left: Remains,
         values: FloatArray,
         seeds: FloatArray,
         which: BoolArray,
+        nodes: IntArray,
     ) -> FloatArray:
         """The same for some of the nodes that are asked for, (k, n_quantities, n_samples)."""
         found, reached = self._adjoints(left, values, seeds, which)

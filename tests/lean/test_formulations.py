@@ -212,6 +212,10 @@ def test_processes_find_what_one_finds(puma, monkeypatch):
     assert (told[-1].done, told[-1].total) == (6, 6)
 
 
+def test_no_subsets_ask_for_no_formulations(puma):
+    assert formulations_for(puma, [], direct=False, jobs=2) == puma.formulations
+
+
 def test_unknown_choices_are_refused():
     with pytest.raises(ValueError, match="nowhere"):
         from_data({"mass": "nowhere"})
@@ -240,6 +244,7 @@ def test_formulations_for_some_parameters_are_the_same_dynamics_and_take_no_more
     new = [one for one in getattr(found, kind) if one not in known]
     assert getattr(found, kind)[: len(known)] == known
     assert new
+    assert formulations_for(puma, [kept], direct=direct, jobs=2) == found
     for choices in new:
         errors = compared(puma.mechanism, list(map(from_data, choices)), np.random.default_rng(0))
         assert max(errors) < 1e-12

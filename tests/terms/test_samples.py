@@ -27,17 +27,19 @@ def symmetric(lower):
     return found
 
 
+@pytest.mark.parametrize("share", [0.6, 1.0])
 @pytest.mark.parametrize("with_loops", [False, True])
 @pytest.mark.parametrize("direct", [False, True])
-def test_torques_and_mass_matrices_of_outputs_most_of_which_are_zero(direct, with_loops):
+def test_torques_and_mass_matrices_of_outputs_most_of_which_are_zero(direct, with_loops, share):
     rng = np.random.default_rng(0)
     tangent = rng.normal(size=(COUNT, N, M)) if with_loops else None
     some = samples(rng, direct, tangent)
     J = tangent if with_loops else np.broadcast_to(np.eye(N), (COUNT, N, N))
     everything = rng.normal(size=((N * (N + 1) // 2 if direct else 0) + N, COUNT))
-    everything[rng.random(len(everything)) < 0.6] = 0.0
+    everything[rng.random(len(everything)) < share] = 0.0
     outputs = Outputs.of(everything)
-    assert 0 < len(outputs.places) < len(everything)
+    assert (len(outputs.places) > 0) == (share < 1)
+    assert len(outputs.places) < len(everything)
 
     torques = everything[-N:].copy()
     if direct:

@@ -5,6 +5,7 @@ import pytest
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.terms import kernels
 from paramreduce_cli.terms.kernels import ITSELF, NUMBER, WHOLE
 from paramreduce_cli.terms.tape import Tape
 
@@ -123,6 +124,27 @@ def test_nodes_that_are_not_asked_for_change_nothing(program, inputs, seed):
         tape.adjoints(left, some, seeds, linear)[linear],
         tape.adjoints(left, values, seeds, everywhere(tape))[linear],
     )
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
+    program, inputs, seed, monkeypatch
+):
+    tape = Tape(program)
+    left = random_remains(tape, seed)
+    swept = kernels.adjoints
+
+    def spoilt(*arguments):
+        found, reached = swept(*arguments)
+        found[~reached] = np.nan
+        return found, reached
+
+    monkeypatch.setattr(kernels, "adjoints", spoilt)
+    values = tape.values(left, inputs, everywhere(tape))
+    given = (left, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
+    adjoints, nodes = tape.adjoints(*given), tape.parameters(2)
+    assert np.all(np.isfinite(adjoints))
+    np.testing.assert_array_equal(tape.adjoints_of(*given, nodes), adjoints[nodes])
 
 
 @pytest.mark.parametrize("seed", range(40))
