@@ -98,8 +98,8 @@ class Tape:
         self._numbers = np.array(numbers)
         self._outputs = np.array(program.outputs, dtype=np.int64)
         zero = [program.nodes[value >> 1] == Node("constant") for value in program.outputs]
-        self._some = np.flatnonzero(~np.array(zero, dtype=np.bool_))
-        self._signs = np.where(self._outputs[self._some] & 1, -1.0, 1.0)
+        self._live = np.flatnonzero(~np.array(zero, dtype=np.bool_))
+        self._signs = np.where(self._outputs[self._live] & 1, -1.0, 1.0)
 
     def everything(self) -> Remains:
         """The whole program."""
@@ -172,8 +172,8 @@ class Tape:
 
     def outputs(self, values: FloatArray) -> Outputs:
         """Outputs from the values of nodes, (n_nodes, n_samples)."""
-        nodes = self._outputs[self._some] >> 1
-        return Outputs(values[nodes] * self._signs[:, None], self._some)
+        nodes = self._outputs[self._live] >> 1
+        return Outputs(values[nodes] * self._signs[:, None], self._live)
 
     def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
