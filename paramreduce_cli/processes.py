@@ -4,12 +4,13 @@ import contextlib
 import multiprocessing
 import os
 import signal
+import sys
 import threading
-import time
 import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
+from multiprocessing.context import BaseContext
 from typing import Any, TypeVar
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
@@ -18,20 +19,34 @@ Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 
+def process_context() -> BaseContext:
+    """Return how processes are started: forked from a server that has imported this package once.
+
+    A fork of this process could hang, as Matplotlib, h5py and the progress display keep threads and locks. Where there
+    is no server, as on Windows, each process imports all by itself.
+    """
+    if "forkserver" not in multiprocessing.get_all_start_methods():
+        return multiprocessing.get_context("spawn")
+    context = multiprocessing.get_context("forkserver")
+    package = __name__.partition(".")[0]
+    context.set_forkserver_preload([name for name in sys.modules if name.startswith(package)])
+    return context
+
+
 @contextlib.contextmanager
 def workers(
     jobs: int, start: Callable[..., None], *arguments: Any
 ) -> Iterator[ProcessPoolExecutor]:
-    """Processes that ignore Ctrl-C; their parent stops them, however it ends.
+    """Start processes that ignore Ctrl-C; their parent stops them, however the parent ends.
 
     Args:
-        jobs: How many.
-        start: Called in each when it begins.
-        arguments: Of that.
+        jobs: How many processes.
+        start: Function that each process calls when it begins.
+        arguments: Arguments of ``start``.
     """
-    context = multiprocessing.get_context("spawn")
     others = set(multiprocessing.active_children())
-    pool = ProcessPoolExecutor(jobs, context, _begin, (os.getpid(), start, arguments))
+    environment = dict(os.environ)  # the server of processes keeps the one that it was started in
+    pool = ProcessPoolExecutor(jobs, process_context(), _begin, (environment, start, arguments))
     try:
         yield pool
         pool.shutdown()
@@ -75,17 +90,22 @@ def _interruption_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(parent: int, start: Callable[..., None], arguments: tuple[Any, ...]) -> None:
-    # First of all, with the number that the parent gave: it may be gone already.
-    threading.Thread(target=_end_with, args=(parent,), daemon=True).start()
+def _begin(
+    environment: dict[str, str], start: Callable[..., None], arguments: tuple[Any, ...]
+) -> None:
+    """Prepare a worker process, then call its ``start``."""
+    threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    os.environ.clear()
+    os.environ.update(environment)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
     start(*arguments)
 
 
-def _end_with(parent: int) -> None:
-    """End this process when its parent is gone, however that ended."""
-    while os.getppid() == parent:
-        time.sleep(0.5)
+def _end_with_parent() -> None:
+    """End this process when the process that asked for it is gone, however that ended."""
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    parent.join()
     os._exit(1)

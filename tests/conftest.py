@@ -148,7 +148,7 @@ ROUGH_TERMS = ("terms.functions=[inverse]", "terms.torque_error=0.5", "terms.rou
 def run_stages(folder, *overrides):
     """Run the small case; returns which stages had nothing to do."""
     config = config_of("two_link", ONE_FORMAT, *overrides)
-    runner = Runner(config, Store(folder), jobs=2)
+    runner = Runner(config, Store(folder))
     return {stage.name: runner.run(stage).current for stage in stages_to_run(config)}
 
 

@@ -387,12 +387,8 @@ class ReportSection(Section):
 
     title: str | None = None
     """Heading; the robot's name if left out."""
-    formats: Annotated[list[Literal["pdf", "svg", "png"]], Field(min_length=1)] = [
-        "pdf",
-        "svg",
-        "png",
-    ]
-    """File formats of the figures."""
+    formats: Annotated[list[Literal["pdf", "svg", "png"]], Field(min_length=1)] = ["svg"]
+    """File formats of the figures. PDF figures have the width of a paper's column."""
     tracking: TrackingSection | None = None
     """Whether control with the exported models is demonstrated, for open trees."""
     poses: Annotated[list[PerJoint], Field(min_length=1)] | None = None

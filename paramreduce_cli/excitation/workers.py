@@ -7,11 +7,10 @@ of processes.
 from __future__ import annotations
 
 import contextlib
-import multiprocessing
 import queue
 import threading
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from multiprocessing.queues import Queue
 
@@ -26,7 +25,7 @@ from paramreduce_cli.multibody.drives import smoothed
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import as_done, process_context, workers
 from paramreduce_cli.records import (
     BaseParameters,
     Constraint,
@@ -101,9 +100,9 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
     if not missing:
         return found
     excitation = excitation_of(task)  # compile once, before the workers all ask for it
-    if run.jobs == 0:
+    if run.jobs < 2:
         for key in missing:
-            made = optimise_trajectory(excitation, task.settings, _seed(task, key), lambda _: None)
+            made = _optimised(task, excitation, key, run.progress)
             found[key] = run.parts[key] = made
             run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
         return found
@@ -120,7 +119,7 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
 @contextlib.contextmanager
 def _audience(run: Run) -> Iterator[Queue[Progress | None]]:
     """A queue whose news reach the audience of the run."""
-    news: Queue[Progress | None] = multiprocessing.get_context("spawn").Queue()
+    news: Queue[Progress | None] = process_context().Queue()
     listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
     listener.start()
     try:
@@ -158,13 +157,19 @@ def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
 
 
 def _optimise(key: str) -> Trajectory:
-    task = _Worker.task
+    return _optimised(_Worker.task, _Worker.excitation, key, _Worker.news.put)
 
-    def tell(share: float) -> None:
-        if share < 1.0:
-            _Worker.news.put(Progress(key, share, 1.0))
 
-    return optimise_trajectory(_Worker.excitation, task.settings, _seed(task, key), tell)
+def _optimised(
+    task: ExcitationTask, excitation: Excitation, key: str, on_progress: Callable[[Progress], None]
+) -> Trajectory:
+    """Optimise the trajectory of one key, and tell how far that is."""
+
+    def on_fraction(fraction: float) -> None:
+        if fraction < 1.0:
+            on_progress(Progress(key, fraction, 1.0))
+
+    return optimise_trajectory(excitation, task.settings, _seed(task, key), on_fraction)
 
 
 def _seed(task: ExcitationTask, key: str) -> list[int]:

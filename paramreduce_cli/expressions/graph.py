@@ -5,6 +5,7 @@ way they were built. A value is a signed reference to a node, as one integer: tw
 number, plus one if it is negated. Constants are folded, zeros and ones vanish as they are met.
 """
 
+from collections import defaultdict
 from typing import NamedTuple
 
 ZERO = 0
@@ -34,32 +35,48 @@ class Graph:
     def __init__(self, *, signs_free: bool = True) -> None:
         self._signs_free = signs_free
         self.nodes: list[Node] = []
-        self._index: dict[tuple, int] = {}
+        # One index an operation: short keys are quick to hash, and sums and products are asked for millions of times.
+        self._indices: dict[str, dict[tuple[int, ...], int]] = defaultdict(dict)
+        self._sums, self._products = self._indices["+"], self._indices["*"]
+        self._inputs: dict[int, int] = {}
+        self._constants: dict[float, int] = {}
+        self._numbers: dict[int, float] = {}
+        """Constants, by the numbers of their nodes."""
         self.constant(0.0)
 
-    def _value(self, operation: str, operands: tuple[int, ...], number: float = 0.0) -> int:
-        key = (operation, operands, number)
-        value = self._index.get(key)
+    def _appended(self, node: Node) -> int:
+        """Append a node; return its value."""
+        self.nodes.append(node)
+        return 2 * len(self.nodes) - 2
+
+    def _value(self, operation: str, operands: tuple[int, ...]) -> int:
+        """Return the value of an operation on values."""
+        index = self._indices[operation]
+        value = index.get(operands)
         if value is None:
-            value = 2 * len(self.nodes)
-            self._index[key] = value
-            self.nodes.append(Node(operation, operands, number))
+            value = index[operands] = self._appended(Node(operation, operands))
         return value
 
     def constant(self, number: float) -> int:
-        """A number."""
-        return self._value("constant", (), abs(number)) ^ (number < 0)
+        """Return the value of a number."""
+        size = abs(number)
+        value = self._constants.get(size)
+        if value is None:
+            value = self._constants[size] = self._appended(Node("constant", (), size))
+            self._numbers[value >> 1] = size
+        return value ^ (number < 0)
 
     def input(self, position: int) -> int:
-        """One of the inputs, by position."""
-        return self._value("input", (), position)
+        """Return one of the inputs, by position."""
+        value = self._inputs.get(position)
+        if value is None:
+            value = self._inputs[position] = self._appended(Node("input", (), position))
+        return value
 
     def number(self, value: int) -> float | None:
-        """What a constant is, None for anything else."""
-        node = self.nodes[value >> 1]
-        if node.operation != "constant":
-            return None
-        return -node.number if value & 1 else node.number
+        """Return what a constant is, None for anything else."""
+        number = self._numbers.get(value >> 1)
+        return -number if number is not None and value & 1 else number
 
     def negate(self, a: int) -> int:
         """-a"""
@@ -97,7 +114,11 @@ class Graph:
         if not self._signs_free:
             return self._value("+", (a, b))
         sign = a & 1
-        return self._value("+", (a ^ sign, b ^ sign)) ^ sign
+        key = (a ^ sign, b ^ sign)
+        value = self._sums.get(key)
+        if value is None:
+            value = self._sums[key] = self._appended(Node("+", key))
+        return value ^ sign
 
     def multiply(self, a: int, b: int) -> int:
         """A b"""
@@ -119,7 +140,11 @@ class Graph:
         a, b = a & ~1, b & ~1
         if b < a and x is None:
             a, b = b, a
-        return self._value("*", (a, b)) ^ sign
+        key = (a, b)
+        value = self._products.get(key)
+        if value is None:
+            value = self._products[key] = self._appended(Node("*", key))
+        return value ^ sign
 
     def call(self, function: str, *values: int) -> int:
         """A function of values: sin, cos, sqrt, /, atan2, ..."""

@@ -18,15 +18,15 @@ from paramreduce_cli.records import (
     Run,
 )
 
-COUNTS = (
-    "operations_inverse",
-    "operations_direct",
+COUNTS = ("operations_inverse", "operations_direct")
+"""Names of the counts of lean models, which :meth:`Counts.lean` returns in this order."""
+TEXTBOOK_COUNTS = (
     "operations_inverse_plain",
     "operations_direct_plain",
     "operations_inverse_paper_rule",
     "operations_direct_paper_rule",
 )
-"""What :meth:`Counts.all` counts: lean models, plain recursion, and that by the paper's rule."""
+"""Names of the counts of textbook recursion, without and with sign changes, which :meth:`Counts.textbook` returns."""
 _MANY = 5_000
 """Models times parameters, from which on the start of processes pays: an arm of six joints takes 2 ms a parameter, a process 4 s."""
 _AT_ONCE = 8
@@ -63,24 +63,27 @@ class Counts:
         indices: IntArray = (kept & self._model.affecting).nonzero()[0]
         return self._lean.estimate(indices)
 
-    def all(self, model: ReducedModel) -> list[int]:
-        """All of :data:`COUNTS`; the values of a model do not matter."""
+    def lean(self, model: ReducedModel) -> list[int]:
+        """Return :data:`COUNTS` of a model; its values do not matter."""
         model = model.restricted(self._model.affecting)
-        plain = [
+        return [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
+
+    def textbook(self, model: ReducedModel) -> list[int]:
+        """Return :data:`TEXTBOOK_COUNTS` of a model; its values do not matter."""
+        model = model.restricted(self._model.affecting)
+        return [
             count
             for signs_free in (True, False)
             for count in self._plain.count_operations(
                 model, signs_free=signs_free, independent=self._independent
             )
         ]
-        lean = [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
-        return lean + plain
 
 
 def count_all(
     model: Model, counted: CountedDynamics, chosen: Sequence[ReducedModel], run: Run
 ) -> IntArray:
-    """All of :data:`COUNTS` for many models; those that differ in values alone are counted once.
+    """Count :data:`COUNTS` of many models; models that differ in values alone are counted once.
 
     Args:
         model: Of the robot.
@@ -89,7 +92,7 @@ def count_all(
         run: Workers, who are asked where it takes long, and progress.
 
     Returns:
-        (n_models, number of counts)
+        (n_models, 2)
     """
     keys = [_structure(one, model) for one in chosen]
     different = dict(zip(keys, chosen, strict=True))
@@ -99,7 +102,7 @@ def count_all(
         counts = Counts(model, counted)
         for key, one in tasks:
             run.progress(Progress("count operations", len(known), len(tasks)))
-            known[key] = counts.all(one)
+            known[key] = counts.lean(one)
     else:
         parts = [tasks[k : k + _AT_ONCE] for k in range(0, len(tasks), _AT_ONCE)]
         with workers(min(run.jobs, len(parts)), _start_worker, model, counted) as pool:
@@ -128,4 +131,4 @@ def _start_worker(model: Model, counted: CountedDynamics) -> None:
 
 
 def _count(tasks: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:
-    return {key: _Worker.counts.all(one) for key, one in tasks}
+    return {key: _Worker.counts.lean(one) for key, one in tasks}

@@ -29,10 +29,6 @@ class HeuristicValidation(BySize):
     """Smallest over the samples."""
     operations_inverse: IntArray
     operations_direct: IntArray
-    operations_inverse_plain: IntArray
-    operations_direct_plain: IntArray
-    operations_inverse_paper_rule: IntArray
-    operations_direct_paper_rule: IntArray
 
 
 @dataclass(frozen=True)
@@ -147,7 +143,8 @@ class Validation:
 
     heuristics: Mapping[str, HeuristicValidation]
     full: Mapping[str, float]
-    """Operation counts and mass-matrix figures of the full model, by name."""
+    """Operation counts and mass-matrix figures of the full model, by name; counts of textbook recursion and those of the
+    base and of the selected model are among them. Empty without a mechanism."""
     nominal_acceleration: FloatArray
     lower: FloatArray
     """Smallest positions, speeds and accelerations of both sets, (3, n_dof)."""

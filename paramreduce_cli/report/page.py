@@ -1,14 +1,12 @@
 """The self-contained page for people."""
 
 import base64
-import importlib.metadata
 import io
 import json
 import zipfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
-from pathlib import Path
 from typing import Any
 
 import jinja2
@@ -26,8 +24,6 @@ from paramreduce_cli.texts import share
 from paramreduce_cli.texts.table import Table
 
 _FIGURE_MIME = "image/svg+xml"
-_PLOTTING = ("uplot-python", "uplot/static/uPlot.iife.js", "uplot/static/uPlot.min.css")
-"""The distribution that carries uPlot, its script and its style."""
 
 
 @dataclass(frozen=True)
@@ -79,12 +75,11 @@ def render_page(
         if items[section]
     ]
     page = environment.from_string(_text("page.html"))
-    script, style = _plotting()
     told, bibtex = methods(data)
     return page.render(
         title=data.title,
-        style=style + _text("page.css"),
-        script=script + _text("explorer.js"),
+        style=_text("uplot/uPlot.min.css") + _text("page.css"),
+        script=_text("uplot/uPlot.iife.min.js") + _text("explorer.js"),
         # Inside a script nothing may look like the end of it.
         explored=json.dumps(explorer(data), separators=(",", ":")).replace("<", "\\u003c"),
         sections=sections,
@@ -104,14 +99,6 @@ def _archive(files: Mapping[str, bytes]) -> str:
         for name, content in files.items():
             archive.writestr(zipfile.ZipInfo(name), content, zipfile.ZIP_DEFLATED)
     return base64.b64encode(buffer.getvalue()).decode()
-
-
-def _plotting() -> tuple[str, str]:
-    """Script and style of uPlot, from where it is installed; to import its package would take a second."""
-    name, *files = _PLOTTING
-    found = importlib.metadata.distribution(name)
-    script, style = (Path(str(found.locate_file(file))).read_text("utf-8") for file in files)
-    return script, style
 
 
 def render_sweep(

@@ -14,7 +14,7 @@ from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
 from paramreduce_cli.judgement.torque import NormErrors, torque_errors
 from paramreduce_cli.judgement.verdict import remarks, verdict
-from paramreduce_cli.lean.counting import COUNTS, count_all
+from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts, count_all
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.multibody.told import told
@@ -28,6 +28,7 @@ from paramreduce_cli.records import (
     IntArray,
     Model,
     Progress,
+    ReducedModel,
     Reduction,
     Run,
     Samples,
@@ -90,7 +91,7 @@ def validate(
         measured = _torques_alone(samples, reduction)
     else:
         measured = _measured(model, samples, reduction, counted, run)
-    heuristics, full = measured.heuristics, measured.full
+    heuristics, full = measured.heuristics, dict(measured.full)
     crossed = None
     if wanted.cross_validation:
         methods = _crossed_methods(wanted, reduction)
@@ -99,6 +100,8 @@ def validate(
             crossed = _cross_validation(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
     selected = select(wanted, values, reduction, heuristics, crossed)
+    if model is not None:
+        full |= _counts_by_name(Counts(model, counted), "selected_", selected.model)
     chosen = (selected.heuristic, selected.n)
     if not judging.stability:
         repeated = None
@@ -182,13 +185,13 @@ def _measured(
         for name, found in reduction.heuristics.items()
         for k in range(found.n.size)
     ]
-    operations = count_all(model, counted, [*chosen, full_model(model), base_model(model)], run)
-    *own, others = np.split(operations, np.cumsum(sizes))
+    operations = count_all(model, counted, chosen, run)
+    own = np.split(operations, np.cumsum(sizes)[:-1])
     heuristics = {
         name: _judged(found.n, some, estimation, validation, models.rows[name])
         for some, (name, found) in zip(own, reduction.heuristics.items(), strict=True)
     }
-    full = _full_model(others, estimation[1], validation[1])
+    full = _full_model(model, counted, estimation[1], validation[1])
     return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
 
 
@@ -292,16 +295,25 @@ def _judged(
 
 
 def _full_model(
-    counts: IntArray, estimation: AccelerationErrors, validation: AccelerationErrors
+    model: Model,
+    counted: CountedDynamics,
+    estimation: AccelerationErrors,
+    validation: AccelerationErrors,
 ) -> dict[str, float]:
-    full, base = counts.tolist()
-    result: dict[str, float] = dict(zip(COUNTS, full, strict=True))
-    result |= {f"base_{name}": value for name, value in zip(COUNTS, base, strict=True)}
+    counts = Counts(model, counted)
+    result = _counts_by_name(counts, "", full_model(model))
+    result |= _counts_by_name(counts, "base_", base_model(model))
     result["mass_matrix_condition"] = float(max(estimation.condition[-1], validation.condition[-1]))
     result["mass_matrix_smallest_eigenvalue"] = float(
         min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])
     )
     return result
+
+
+def _counts_by_name(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
+    """Count operations of a model: lean, and by textbook recursion."""
+    names = [prefix + name for name in (*COUNTS, *TEXTBOOK_COUNTS)]
+    return dict(zip(names, [*counts.lean(chosen), *counts.textbook(chosen)], strict=True))
 
 
 def _crossed_methods(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:

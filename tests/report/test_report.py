@@ -124,10 +124,10 @@ def test_summary_holds_what_a_regression_job_compares(summary):
         assert row["n"] == 4
         assert {"estimation", "validation"} <= set(row["torque_error"])
         assert {"estimation", "validation"} <= set(row["acceleration_error"])
-        kinds = {
-            f"{d}{rule}" for d in ("inverse", "direct") for rule in ("", "_plain", "_paper_rule")
-        }
-        assert set(row["operations"]) == kinds
+        assert set(row["operations"]) == {"inverse", "direct"}
+    for model in ("", "base_", "selected_"):
+        for rule in ("", "_plain", "_paper_rule"):
+            assert f"{model}operations_inverse{rule}" in summary["full"]
 
 
 def test_summary_agrees_with_the_samples(summary, two_link_results):

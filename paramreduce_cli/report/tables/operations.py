@@ -9,25 +9,17 @@ from paramreduce_cli.texts.table import Table
 def operations(data: ReportData) -> Table:
     """Operations of the full, the base and the selected model: lean, plain recursion, the paper's rule."""
     selected = data.validation.selected
-    result = data.validation.heuristics[selected.heuristic]
     keys = tuple(
         f"operations_{function}{rule}"
         for function in ("inverse", "direct")
         for rule in ("", "_plain", "_paper_rule")
     )
-    affecting = int(data.model.affecting.sum())
+    affecting, base = int(data.model.affecting.sum()), data.model.base.columns.size
+    named = [("full", affecting, ""), ("base", base, "base_")]
+    named.append((selected.heuristic, selected.n, "selected_"))
     rows = [
-        ("full", str(affecting), *(f"{data.validation.full[key]:.0f}" for key in keys)),
-        (
-            "base",
-            str(data.model.base.columns.size),
-            *(f"{data.validation.full[f'base_{key}']:.0f}" for key in keys),
-        ),
-        (
-            selected.heuristic,
-            str(selected.n),
-            *(str(int(getattr(result, key)[result.row(selected.n)])) for key in keys),
-        ),
+        (name, str(n), *(f"{data.validation.full[prefix + key]:.0f}" for key in keys))
+        for name, n, prefix in named
     ]
     header = (
         "model", "n", "d, lean", "d, plain recursion", "d, the paper's rule",
