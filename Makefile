@@ -39,6 +39,7 @@ help:
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/paramreduce doctor
 	@touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed

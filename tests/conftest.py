@@ -1,5 +1,6 @@
 """Mechanisms and finished runs that several tests look at."""
 
+import contextlib
 import json
 import os
 import shutil
@@ -8,6 +9,7 @@ from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before NumPy is loaded
 
+import filelock
 import numpy as np
 import pytest
 from simulated_logs import log_config, two_link_log, write_log
@@ -15,6 +17,7 @@ from simulated_logs import log_config, two_link_log, write_log
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
 from paramreduce_cli.config import load_config
+from paramreduce_cli.lean import formulations as formulations_module
 from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.records import ReducedModel, Run
 from paramreduce_cli.robots import Robot
@@ -129,17 +132,16 @@ NO_PICTURE = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'
 
 
 @pytest.fixture(autouse=True)
-def figures_without_pictures(request, monkeypatch):
-    """Laying figures out and encoding them takes half of a small run; tests of the report itself have it."""
-    if "report" in request.path.parts:
+def figures_not_drawn(request, monkeypatch):
+    """Drawing figures takes most of a small run; tests of the report draw them, and those marked with ``draws``."""
+    if "report" in request.path.parts or request.node.get_closest_marker("draws"):
         return
-    from matplotlib.figure import Figure
+    from paramreduce_cli.report import rendering
 
-    def saved(figure, file, **how):
-        assert how["format"] == "svg", "other formats are of tests/report"
-        file.write(NO_PICTURE)
+    def rendered(names, data, formats, **how):
+        return {name: dict.fromkeys(formats, NO_PICTURE) for name in names}
 
-    monkeypatch.setattr(Figure, "savefig", saved)
+    monkeypatch.setattr(rendering, "rendered", rendered)
 
 
 ROUGH_TERMS = ("terms.functions=[inverse]", "terms.torque_error=0.5", "terms.rounds=0")
@@ -160,33 +162,95 @@ def slope(function, arguments, direction, which=0, step=1e-6):
     return (function(*ahead) - function(*behind)) / (2 * step)
 
 
+@pytest.fixture(autouse=True)
+def one_core(monkeypatch):
+    """Tests run in as many processes as there are cores already; those of worker processes ask for them."""
+    monkeypatch.setattr(os, "sched_getaffinity", lambda _: {0}, raising=False)
+
+
+@pytest.fixture(scope="session")
+def made_once(tmp_path_factory):
+    """Call ``make_once(name, make)`` for a folder that one process of the session fills with ``make(folder)``.
+
+    Look at what is in it, do not touch.
+    """
+    root = tmp_path_factory.getbasetemp()
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        root = root.parent
+
+    def make_once(name, make):
+        folder = root / f"made-{name}"
+        done = root / f"made-{name}.done"
+        with filelock.FileLock(f"{folder}.lock"):
+            if not done.exists():
+                shutil.rmtree(folder, ignore_errors=True)
+                folder.mkdir()
+                make(folder)
+                done.touch()
+        return folder
+
+    return make_once
+
+
+@contextlib.contextmanager
+def searched_formulations():
+    """Search the leanest formulations of a model, as the program does."""
+    _Formulations.searched = True
+    yield
+    _Formulations.searched = False
+
+
+class _Formulations:
+    searched = False
+
+
+@pytest.fixture(scope="session", autouse=True)
+def formulations_as_searches_begin():
+    """Take the formulations that searches begin with: correct ones, though not the leanest, in a tenth of the time.
+
+    Tests of the leanest ones ask for :func:`searched_formulations`.
+    """
+    search = formulations_module._best
+
+    def best(mechanism, asked):
+        if _Formulations.searched:
+            return search(mechanism, asked)
+        return [tuple(asked.start) for _ in asked.dropped]
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(formulations_module, "_best", best)
+        yield
+
+
 @pytest.fixture(scope="session")
 def puma():
-    return model_of("puma560")
+    with searched_formulations():
+        return model_of("puma560")
 
 
 @pytest.fixture(scope="session")
 def hexaglide():
-    return model_of("hexaglide")
+    with searched_formulations():
+        return model_of("hexaglide")
 
 
 @pytest.fixture(scope="session")
-def two_link_results(tmp_path_factory):
+def two_link_results(made_once):
     """A finished run of the small case; look, do not touch."""
-    folder = tmp_path_factory.mktemp("two_link")
-    run_stages(folder)
-    return folder
+    return made_once("two_link", run_stages)
 
 
 @pytest.fixture(scope="session")
-def measured_results(tmp_path_factory):
+def measured_results(made_once):
     """A finished run of the small case on a log; look, do not touch."""
-    folder = tmp_path_factory.mktemp("measured")
-    write_log(folder / "log.csv", two_link_log())
-    config = load_config(log_config(folder), [ONE_FORMAT, *ROUGH_TERMS])
-    for stage in stages_to_run(config):
-        Runner(config, Store(folder / "results")).run(stage)
-    return folder
+
+    def make(folder):
+        write_log(folder / "log.csv", two_link_log())
+        config = load_config(log_config(folder), [ONE_FORMAT, *ROUGH_TERMS])
+        for stage in stages_to_run(config):
+            Runner(config, Store(folder / "results")).run(stage)
+
+    return made_once("measured", make)
 
 
 @pytest.fixture

@@ -96,20 +96,24 @@ OTHERS = {"geared": GEARED, "afloat": FLOATING}
 
 
 @pytest.fixture(scope="module")
-def run_of(tmp_path_factory):
+def run_of(made_once):
     """Runs of robots by name, each made once."""
+
+    def config_for(name, folder):
+        robot, _, counted = name.partition("-")
+        if name not in OTHERS:
+            counts = [f"validation.operations={counted}"] if counted else []
+            return config_of(robot, ONE_FORMAT, *TERMS, *counts)
+        path = folder / "config.yaml"
+        path.write_text(OTHERS[name])
+        return load_config(path, [ONE_FORMAT])
 
     @cache
     def made(name):
-        folder = tmp_path_factory.mktemp(f"{name}_terms")
-        robot, _, counted = name.partition("-")
-        if name not in OTHERS:
-            return simplified(
-                folder, robot, *([f"validation.operations={counted}"] if counted else ())
-            )
-        path = folder / "config.yaml"
-        path.write_text(OTHERS[name])
-        return as_far(load_config(path, [ONE_FORMAT]), folder / "results")
+        folder = made_once(
+            f"terms-{name}", lambda folder: as_far(config_for(name, folder), folder / "results")
+        )
+        return Runner(config_for(name, folder), Store(folder / "results"))
 
     return made
 

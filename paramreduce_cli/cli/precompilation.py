@@ -1,0 +1,66 @@
+"""The compiled loops of all searches, made before the first run needs them.
+
+A loop is compiled when it is first called, and kept for all runs. Here small examples call every loop.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.processes import as_done, workers
+
+_EXAMPLE = "two_link"
+_QUICK = (
+    "trajectories.count=1",
+    "trajectories.starts=1",
+    "trajectories.max_iterations=2",
+    "reduction.heuristics=[forward-selection]",
+    "terms={torque_error: 0.5, acceleration_error: 5, rounds: 1}",
+)
+
+
+def compile_loops() -> None:
+    """Compile the loops of all searches in two processes, each about a quarter of a minute the first time.
+
+    Raises:
+        DataError: A process died.
+    """
+    with workers(2, _nothing) as pool:
+        for _ in as_done(pool, _call, ["proofs", "terms"]):
+            pass
+
+
+def _nothing() -> None:
+    """Prepare a worker process, which needs nothing."""
+
+
+def _call(name: str) -> None:
+    {"proofs": _prove_best_subsets, "terms": _leave_out_terms}[name]()
+
+
+def _prove_best_subsets() -> None:
+    """Prove the best subset of a few columns, some of which depend on others."""
+    from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
+    from paramreduce_cli.reduction.problem import SelectionProblem
+
+    rng = np.random.default_rng(0)
+    W = rng.normal(size=(9, 4)) @ rng.normal(size=(4, 6))
+    columns = np.arange(6)
+    problem = SelectionProblem(W, W @ rng.normal(size=6), columns, columns, ())
+    Search(unit_problem(problem), 3, 1.0, BEGINNING).advance(10)
+
+
+def _leave_out_terms() -> None:
+    """Run the small arm as far as its functions without terms; their operations are counted on the way."""
+    from paramreduce_cli.config import load_config
+    from paramreduce_cli.config.examples import examples
+    from paramreduce_cli.in_memory import made_in_memory
+    from paramreduce_cli.pipeline import stages_to_run
+    from paramreduce_cli.records import Run, TermReduction
+
+    config = load_config(examples()[_EXAMPLE], _QUICK)
+    records: dict[type, Any] = {}
+    for stage in stages_to_run(config):
+        records[stage.output] = made_in_memory(stage, config, records, Run())
+        if stage.output is TermReduction:
+            return
