@@ -1,6 +1,5 @@
 """Mechanisms and finished runs that several tests look at."""
 
-import contextlib
 import json
 import os
 import shutil
@@ -12,6 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, befor
 import filelock
 import numpy as np
 import pytest
+from searched import Formulations, searched_formulations
 from simulated_logs import log_config, two_link_log, write_log
 
 from paramreduce_cli.artifacts.store import Store
@@ -192,28 +192,16 @@ def made_once(tmp_path_factory):
     return make_once
 
 
-@contextlib.contextmanager
-def searched_formulations():
-    """Search the leanest formulations of a model, as the program does."""
-    _Formulations.searched = True
-    yield
-    _Formulations.searched = False
-
-
-class _Formulations:
-    searched = False
-
-
 @pytest.fixture(scope="session", autouse=True)
 def formulations_as_searches_begin():
     """Take the formulations that searches begin with: correct ones, though not the leanest, in a tenth of the time.
 
-    Tests of the leanest ones ask for :func:`searched_formulations`.
+    Tests of the leanest ones ask for ``searched_formulations``.
     """
     search = formulations_module._best
 
     def best(mechanism, asked):
-        if _Formulations.searched:
+        if Formulations.searched:
             return search(mechanism, asked)
         return [tuple(asked.start) for _ in asked.dropped]
 

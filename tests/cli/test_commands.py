@@ -33,6 +33,7 @@ def test_every_command_explains_itself(invoke, command):
     assert command not in STAGES or re.search(r"Reads .*; writes", out)
 
 
+@pytest.mark.draws
 def test_a_full_run_ends_with_a_table_and_the_report(invoke, tmp_path):
     run = ("run", TWO_LINK, "--results", tmp_path / "r")
     out, err = invoke(*run, "--jobs", 2, settings=[ONE_FORMAT])
@@ -116,6 +117,7 @@ def test_named_base_columns_that_are_none(invoke, tmp_path, name):
     assert name in invoke(*build, settings=[f"model.base_columns=[{name}]"], code=2).err
 
 
+@pytest.mark.draws
 def test_arms_of_one_joint_get_their_report(invoke, tmp_path, write_config):
     """Nothing but an inertia about a vertical axis: its mass matrix costs no operation."""
     path = write_config(

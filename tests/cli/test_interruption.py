@@ -14,7 +14,7 @@ PARAMREDUCE = [sys.executable, "-m", "paramreduce_cli"]
 @pytest.fixture
 def arguments(write_config, tmp_path):
     """Of a run that takes a while."""
-    slow = ("  count: 2\n", "  count: 24\n")
+    slow = ("  count: 2\n", "  count: 10\n")
     return [write_config(slow, ("harmonics: 2", "harmonics: 6")), "--results", tmp_path / "r"]
 
 

@@ -74,7 +74,7 @@ def test_c_is_clean_at_every_level_of_optimisation(model, tmp_path, compiler, si
         pytest.skip(f"there is no {compiler}")
     write(model, tmp_path, "c", single=single)
     sources = [path.name for path in tmp_path.glob("*.c")]
-    for level in range(4):
+    for level in range(4) if compiler == "gcc" else (0, 3):
         run([*COMPILERS[compiler], f"-O{level}", *WARNINGS, "-o", "t", *sources, "-lm"], tmp_path)
 
 

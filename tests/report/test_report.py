@@ -24,12 +24,14 @@ def folder(two_link_results):
 
 
 @pytest.fixture(scope="module")
-def in_every_format(two_link_results, tmp_path_factory):
+def in_every_format(two_link_results, made_once):
     """The folder of a report with figures in all formats."""
-    copy = tmp_path_factory.mktemp("formats") / "results"
-    shutil.copytree(two_link_results, copy)
-    run_stages(copy, "report.formats=[pdf, svg, png]")
-    return copy / "report"
+
+    def make(folder):
+        shutil.copytree(two_link_results, folder / "results")
+        run_stages(folder / "results", "report.formats=[pdf, svg, png]")
+
+    return made_once("formats", make) / "results" / "report"
 
 
 @pytest.mark.parametrize(

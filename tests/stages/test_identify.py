@@ -73,6 +73,7 @@ def test_the_size_is_chosen_without_the_held_out_part(measured_copy, invoke):
     assert np.all(worse > before.heuristics[name].torque_error_validation)
 
 
+@pytest.mark.draws
 def test_summary_and_page(measured_results):
     report = measured_results / "results" / "report"
     found = json.loads((report / "summary.json").read_text())["identification"]
