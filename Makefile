@@ -10,12 +10,13 @@ PAPER := puma560 hexaglide
 MEASURED := tx40 ur10 panda
 SMALL := two_link four_bar five_bar rssr delta humanoid_leg cart_pole quarter_car puma560_friction
 
-.PHONY: docs serve help all $(PAPER) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression reference benchmark robots identification controllers pages torture graph clean
+.PHONY: docs serve help all campaign $(PAPER) $(PAPER:%=%-terms) $(SMALL) $(MEASURED) test check format sweep test-cluster test-pythons regression optimiser reference benchmark robots identification controllers pages torture graph clean
 .DEFAULT_GOAL := help
 
 help:
 	@echo "make puma560     run the whole pipeline on the PUMA 560"
 	@echo "make hexaglide   the same on the 6-PUS Hexaglide, in a few minutes"
+	@echo "make puma560-terms   the same with the whole search for negligible terms, a minute more; also hexaglide-terms"
 	@echo "make all         both, and one table over them"
 	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr, delta"
 	@echo "make ur10        identify and reduce from a recording of the robot; also panda, tx40"
@@ -23,7 +24,8 @@ help:
 	@echo "make test-cluster    sweeps here and on a Slurm of its own, with kills, against plain runs"
 	@echo "make test        run the tests"
 	@echo "make check       lint, format and types"
-	@echo "make regression  compare with the committed references"
+	@echo "make regression  compare with the committed references; make optimiser, with the condition numbers of anew optimised trajectories"
+	@echo "make campaign    all that takes too long for every change: an hour and more"
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios, and CPU seconds; BEFORE=REVISION compares the stages with it"
 	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
@@ -50,6 +52,140 @@ $(PARAMREDUCE): $(VENV)/.installed
 
 $(PAPER) $(SMALL): $(VENV)/.installed
 	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
+
+# The search for negligible terms ends after some seconds in these configs; here it ends by itself.
+WHOLE_SEARCH := --set terms.time_limit=null
+
+$(PAPER:%=%-terms): %-terms: $(VENV)/.installed
+	@$(PARAMREDUCE) run configs/$*.yaml --jobs $(JOBS) $(WHOLE_SEARCH)
+
+# Physical consistency needs a solver of its own.
+$(VENV)/.installed-identify: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[identify]'
+	@touch $@
+
+$(MEASURED): $(VENV)/.installed-identify
+	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
+
+# Workflows over many runs are Snakemake's.
+$(VENV)/.installed-sweep: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[sweep]'
+	@touch $@
+
+# What pipelines/sweep.yaml lists; SWEEP=FILE another list, PROFILE=slurm on a cluster.
+SWEEP ?= pipelines/sweep.yaml
+PROFILE ?= local
+
+sweep: $(VENV)/.installed-sweep
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/snakemake --snakefile pipelines/Snakefile --quiet rules \
+	  --profile pipelines/profiles/$(PROFILE) --config sweep=$(SWEEP)
+
+# Everything takes more than an hour, CLUSTER="--robots 1 --seeds 3" half of one; with Debian's
+# slurm-wlm and munge, and as root, on a Slurm of its own too.
+CLUSTER ?=
+
+test-cluster: $(VENV)/.installed-sweep $(VENV)/.installed-dev
+	PATH="$(CURDIR)/$(BIN):$$PATH" PYTHONPATH=tests $(BIN)/python -m tests.cluster $(CLUSTER)
+
+all: $(PAPER)
+	@$(PARAMREDUCE) table $(PAPER:%=results/%)
+
+test: $(VENV)/.installed-dev
+	$(BIN)/pytest -n $(JOBS)
+
+check: $(VENV)/.installed-dev
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+
+format: $(VENV)/.installed-dev
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+# Everything after the optimiser is repeated from the committed coefficients and must agree, proofs
+# as far as they come in half a minute.
+REFERENCES := $(patsubst results/reference/%.json,%,$(wildcard results/reference/*.json))
+whole_search = $(if $(filter $*,$(PAPER)),$(WHOLE_SEARCH))
+
+regression: $(VENV)/.installed $(REFERENCES:%=regression-%)
+
+regression-%: $(VENV)/.installed
+	rm -rf results/regression/$*
+	$(PARAMREDUCE) run configs/$*.yaml --results results/regression/$* --quiet --jobs $(JOBS) \
+	  --set reduction.best_subset.time_limit=30 $(whole_search) \
+	  --set trajectories.file=$(CURDIR)/results/reference/$*.json
+	$(PARAMREDUCE) compare results/reference/$*.json results/regression/$*
+
+# The optimiser is random, and so gated by the condition numbers that it reaches.
+optimiser: $(VENV)/.installed $(REFERENCES:%=optimiser-%)
+
+optimiser-%: $(VENV)/.installed
+	rm -rf results/regression/$*-optimised
+	$(PARAMREDUCE) run configs/$*.yaml --results results/regression/$*-optimised --quiet \
+	  --jobs $(JOBS) --set reduction.heuristics=[forward-selection] \
+	  --set validation.stability=false --set validation.accept={} --set terms=null
+	$(PARAMREDUCE) compare results/reference/$*.json results/regression/$*-optimised --only kappa \
+	  --tolerance kappa=0.1
+
+reference: $(REFERENCES:%=reference-%)
+
+reference-%: $(VENV)/.installed
+	$(PARAMREDUCE) run configs/$*.yaml --jobs $(JOBS) $(whole_search)
+	cp results/$*/report/summary.json results/reference/$*.json
+
+# What takes too long for every change; docs/soundness.md says when it last ran and what came out.
+campaign: regression optimiser docs test-pythons
+	$(MAKE) torture
+	$(MAKE) test-cluster
+
+benchmark robots identification controllers pages torture graph clean
+.DEFAULT_GOAL := help
+
+help:
+	@echo "make puma560     run the whole pipeline on the PUMA 560"
+	@echo "make hexaglide   the same on the 6-PUS Hexaglide, in a few minutes"
+	@echo "make puma560-terms   the same with the whole search for negligible terms, a minute more; also hexaglide-terms"
+	@echo "make all         both, and one table over them"
+	@echo "make two_link    a small arm, in seconds; also four_bar, five_bar, rssr, delta"
+	@echo "make ur10        identify and reduce from a recording of the robot; also panda, tx40"
+	@echo "make sweep       all runs of pipelines/sweep.yaml; PROFILE=slurm on a cluster"
+	@echo "make test-cluster    sweeps here and on a Slurm of its own, with kills, against plain runs"
+	@echo "make test        run the tests"
+	@echo "make check       lint, format and types"
+	@echo "make regression  compare with the committed references; make optimiser, with the condition numbers of anew optimised trajectories"
+	@echo "make campaign    all that takes too long for every change: an hour and more"
+	@echo "make reference   renew the committed references"
+	@echo "make benchmark   measure speed, as ratios, and CPU seconds; BEFORE=REVISION compares the stages with it"
+	@echo "make robots      arms from their URDF to code: sizes, operations, nanoseconds"
+	@echo "make pages       reports in a browser: sizes and times"
+	@echo "make identification  intervals and hints on simulated logs"
+	@echo "make controllers     rest-to-rest trajectories of two arms, checked"
+	@echo "make docs        build the site, and run what it tells to type"
+	@echo "make serve       the site, to read in a browser"
+	@echo "make test-pythons  the small case with every other Python from 3.11 to 3.13"
+	@echo "make torture     damage files and kill runs, and see that nothing is lost"
+	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
+
+$(VENV)/.installed: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
+	@$(BIN)/paramreduce doctor
+	@touch $@
+
+$(VENV)/.installed-dev: $(VENV)/.installed
+	$(BIN)/pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	@touch $@
+
+$(PARAMREDUCE): $(VENV)/.installed
+
+$(PAPER) $(SMALL): $(VENV)/.installed
+	@$(PARAMREDUCE) run configs/$@.yaml --jobs $(JOBS)
+
+# The search for negligible terms ends after some seconds in these configs; here it ends by itself.
+WHOLE_SEARCH := --set terms.time_limit=null
+
+$(PAPER:%=%-terms): %-terms: $(VENV)/.installed
+	@$(PARAMREDUCE) run configs/$*.yaml --jobs $(JOBS) $(WHOLE_SEARCH)
 
 # Physical consistency needs a solver of its own.
 $(VENV)/.installed-identify: $(VENV)/.installed

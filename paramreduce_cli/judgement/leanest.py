@@ -61,12 +61,13 @@ def _rank(one: Leanest) -> tuple[int, float]:
 
 
 def _alone(function: str, columns: Tolerances, results: Results) -> Iterator[Leanest]:
-    """Functions of models with parameters alone left out."""
+    """Functions of models with parameters alone left out, as far as their operations are known."""
     for heuristic, result in results.items():
         ways = [getattr(result, name) <= limit for name, limit in columns.items()]
         if function == "direct":
             ways.append(result.mass_matrix_smallest_eigenvalue > 0)
         operations = getattr(result, f"operations_{function}")
+        ways.append(np.isfinite(operations))
         for row in np.flatnonzero(np.all(ways, axis=0)):
             yield Leanest(
                 f"{heuristic}:{result.n[row]}",

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray, HeuristicValidation, ModelChoice, Proofs
+from paramreduce_cli.records import FloatArray, HeuristicValidation, ModelChoice, Proofs, Selected
 from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.texts import EXACT
 
@@ -104,7 +104,7 @@ def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> bool:
 
 
 def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoice, ...]:
-    """Models that no other one beats in something without losing in something else.
+    """Models whose operations are known and that no other one beats in something without losing in something else.
 
     Compared are the number of parameters, both errors on the estimation set and both operation
     counts; models with errors of a hundred per cent are left out. Of equal models the first stays.
@@ -126,6 +126,33 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoic
     return tuple(ModelChoice(front[k][0], int(results[front[k][0]].n[front[k][1]])) for k in order)
 
 
+def every_model(results: Mapping[str, HeuristicValidation]) -> list[ModelChoice]:
+    """Return all models of all heuristics."""
+    return [ModelChoice(name, int(n)) for name, result in results.items() for n in result.n]
+
+
+def shown_models(
+    results: Mapping[str, HeuristicValidation], selected: Selected, front: Sequence[ModelChoice]
+) -> list[ModelChoice]:
+    """Return the models whose operations people look at; to count those of all takes minutes for large robots.
+
+    Args:
+        results: Validation of each heuristic.
+        selected: The selected model.
+        front: Models of the Pareto front.
+
+    Returns:
+        All sizes of the selected heuristic and of forward selection, the selected size of every heuristic, and the front.
+    """
+    whole = {selected.heuristic, "forward-selection"}
+    shown = [
+        choice
+        for choice in every_model(results)
+        if choice.heuristic in whole or choice.n == selected.n
+    ]
+    return list(dict.fromkeys([*shown, *front]))
+
+
 def _resolved(value: float) -> float:
     """A number without what is round-off in it."""
     return 0.0 if value < EXACT else float(f"{value:.9g}")
@@ -134,4 +161,5 @@ def _resolved(value: float) -> float:
 def _sensible(results: Mapping[str, HeuristicValidation]) -> Iterator[Pick]:
     for name, result in results.items():
         sensible = (result.torque_error_estimation < 1) & (result.acceleration_error_estimation < 1)
+        sensible &= np.isfinite(result.operations_inverse)
         yield from ((name, int(row)) for row in np.flatnonzero(sensible))

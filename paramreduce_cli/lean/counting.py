@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.model import LeanModels, lean_models
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.processes import as_done, workers
 from paramreduce_cli.records import (
@@ -51,17 +51,17 @@ class Counts:
 
     @cached_property
     def _lean(self) -> LeanModels:
-        model = self._model
-        return LeanModels(model, independent=self._independent)
+        return lean_models(self._model, independent=self._independent)
 
-    def estimate(self, kept: BoolArray) -> int:
-        """Of the lean inverse dynamics, nearly; for criteria, which ask for thousands of models.
+    def estimate(self, kept: BoolArray, *, direct: bool = False) -> int:
+        """Return nearly the operations of the lean inverse dynamics; it takes microseconds.
 
         Args:
             kept: Which standard parameters are not zero, (n_standard,).
+            direct: Whether the direct dynamics is meant instead.
         """
         indices: IntArray = (kept & self._model.affecting).nonzero()[0]
-        return self._lean.estimate(indices)
+        return self._lean.estimate(indices, direct=direct)
 
     def lean(self, model: ReducedModel) -> list[int]:
         """Return :data:`COUNTS` of a model; its values do not matter."""
@@ -94,7 +94,7 @@ def count_all(
     Returns:
         (n_models, 2)
     """
-    keys = [_structure(one, model) for one in chosen]
+    keys = [structure(one, model) for one in chosen]
     different = dict(zip(keys, chosen, strict=True))
     tasks = list(different.items())
     known: dict[bytes, list[int]] = {}
@@ -113,8 +113,8 @@ def count_all(
     return np.array([known[key] for key in keys], dtype=np.int64)
 
 
-def _structure(one: ReducedModel, model: Model) -> bytes:
-    """What the operations of a model depend on."""
+def structure(one: ReducedModel, model: Model) -> bytes:
+    """Return what the operations of a reduced model depend on: which parameters are kept, and which share a value."""
     one = one.restricted(model.affecting)
     ties = one.ties
     return bytes(str([ties.get(k, k) for k in one.kept.tolist()]), "ascii")

@@ -9,7 +9,7 @@ from paramreduce_cli.expressions.factoring import Written, least
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.model import lean_models
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
 from paramreduce_cli.multibody.loops.closures import closure_equations
 from paramreduce_cli.records import Model, ReducedModel, TermModel
@@ -36,7 +36,7 @@ class LeanFunctions:
         mechanism = model.mechanism
         self._simplified = simplified
         self._mechanism = mechanism
-        self._models = LeanModels(model, independent=True)
+        self._models = lean_models(model, independent=True)
         self._reduced = reduced.restricted(model.affecting)
         self._constant = constant
         q, z = mechanism.n_q, mechanism.n_dof

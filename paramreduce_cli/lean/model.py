@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import cached_property, lru_cache, partial
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -46,6 +46,36 @@ class _Variants:
         estimates = self.estimates(zero)
         most = _NEAR * min(estimates)
         return [k for k, count in enumerate(estimates) if count <= most]
+
+
+def lean_models(model: Model, *, independent: bool = False) -> LeanModels:
+    """Return the lean models of a robot.
+
+    Those of the robots asked for last are kept: all formulations of an arm of six joints take half a second to write.
+
+    Args:
+        model: Model of the robot, with formulations to choose from.
+        independent: See :class:`LeanModels`.
+    """
+    return _kept_lean_models(_SameModel(model), independent)
+
+
+@dataclass(frozen=True, eq=False)
+class _SameModel:
+    """A model that equals itself alone, as arrays cannot be hashed."""
+
+    model: Model
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _SameModel) and other.model is self.model
+
+    def __hash__(self) -> int:
+        return id(self.model)
+
+
+@lru_cache(2)
+def _kept_lean_models(same: _SameModel, independent: bool) -> LeanModels:
+    return LeanModels(same.model, independent=independent)
 
 
 class LeanModels:

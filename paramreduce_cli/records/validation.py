@@ -6,7 +6,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.arrays import BoolArray, FloatArray
 from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
 
 
@@ -27,8 +27,9 @@ class HeuristicValidation(BySize):
     """Largest over the samples."""
     mass_matrix_smallest_eigenvalue: FloatArray
     """Smallest over the samples."""
-    operations_inverse: IntArray
-    operations_direct: IntArray
+    operations_inverse: FloatArray
+    """Not a number where a model is not shown, and so not counted."""
+    operations_direct: FloatArray
 
 
 @dataclass(frozen=True)

@@ -110,6 +110,8 @@ def _numbers(part: str) -> Quantity:
                 left_out |= _tied_sizes(a, b, name)
             for x in (row for row in rows if row["n"] not in left_out):
                 y = others.get(x["n"], x)
+                if part == "operations" and None in {*x[part].values(), *y[part].values()}:
+                    continue  # counted in one run at most, as only what is shown is counted
                 yield from _row(f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part])
 
     return quantity

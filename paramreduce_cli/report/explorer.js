@@ -249,7 +249,7 @@
   const finders = (k, row) => curves.filter((c) => c.model.includes(curves[k].model[row])).flatMap((c) => c.names);
   const spoken = (k, row) => {
     const c = curves[k];
-    const cost = c.operations.inverse ? `, ${data.functions[0]} in ${c.operations.inverse[row]} operations` : "";
+    const cost = c.operations.inverse?.[row] != null ? `, ${data.functions[0]} in ${c.operations.inverse[row]} operations` : "";
     return `${finders(k, row).join(", ")}: ${c.n[row]} ${c.n[row] === 1 ? "parameter" : "parameters"}, ${SETS.map((s) => percent(c.torque[s][row])).join(" / ")}${cost}`;
   };
 
@@ -274,7 +274,7 @@
     });
   }
   const ring = (u, x, y, of) => {
-    if (y === null || !Number.isFinite(y)) return;
+    if (x === null || y === null || !Number.isFinite(y)) return;
     u.ctx.save();
     u.ctx.beginPath();
     u.ctx.lineWidth = 2 * devicePixelRatio;
@@ -353,7 +353,7 @@
   // Error against operations: a point for every model, the front, and functions with terms left out.
   const costCharts = {};
   function costChart(key, label) {
-    const all = curves.flatMap((c, k) => c.n.map((_, row) => ({ x: c.operations[key][row], y: visible(c.torque.estimation[row]), curve: k, row, text: spoken(k, row) }))).filter((p) => p.y !== null);
+    const all = curves.flatMap((c, k) => c.n.map((_, row) => ({ x: c.operations[key][row], y: visible(c.torque.estimation[row]), curve: k, row, text: spoken(k, row) }))).filter((p) => p.x !== null && p.y !== null);
     const [counts, found] = data.terms[key] ?? [[], []];
     const terms = counts.map((x, k) => ({ x, y: visible(found[k]), terms: true, text: `terms left out: ${x} operations, ${percent(found[k])}` }));
     const points = [...all, ...terms].sort((a, b) => a.x - b.x || b.y - a.y);

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.records import HeuristicValidation, IntArray, ModelChoice
+from paramreduce_cli.records import FloatArray, HeuristicValidation, IntArray, ModelChoice
 from paramreduce_cli.report.curves import EQUAL, curves
 from paramreduce_cli.report.data import ReportData
 
@@ -110,9 +110,14 @@ def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
         },
         "acceleration": {s: packed(getattr(result, f"acceleration_error_{s}")) for s in _SETS},
         "operations": {
-            f: getattr(result, f"operations_{f}").tolist() if counted else None for f in _FUNCTIONS
+            f: _counted(getattr(result, f"operations_{f}")) if counted else None for f in _FUNCTIONS
         },
     }
+
+
+def _counted(operations: FloatArray) -> list[int | None]:
+    """Return operations of models; None of those that were not counted."""
+    return [None if np.isnan(one) else int(one) for one in operations]
 
 
 def _terms(data: ReportData) -> dict[str, Any]:

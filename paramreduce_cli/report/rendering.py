@@ -28,14 +28,14 @@ def rendered(
         names: Of :data:`paramreduce_cli.report.figures.figures`.
         data: What they show.
         formats: In which they are encoded.
-        jobs: Processes at most; starting them pays where there are several formats.
+        jobs: Processes at most; a few figures are drawn in this one.
         told: How many figures are done, and the name of the last one.
 
     Raises:
         DataError: A process died.
     """
     found: dict[str, Encoded] = {}
-    jobs = min(jobs, len(names) // _AT_LEAST) if len(formats) > 1 else 1
+    jobs = min(jobs, len(names) // _AT_LEAST)
     for name, encoded in _drawn(names, data, formats, jobs):
         found[name] = encoded
         told(len(found), name)

@@ -40,7 +40,6 @@ def summary_of(
     that only a mechanism tells where there is none.
     """
     selected = validation.selected
-    counted = model is not None
     chosen = validation.heuristics[selected.heuristic]
     data = {
         "robot": provenance.robot,
@@ -54,9 +53,7 @@ def summary_of(
             "proofs": _proofs(reduction),
             "pareto": [_pareto(reduction, validation, choice) for choice in validation.pareto],
         },
-        "validation": {
-            name: _rows(result, counted) for name, result in validation.heuristics.items()
-        },
+        "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
         "identification": _identification(identification),
         "terms": _terms(model, terms),
@@ -69,7 +66,7 @@ def summary_of(
             "verdict": validation.verdict,
             "remarks": [r.text for r in validation.remarks if r.about is About.SELECTED],
             "leanest": _leanest(leanest),
-            **next(row for row in _rows(chosen, counted) if row["n"] == selected.n),
+            **next(row for row in _rows(chosen) if row["n"] == selected.n),
         },
         "stability": _stability(reduction, validation),
         "remarks": [remark.text for remark in validation.remarks],
@@ -153,7 +150,7 @@ def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -
         "torque_error": result.torque_error_estimation[row],
         "acceleration_error": result.acceleration_error_estimation[row],
         "operations": {
-            function: getattr(result, f"operations_{function}")[row] if validation.full else None
+            function: _whole(getattr(result, f"operations_{function}")[row])
             for function in ("inverse", "direct")
         },
     }
@@ -271,7 +268,7 @@ def _first(found: Subsets) -> int | None:
     return int(beyond[0]) if beyond.size else None
 
 
-def _rows(found: HeuristicValidation, counted: bool) -> list[dict[str, Any]]:
+def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     counts = [f.name for f in fields(found) if f.name.startswith("operations_")]
     sets = ("estimation", "validation")
     errors = {
@@ -287,13 +284,20 @@ def _rows(found: HeuristicValidation, counted: bool) -> list[dict[str, Any]]:
         {"n": n}
         | {
             part: {
-                key: getattr(found, name)[k] if counted or part != "operations" else None
+                key: getattr(found, name)[k]
+                if part != "operations"
+                else _whole(getattr(found, name)[k])
                 for key, name in of.items()
             }
             for part, of in names.items()
         }
         for k, n in enumerate(found.n)
     ]
+
+
+def _whole(operations: float) -> int | None:
+    """Return a number of operations; None where it is not known."""
+    return int(operations) if np.isfinite(operations) else None
 
 
 def _plain(value: Any) -> Any:

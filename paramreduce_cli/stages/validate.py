@@ -1,7 +1,7 @@
 """validate: what every reduced model is worth, and whether the selected one is accepted."""
 
-import dataclasses
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,12 +9,12 @@ from paramreduce_cli.config.schema import ReductionSection, SelectedSection, Val
 from paramreduce_cli.errors import ConfigError, DataError, Key
 from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
 from paramreduce_cli.judgement.cross_validation import cross_validated
-from paramreduce_cli.judgement.picking import pareto_front
+from paramreduce_cli.judgement.picking import every_model, pareto_front, shown_models
 from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
 from paramreduce_cli.judgement.torque import NormErrors, torque_errors
 from paramreduce_cli.judgement.verdict import remarks, verdict
-from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts, count_all
+from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts, count_all, structure
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.multibody.told import told
@@ -27,6 +27,7 @@ from paramreduce_cli.records import (
     HeuristicValidation,
     IntArray,
     Model,
+    ModelChoice,
     Progress,
     ReducedModel,
     Reduction,
@@ -61,6 +62,9 @@ _NODES = 50_000
 """Of each proof while stability is looked at; the best found is good enough there."""
 
 
+Heuristics = Mapping[str, HeuristicValidation]
+
+
 def validate(
     judging: ValidationSection,
     counted: CountedDynamics,
@@ -92,6 +96,9 @@ def validate(
     else:
         measured = _measured(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
+    costs = None if model is None else _Costs(model, counted, reduction, run)
+    if costs is not None and "operations" in wanted.tolerances():
+        heuristics = costs.count(heuristics, every_model(heuristics))
     crossed = None
     if wanted.cross_validation:
         methods = _crossed_methods(wanted, reduction)
@@ -100,8 +107,10 @@ def validate(
             crossed = _cross_validation(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
     selected = select(wanted, values, reduction, heuristics, crossed)
-    if model is not None:
+    if model is not None and costs is not None:
         full |= _counts_by_name(Counts(model, counted), "selected_", selected.model)
+        estimated = pareto_front(costs.estimate(heuristics))
+        heuristics = costs.count(heuristics, shown_models(heuristics, selected, estimated))
     chosen = (selected.heuristic, selected.n)
     if not judging.stability:
         repeated = None
@@ -126,7 +135,7 @@ def validate(
     )
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclass(frozen=True)
 class _Measured:
     """What all models are worth, whichever is selected and whatever is accepted."""
 
@@ -179,17 +188,9 @@ def _measured(
 
     estimation = errors_on(samples.estimation, "estimation")
     validation = errors_on(samples.validation, "validation")
-    sizes = [found.n.size for found in reduction.heuristics.values()]
-    chosen = [
-        reduction.model(name, k)
-        for name, found in reduction.heuristics.items()
-        for k in range(found.n.size)
-    ]
-    operations = count_all(model, counted, chosen, run)
-    own = np.split(operations, np.cumsum(sizes)[:-1])
     heuristics = {
-        name: _judged(found.n, some, estimation, validation, models.rows[name])
-        for some, (name, found) in zip(own, reduction.heuristics.items(), strict=True)
+        name: _judged(found.n, estimation, validation, models.rows[name])
+        for name, found in reduction.heuristics.items()
     }
     full = _full_model(model, counted, estimation[1], validation[1])
     return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
@@ -203,7 +204,7 @@ def _ranges(estimation: NormErrors, validation: NormErrors) -> tuple[FloatArray,
 
 
 def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
-    """Errors of torques; what only a mechanism tells is not a number, operations are zero."""
+    """Errors of torques; what only a mechanism tells is not a number."""
     if samples.validation is None:
         raise DataError(
             "the samples hold no validation set: /validation/W and /validation/tau are missing."
@@ -217,13 +218,7 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
     unknown = np.full(models.values.shape[1], np.nan)
     nothing = AccelerationErrors(unknown, np.tile(unknown[:, None], n_dof), unknown, unknown)
     heuristics = {
-        name: _judged(
-            found.n,
-            np.zeros((found.n.size, len(COUNTS)), np.int64),
-            (estimation, nothing),
-            (validation, nothing),
-            models.rows[name],
-        )
+        name: _judged(found.n, (estimation, nothing), (validation, nothing), models.rows[name])
         for name, found in reduction.heuristics.items()
     }
     return _Measured(heuristics, {}, np.full(n_dof, np.nan), *_ranges(estimation, validation))
@@ -269,7 +264,6 @@ class _Models:
 
 def _judged(
     n: IntArray,
-    counts: IntArray,
     estimation: tuple[NormErrors, AccelerationErrors],
     validation: tuple[NormErrors, AccelerationErrors],
     rows: IntArray,
@@ -290,7 +284,7 @@ def _judged(
         mass_matrix_smallest_eigenvalue=np.minimum(
             estimation[1].smallest_eigenvalue[rows], validation[1].smallest_eigenvalue[rows]
         ),
-        **dict(zip(COUNTS, counts.T, strict=True)),
+        **dict.fromkeys(COUNTS, np.full(n.size, np.nan)),
     )
 
 
@@ -308,6 +302,73 @@ def _full_model(
         min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])
     )
     return result
+
+
+class _Costs:
+    """Operations of reduced models.
+
+    Args:
+        model: Model of the robot.
+        counted: Which functions are counted where there are loops.
+        reduction: The reduced models.
+        run: Workers and progress.
+    """
+
+    def __init__(
+        self, model: Model, counted: CountedDynamics, reduction: Reduction, run: Run
+    ) -> None:
+        self._model, self._counted, self._run = model, counted, run
+        self._models = {
+            ModelChoice(name, int(n)): reduction.model(name, row)
+            for name, found in reduction.heuristics.items()
+            for row, n in enumerate(found.n)
+        }
+        self._structures = {key: structure(one, model) for key, one in self._models.items()}
+
+    def estimate(self, heuristics: Heuristics) -> Heuristics:
+        """Return the validation of heuristics with operations that are nearly right for all models."""
+        counts = Counts(self._model, self._counted)
+        kept = {key: one.standard != 0 for key, one in self._models.items()}
+        found = {
+            key: (counts.estimate(one), counts.estimate(one, direct=True))
+            for key, one in kept.items()
+        }
+        return _with_operations(heuristics, found)
+
+    def count(self, heuristics: Heuristics, shown: Sequence[ModelChoice]) -> Heuristics:
+        """Return the validation of heuristics with the operations of some models, and of all that take the same."""
+        known = {
+            self._structures[key]: tuple(getattr(result, name)[row] for name in COUNTS)
+            for key in self._models
+            for result in [heuristics[key.heuristic]]
+            for row in [result.row(key.n)]
+            if row is not None and np.isfinite(result.operations_inverse[row])
+        }
+        asked = {self._structures[key]: self._models[key] for key in shown}
+        missing = [key for key in asked if key not in known]
+        if missing:
+            models = [asked[key] for key in missing]
+            counts = count_all(self._model, self._counted, models, self._run)
+            known |= dict(zip(missing, map(tuple, counts.tolist()), strict=True))
+        found = {key: known[name] for key, name in self._structures.items() if name in known}
+        return _with_operations(heuristics, found)
+
+
+def _with_operations(
+    heuristics: Heuristics, operations: Mapping[ModelChoice, tuple[float, ...]]
+) -> Heuristics:
+    """Return the validation of heuristics with operations by model, not a number for the others."""
+    unknown = (np.nan,) * len(COUNTS)
+    return {
+        name: replace(
+            result,
+            **{
+                key: np.array([operations.get(ModelChoice(name, n), unknown)[k] for n in result.n.tolist()])
+                for k, key in enumerate(COUNTS)
+            },
+        )
+        for name, result in heuristics.items()
+    }  # fmt: skip
 
 
 def _counts_by_name(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
@@ -361,7 +422,7 @@ def _cross_validation(
         for k in range(len(factors))
     ]
     problem = selection_problem(reduction.factor, model, grouped)
-    quick = dataclasses.replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
+    quick = replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
     found = {}
     for k, (name, heuristic) in enumerate(methods.items()):
         run.progress(Progress("cross-validation", k, len(methods), name))
@@ -396,7 +457,7 @@ def _stability(
     grouped = selection_columns(search, samples)
     weights = reduction.nominal_torque
     problem = selection_problem(reduction.factor, model, grouped)
-    quick = dataclasses.replace(effort(search, run), node_limit=_NODES)
+    quick = replace(effort(search, run), node_limit=_NODES)
     heuristic = SelectionMethod.parse(selected.heuristic).heuristic
 
     def factor(factors: FloatArray) -> FloatArray:

@@ -11,7 +11,7 @@ from paramreduce_cli.report.style import FUNCTIONS, legend_beside, pair_of_plots
 
 @placed(PageSection.SAVINGS, 3)
 def error_vs_operations(data: ReportData) -> Figure:
-    """Torque error on the estimation set against the operations it costs. What several heuristics found is drawn once, for the first of them."""
+    """Torque error on the estimation set against the operations it costs, of the models that were counted. What several heuristics found is drawn once, for the first of them."""
     drawn, *axes = pair_of_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
         for curve in curves(data):
@@ -26,6 +26,7 @@ def error_vs_operations(data: ReportData) -> Figure:
             for cost, error in zip(
                 getattr(r, f"operations_{key}"), visible(r.torque_error_estimation), strict=True
             )
+            if np.isfinite(cost)
         ]
         stairs = np.array(staircase(front))
         if stairs.size:
