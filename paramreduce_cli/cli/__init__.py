@@ -12,7 +12,14 @@ from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
 from paramreduce_cli.cli.hints import after, after_usage, meant_command, of_usage, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
-from paramreduce_cli.cli.terminal import complain, interruption, say, show_errors, show_warning
+from paramreduce_cli.cli.terminal import (
+    complain,
+    interruption,
+    say,
+    show_errors,
+    show_start,
+    show_warning,
+)
 from paramreduce_cli.errors import ParamreduceError, ParamreduceWarning
 from paramreduce_cli.stages import stages
 
@@ -100,14 +107,15 @@ class _Commands(click.Group):
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
         """The command with a name; None if there is none."""
-        if name in commands:
-            command: click.Command = commands[name]
-            return command
-        if name in stages:
+        if name not in commands and name not in stages:
+            return None
+        with show_start(name):
+            if name in commands:
+                command: click.Command = commands[name]
+                return command
             from paramreduce_cli.cli.stage_command import stage_command
 
             return stage_command(name)
-        return None
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]

@@ -19,7 +19,7 @@ from paramreduce_cli.cli.options import (
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, progress_bars, remark
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, remark, show_progress
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, check_is_asked_for, describe_stage
@@ -55,7 +55,7 @@ def stage_command(name: str) -> click.Command:
         store = results_store(loaded, results)
         placed = placed_errors(config, overrides)
         lock = "" if share is None else f"-{stage.name}-{share.number}-{share.count}"
-        with placed, store.locked(lock, wait=wait), progress_bars(quiet) as progress:
+        with placed, store.locked(lock, wait=wait), show_progress(stage.name, quiet) as progress:
             if loaded is not None:
                 check_is_asked_for(stage, loaded)
             runner = Runner(

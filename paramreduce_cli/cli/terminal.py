@@ -203,9 +203,20 @@ interruption = Interruption()
 
 
 @contextmanager
-def progress_bars(quiet: bool, as_json: bool = False) -> Iterator[Callable[[Progress], None]]:
-    """Show long work: bars on a terminal, plain lines elsewhere, events as JSON, nothing if quiet."""
-    with _shown_progress(quiet, as_json) as show:
+def show_progress(
+    label: str, quiet: bool = False, as_json: bool = False
+) -> Iterator[Callable[[Progress], None]]:
+    """Show long work: one line that moves on a terminal, a line now and then elsewhere, events as JSON, nothing if quiet.
+
+    Args:
+        label: What is at work, such as "3/7 reduce".
+        quiet: Whether nothing is shown.
+        as_json: Whether progress is written as events for programs.
+
+    Yields:
+        The callback that is told of progress.
+    """
+    with _shown_progress(label, quiet, as_json) as show:
 
         def step(p: Progress) -> None:
             show(p)
@@ -216,31 +227,80 @@ def progress_bars(quiet: bool, as_json: bool = False) -> Iterator[Callable[[Prog
 
 
 @contextmanager
-def _shown_progress(quiet: bool, as_json: bool) -> Iterator[Callable[[Progress], None]]:
+def _shown_progress(label: str, quiet: bool, as_json: bool) -> Iterator[Callable[[Progress], None]]:
     if as_json:
         yield _Lines(1.0, lambda p, left: emit(event="progress", **vars(p), left=left)).show
     elif quiet:
         yield lambda _: None
-    elif not err.is_terminal or journal.verbose:
-        yield _Lines(0.0 if journal.verbose else 10.0, _plain_line).show
+    elif journal.verbose:
+        yield _Lines(0.0, lambda p, left: complain(_plain_line(p, left))).show
+    elif not err.is_terminal:
+        yield _Paced(lambda p, left: complain(f"{label}: {_plain_line(p, left)}")).show
     else:
-        columns = (
-            rich.progress.TextColumn("{task.description}"),
-            rich.progress.BarColumn(),
-            rich.progress.TaskProgressColumn(),
-            rich.progress.TimeElapsedColumn(),
-            rich.progress.TimeRemainingColumn(elapsed_when_finished=True),
-            rich.progress.TextColumn("{task.fields[remark]}"),
-        )
-        with rich.progress.Progress(*columns, console=err) as bars:
-            tasks: dict[str, rich.progress.TaskID] = {}
+        with _moving_line(label) as show:
+            yield show
 
-            def advance(p: Progress) -> None:
-                if p.task not in tasks:
-                    tasks[p.task] = bars.add_task(p.task, total=p.total, remark="")
-                bars.update(tasks[p.task], completed=p.done, remark=p.remark)
 
-            yield advance
+@contextmanager
+def _moving_line(label: str) -> Iterator[Callable[[Progress], None]]:
+    """One line of a terminal, which vanishes at the end: what is done at present, and the seconds left for that."""
+    columns = (
+        rich.progress.SpinnerColumn(),
+        rich.progress.TextColumn("{task.description}"),
+        rich.progress.BarColumn(24),
+        rich.progress.TaskProgressColumn(),
+        rich.progress.TimeRemainingColumn(),
+        rich.progress.TextColumn("{task.fields[remark]}"),
+    )
+    with rich.progress.Progress(*columns, console=err, transient=True) as bars:
+        line = bars.add_task(label, total=None, remark="")
+        shown = ""
+
+        def show(p: Progress) -> None:
+            nonlocal shown
+            total = p.total if p.done or p.total > 1 else None  # of a single step nothing is known
+            if p.task != shown:
+                shown = p.task
+                bars.reset(line, description=f"{label}: {p.task}", total=total, remark=p.remark)
+            bars.update(line, completed=p.done, total=total, remark=p.remark)
+
+        yield show
+
+
+@contextmanager
+def show_start(name: str) -> Iterator[None]:
+    """Say on a terminal that a command starts, while the libraries that it needs are loaded."""
+    with err.status(f"starting {name}"):
+        yield
+
+
+class _Paced:
+    """Progress as a line every ten seconds.
+
+    Args:
+        tell: Given a step and the seconds that are left for its task; None where that cannot be told.
+    """
+
+    _PAUSE = 10.0
+
+    def __init__(self, tell: Callable[[Progress, float | None], None]) -> None:
+        self._tell = tell
+        self._told = time.monotonic()
+        self._begun: dict[str, float] = {}
+
+    def show(self, p: Progress) -> None:
+        """Write a line, if the last one is long ago."""
+        now = time.monotonic()
+        begun = self._begun.setdefault(p.task, now)
+        if now - self._told >= self._PAUSE and p.done < p.total:
+            self._told = now
+            self._tell(p, _seconds_left(p, now - begun))
+
+
+def _seconds_left(p: Progress, passed: float) -> float | None:
+    """Return the seconds that a task still takes, None where that cannot be told."""
+    share = p.done / p.total if p.total else 1.0
+    return passed * (1 - share) / share if 0 < share < 1 else None
 
 
 _FIRST_PAUSE = 2.0
@@ -270,7 +330,6 @@ class _Lines:
         single = p.done == 0 and p.total == 1
         if p.done < p.total and not single and now - self._told.get(p.task, begun) < pause:
             return
-        share = p.done / p.total if p.total else 1.0
         if p.done >= p.total:
             told = self._told.pop(p.task, None) is not None
             del self._begun[p.task]
@@ -278,11 +337,11 @@ class _Lines:
                 return
         else:
             self._told[p.task] = now
-        self._tell(p, (now - begun) * (1 - share) / share if 0 < share < 1 else None)
+        self._tell(p, _seconds_left(p, now - begun))
 
 
-def _plain_line(p: Progress, left: float | None) -> None:
+def _plain_line(p: Progress, left: float | None) -> str:
     share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
     state = "done" if p.done >= p.total else share if p.done else "begun"
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
-    complain(f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}")
+    return f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}"

@@ -10,7 +10,7 @@ import contextlib
 import queue
 import threading
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from multiprocessing.queues import Queue
 
@@ -94,33 +94,63 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
         KeyboardInterrupt: After all workers have been stopped; finished parts are kept.
     """
     found = {key: run.parts[key] for key in keys if key in run.parts}
-    for key in found:
-        run.progress(Progress(key, 1.0, 1.0, "kept from before"))
+    told = _Told(run, keys)
+    if found:
+        told.done(found, f"{len(found)} kept from before")
     missing = [key for key in keys if key not in found]
     if not missing:
         return found
     excitation = excitation_of(task)  # compile once, before the workers all ask for it
+
+    def keep(key: str, made: Trajectory) -> None:
+        found[key] = run.parts[key] = made
+        told.done([key], f"{key}: kappa {made.kappa:.4g}")
+
     if run.jobs < 2:
         for key in missing:
-            made = _optimised(task, excitation, key, run.progress)
-            found[key] = run.parts[key] = made
-            run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
+            keep(key, _optimised(task, excitation, key, told.step))
         return found
     with (
-        _audience(run) as news,
+        _news_for(told) as news,
         workers(min(run.jobs, len(missing)), _start_worker, task, news) as pool,
     ):
         for key, made in as_done(pool, _optimise, missing):
-            found[key] = run.parts[key] = made
-            run.progress(Progress(key, 1.0, 1.0, f"kappa {made.kappa:.4g}"))
+            keep(key, made)
     return found
 
 
+class _Told:
+    """Tells how far all trajectories are together.
+
+    Args:
+        run: Told of progress.
+        keys: Names of the trajectories.
+    """
+
+    def __init__(self, run: Run, keys: list[str]) -> None:
+        self._run = run
+        self._fractions = dict.fromkeys(keys, 0.0)
+
+    def step(self, key: str, fraction: float) -> None:
+        """Tell how far one trajectory is."""
+        self._fractions[key] = fraction
+        self._tell("")
+
+    def done(self, keys: Iterable[str], remark: str) -> None:
+        """Tell that some trajectories are done."""
+        self._fractions |= dict.fromkeys(keys, 1.0)
+        self._tell(remark)
+
+    def _tell(self, remark: str) -> None:
+        done, total = sum(self._fractions.values()), len(self._fractions)
+        self._run.progress(Progress("trajectories", round(done, 3), total, remark))
+
+
 @contextlib.contextmanager
-def _audience(run: Run) -> Iterator[Queue[Progress | None]]:
-    """A queue whose news reach the audience of the run."""
-    news: Queue[Progress | None] = process_context().Queue()
-    listener = threading.Thread(target=_listen, args=(news, run), daemon=True)
+def _news_for(told: _Told) -> Iterator[Queue[tuple[str, float] | None]]:
+    """Make a queue whose news, keys with fractions that are done, reach the progress of the run."""
+    news: Queue[tuple[str, float] | None] = process_context().Queue()
+    listener = threading.Thread(target=_listen, args=(news, told), daemon=True)
     listener.start()
     try:
         yield news
@@ -132,7 +162,7 @@ def _audience(run: Run) -> Iterator[Queue[Progress | None]]:
         listener.join(timeout=5)
 
 
-def _listen(news: Queue[Progress | None], run: Run) -> None:
+def _listen(news: Queue[tuple[str, float] | None], told: _Told) -> None:
     while True:
         try:
             item = news.get()
@@ -140,7 +170,7 @@ def _listen(news: Queue[Progress | None], run: Run) -> None:
             return
         if item is None:
             return
-        run.progress(item)
+        told.step(*item)
 
 
 class _Worker:
@@ -148,26 +178,26 @@ class _Worker:
 
     task: ExcitationTask
     excitation: Excitation
-    news: Queue[Progress | None]
+    news: Queue[tuple[str, float] | None]
 
 
-def _start_worker(task: ExcitationTask, news: Queue[Progress | None]) -> None:
+def _start_worker(task: ExcitationTask, news: Queue[tuple[str, float] | None]) -> None:
     _Worker.task, _Worker.news = task, news
     _Worker.excitation = excitation_of(task)
 
 
 def _optimise(key: str) -> Trajectory:
-    return _optimised(_Worker.task, _Worker.excitation, key, _Worker.news.put)
+    return _optimised(_Worker.task, _Worker.excitation, key, lambda *step: _Worker.news.put(step))
 
 
 def _optimised(
-    task: ExcitationTask, excitation: Excitation, key: str, on_progress: Callable[[Progress], None]
+    task: ExcitationTask, excitation: Excitation, key: str, on_step: Callable[[str, float], None]
 ) -> Trajectory:
     """Optimise the trajectory of one key, and tell how far that is."""
 
     def on_fraction(fraction: float) -> None:
         if fraction < 1.0:
-            on_progress(Progress(key, fraction, 1.0))
+            on_step(key, fraction)
 
     return optimise_trajectory(excitation, task.settings, _seed(task, key), on_fraction)
 

@@ -91,15 +91,16 @@ def reduce(
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
     proofs = None
-    for name in _wanted(reduction.heuristics, share):
-        run.progress(Progress(f"select by {name}", 0, 1))
+    names = _wanted(reduction.heuristics, share)
+    for k, name in enumerate(names):
+        run.progress(Progress("heuristics", k, len(names), name))
         method = SelectionMethod.parse(name)
         if method.criterion not in tasks:
             objective = criteria[method.criterion](problem, inputs)
             tasks[method.criterion] = _task(objective, reduction, proven, share, run)
         found[name], made = _selected(tasks[method.criterion], method, reduction.stop)
         proofs = made if made is not None else proofs
-        run.progress(Progress(f"select by {name}", 1, 1))
+    run.progress(Progress("heuristics", len(names), len(names)))
     _remark_on_proofs(proofs, share)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)

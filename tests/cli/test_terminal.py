@@ -1,6 +1,7 @@
 """What is said of long work, and which interruptions are kept in mind."""
 
 import contextlib
+import io
 import signal
 import warnings
 
@@ -67,6 +68,30 @@ def test_a_second_task_of_a_name_begins_anew(lines):
     lines(30, 10)
     lines(100, 0)
     assert lines(105, 10) == [(10, None)]
+
+
+def test_a_line_every_ten_seconds_where_there_is_no_terminal(monkeypatch):
+    now, told = [0.0], []
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
+    shown = terminal._Paced(lambda p, left: told.append((p.task, p.done, left)))
+    for time in range(26):
+        now[0] = float(time)
+        shown.show(Progress("first" if time < 15 else "second", time % 15, 20.0))
+    assert told == [("first", 10, 10.0), ("second", 5, pytest.approx(15.0))]
+
+
+def test_on_a_terminal_one_line_moves_and_vanishes(monkeypatch):
+    written = io.StringIO()
+    console = terminal._Console(file=written, force_terminal=True, width=100)
+    monkeypatch.setattr(terminal, "err", console)
+    with terminal.show_progress("2/7 reduce") as tell:
+        for task in ("heuristics", "best-subset"):
+            for done in range(3):
+                tell(Progress(task, done, 3, "swap"))
+        console.file.flush()
+    assert "2/7 reduce: best-subset" in written.getvalue()
+    assert written.getvalue().count("\n") == 1
+    assert written.getvalue().endswith("\x1b[1A\x1b[2K"), "the line is cleared"
 
 
 def test_after_a_kill_ctrl_c_is_no_wish_to_go_on():

@@ -14,6 +14,7 @@ import rich.table
 
 from tests.docs import prepared
 from tests.docs.prepared import ROOT
+from tests.pythons import interpreters
 
 LONG = ("tutorial.md", "how-to.md", "python.md")
 """Pages that are typed as they stand, each in an empty folder of its own."""
@@ -60,16 +61,27 @@ def main():
     parser.add_argument(
         "--python", default=sys.executable, help="Interpreter to install the wheel for."
     )
+    parser.add_argument(
+        "--newest",
+        action="store_true",
+        help="Take the newest other Python of this machine instead, if there is one.",
+    )
+    parser.add_argument("--page", choices=LONG, help="Type one page alone.")
     given = parser.parse_args()
+    if given.newest:
+        others = interpreters()
+        given.python = others[max(others)] if others else given.python
     table = rich.table.Table("page", "what is typed", "seconds", "exit code")
     failed = False
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         environment = installed(folder, given.python)
-        for page in LONG:
+        for page in [given.page] if given.page else LONG:
             here = folder / page.removesuffix(".md")
             here.mkdir()
             failed |= all_typed(table, page, here, environment)
+        if given.page:
+            end(table, failed)
         failed |= typed(table, "how-to.md", CONTROLLER, SYNTAX, folder / "how-to", environment)
         for prepare, pages in SHORT.items():
             here = folder / prepare.__name__
@@ -83,6 +95,11 @@ def main():
         run = "import nbformat, nbclient; nbclient.NotebookClient(nbformat.read({!r}, 4), timeout=300).execute()"
         words = ["python", "-c", run.format(str(ROOT / "docs" / NOTEBOOK))]
         failed |= typed(table, NOTEBOOK, "all cells", words, here, environment)
+        end(table, failed)
+
+
+def end(table, failed):
+    """Print what was typed; exit with 1 if anything failed."""
     rich.console.Console(width=120).print(table)
     sys.exit(failed)
 

@@ -10,7 +10,7 @@ from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
-from paramreduce_cli.cli.terminal import LOG, VERBOSE, progress_bars, say
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, say, show_progress
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.export.choice import (
@@ -148,7 +148,7 @@ def export(
         assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:
-        with progress_bars(quiet=False) as tell:
+        with show_progress("export") as tell:
             checked = exported_model(
                 loading[Model],
                 chosen,

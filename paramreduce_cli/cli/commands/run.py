@@ -27,10 +27,10 @@ from paramreduce_cli.cli.terminal import (
     VERBOSE,
     emit,
     interruption,
-    progress_bars,
     remark,
     say,
     say_table,
+    show_progress,
 )
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import absent_files, stages_to_run
@@ -82,8 +82,10 @@ def run(
     with placed_errors(config, overrides), store.locked():
         if overrides and results is None:
             _say_what_is_replaced(Runner(loaded, store))
-        for stage in stages_to_run(loaded):
-            with progress_bars(quiet, as_json) as progress:
+        stages = stages_to_run(loaded)
+        for number, stage in enumerate(stages, 1):
+            label = f"{number}/{len(stages)} {stage.name}"
+            with show_progress(label, quiet, as_json) as progress:
                 runner = Runner(
                     loaded,
                     store,
