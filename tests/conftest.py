@@ -11,7 +11,7 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, befor
 import filelock
 import numpy as np
 import pytest
-from searched import Formulations, searched_formulations
+from shortcuts import Wanted, drawn_figures, searched_formulations
 from simulated_logs import log_config, two_link_log, write_log
 
 from paramreduce_cli.artifacts.store import Store
@@ -138,7 +138,11 @@ def figures_not_drawn(request, monkeypatch):
         return
     from paramreduce_cli.report import rendering
 
+    draw = rendering.rendered
+
     def rendered(names, data, formats, **how):
+        if Wanted.figures:
+            return draw(names, data, formats, **how)
         return {name: dict.fromkeys(formats, NO_PICTURE) for name in names}
 
     monkeypatch.setattr(rendering, "rendered", rendered)
@@ -201,7 +205,7 @@ def formulations_as_searches_begin():
     search = formulations_module._best
 
     def best(mechanism, asked):
-        if Formulations.searched:
+        if Wanted.formulations:
             return search(mechanism, asked)
         return [tuple(asked.start) for _ in asked.dropped]
 
@@ -225,7 +229,8 @@ def hexaglide():
 @pytest.fixture(scope="session")
 def two_link_results(made_once):
     """A finished run of the small case; look, do not touch."""
-    return made_once("two_link", run_stages)
+    with drawn_figures():
+        return made_once("two_link", run_stages)
 
 
 @pytest.fixture(scope="session")
@@ -238,7 +243,8 @@ def measured_results(made_once):
         for stage in stages_to_run(config):
             Runner(config, Store(folder / "results")).run(stage)
 
-    return made_once("measured", make)
+    with drawn_figures():
+        return made_once("measured", make)
 
 
 @pytest.fixture

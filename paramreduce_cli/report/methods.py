@@ -182,7 +182,7 @@ def _result(data: ReportData) -> Iterator[str]:
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {' and '.join(errors)}."
     if data.known_model is not None:
         full = data.validation.full["operations_inverse"]
-        reduced = result.operations_inverse[row]
+        reduced = int(result.operations_inverse[row])
         yield (
             f"Its inverse dynamics, recursive Newton-Euler equations [Luh1980] simplified symbolically, takes {reduced} "
             f"operations instead of {full:.0f}{_COUNTED[data.functions[0]]}, parameters being inputs."

@@ -54,6 +54,8 @@ _MEASURED_ON = frozenset(
 _MOST_ACCELERATIONS = 20_000
 """Samples of a set, evenly spread, on which models predict accelerations: each takes a mass matrix of
 every model, and more of them tell no more."""
+_FEW = 2_000
+"""Models times parameters up to which the operations of all models are counted: about four seconds."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _FOLD_NODES = 5_000
@@ -97,7 +99,7 @@ def validate(
         measured = _measured(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
     costs = None if model is None else _Costs(model, counted, reduction, run)
-    if costs is not None and "operations" in wanted.tolerances():
+    if costs is not None and (costs.are_few or "operations" in wanted.tolerances()):
         heuristics = costs.count(heuristics, every_model(heuristics))
     crossed = None
     if wanted.cross_validation:
@@ -324,6 +326,11 @@ class _Costs:
             for row, n in enumerate(found.n)
         }
         self._structures = {key: structure(one, model) for key, one in self._models.items()}
+
+    @property
+    def are_few(self) -> bool:
+        """Whether all models are counted in a few seconds."""
+        return len(set(self._structures.values())) * self._model.values.size <= _FEW
 
     def estimate(self, heuristics: Heuristics) -> Heuristics:
         """Return the validation of heuristics with operations that are nearly right for all models."""

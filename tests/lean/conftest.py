@@ -1,7 +1,7 @@
 """Tests of lean models search for the leanest formulations."""
 
 import pytest
-from searched import searched_formulations
+from shortcuts import searched_formulations
 
 
 @pytest.fixture(autouse=True)

@@ -90,6 +90,15 @@ def loaded(runner, record):
     return load_file(runner.store.path(record), record, None, "")[0]
 
 
+@pytest.fixture(autouse=True, scope="module")
+def few_starts():
+    """Descend from three starts instead of a dozen, which take most of the time."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simplify, "_FEWEST", 3)
+        patch.setattr(simplify, "_MOST", 3)
+        yield
+
+
 LOOPS = ["four_bar-generalised", "four_bar-independent"]
 OTHERS = {"geared": GEARED, "afloat": FLOATING}
 """An arm with friction and a rotor, and one on a floating base."""

@@ -10,7 +10,7 @@ from paramreduce_cli.report.style import FUNCTIONS, legend_beside, mark_selected
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
-    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters. Counted are all sizes of the selected heuristic and of forward selection, and what is worth a look of the others. What several heuristics found is drawn once, for the first of them."""
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters. Of large robots all sizes of the selected heuristic and of forward selection are counted, and of the others the models that nothing beats. What several heuristics found is drawn once, for the first of them."""
     drawn = new_figure()
     axes = drawn.subplots()
     for curve in curves(data):
