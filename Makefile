@@ -91,7 +91,7 @@ all: $(PAPER)
 	@$(PARAMREDUCE) table $(PAPER:%=results/%)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/pytest -n $(JOBS)
+	$(BIN)/pytest -n $(JOBS) --dist worksteal
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .

@@ -366,16 +366,12 @@ def _with_operations(
 ) -> Heuristics:
     """Return the validation of heuristics with operations by model, not a number for the others."""
     unknown = (np.nan,) * len(COUNTS)
-    return {
-        name: replace(
-            result,
-            **{
-                key: np.array([operations.get(ModelChoice(name, n), unknown)[k] for n in result.n.tolist()])
-                for k, key in enumerate(COUNTS)
-            },
-        )
-        for name, result in heuristics.items()
-    }  # fmt: skip
+    found = {}
+    for name, result in heuristics.items():
+        rows = [operations.get(ModelChoice(name, n), unknown) for n in result.n.tolist()]
+        columns = np.array(rows, dtype=float).reshape(-1, len(COUNTS)).T
+        found[name] = replace(result, **dict(zip(COUNTS, columns, strict=True)))
+    return found
 
 
 def _counts_by_name(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
