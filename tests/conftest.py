@@ -2,8 +2,10 @@
 
 import json
 import os
+import pickle
 import shutil
 import sys
+from functools import cache
 from pathlib import Path
 
 os.environ.setdefault("OMP_NUM_THREADS", "1")  # as the command line does, before NumPy is loaded
@@ -93,6 +95,12 @@ def model_of(robot, *overrides):
 
 
 def config_and_model(robot, *overrides):
+    """The config and the model of a robot that ships; look, do not touch."""
+    return _config_and_model(robot, overrides, Wanted.formulations)
+
+
+@cache
+def _config_and_model(robot, overrides, searched):
     config = config_of(robot, *overrides)
     return config, build_model(config, config.model, Run())
 
@@ -215,15 +223,25 @@ def formulations_as_searches_begin():
 
 
 @pytest.fixture(scope="session")
-def puma():
-    with searched_formulations():
-        return model_of("puma560")
+def puma(made_once):
+    return _leanest_model_of("puma560", made_once)
 
 
 @pytest.fixture(scope="session")
-def hexaglide():
-    with searched_formulations():
-        return model_of("hexaglide")
+def hexaglide(made_once):
+    return _leanest_model_of("hexaglide", made_once)
+
+
+def _leanest_model_of(robot, made_once):
+    """The model of a robot with the leanest formulations, which are searched once a session."""
+
+    def make(folder):
+        config = config_of(robot)
+        with searched_formulations():
+            made = build_model(config, config.model, Run())
+        (folder / "model").write_bytes(pickle.dumps(made))
+
+    return pickle.loads((made_once(f"leanest-{robot}", make) / "model").read_bytes())
 
 
 @pytest.fixture(scope="session")

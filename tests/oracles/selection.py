@@ -36,8 +36,7 @@ def all_best_errors(W, chi, sets=None):
         for k in range(n):
             v = A[:, k]
             for _ in range(2):
-                for i in range(k):
-                    v = v - np.sum(A[:, i] * v, axis=1, keepdims=True) * A[:, i]
+                v = v - ((A[:, :k] @ v[..., None]).swapaxes(1, 2) @ A[:, :k])[:, 0]
             length = np.linalg.norm(v, axis=1, keepdims=True)
             v = np.where(length > 1e-9, v / np.where(length > 0, length, 1.0), 0.0)
             A[:, k] = v
