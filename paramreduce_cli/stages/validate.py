@@ -9,12 +9,13 @@ from paramreduce_cli.config.schema import ReductionSection, SelectedSection, Val
 from paramreduce_cli.errors import ConfigError, DataError, Key
 from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
 from paramreduce_cli.judgement.cross_validation import cross_validated
+from paramreduce_cli.judgement.operation_counts import OperationCounts
 from paramreduce_cli.judgement.picking import every_model, pareto_front, shown_models
 from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
 from paramreduce_cli.judgement.torque import NormErrors, torque_errors
 from paramreduce_cli.judgement.verdict import remarks, verdict
-from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts, count_all, structure
+from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.multibody.told import told
@@ -27,7 +28,6 @@ from paramreduce_cli.records import (
     HeuristicValidation,
     IntArray,
     Model,
-    ModelChoice,
     Progress,
     ReducedModel,
     Reduction,
@@ -54,17 +54,12 @@ _MEASURED_ON = frozenset(
 _MOST_ACCELERATIONS = 20_000
 """Samples of a set, evenly spread, on which models predict accelerations: each takes a mass matrix of
 every model, and more of them tell no more."""
-_FEW = 2_000
-"""Models times parameters up to which the operations of all models are counted: about four seconds."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _FOLD_NODES = 5_000
 """Of each proof while folds are left out."""
 _NODES = 50_000
 """Of each proof while stability is looked at; the best found is good enough there."""
-
-
-Heuristics = Mapping[str, HeuristicValidation]
 
 
 def validate(
@@ -98,7 +93,7 @@ def validate(
     else:
         measured = _measured(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
-    costs = None if model is None else _Costs(model, counted, reduction, run)
+    costs = None if model is None else OperationCounts(model, counted, reduction, run)
     if costs is not None and (costs.are_few or "operations" in wanted.tolerances()):
         heuristics = costs.count(heuristics, every_model(heuristics))
     crossed = None
@@ -304,74 +299,6 @@ def _full_model(
         min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])
     )
     return result
-
-
-class _Costs:
-    """Operations of reduced models.
-
-    Args:
-        model: Model of the robot.
-        counted: Which functions are counted where there are loops.
-        reduction: The reduced models.
-        run: Workers and progress.
-    """
-
-    def __init__(
-        self, model: Model, counted: CountedDynamics, reduction: Reduction, run: Run
-    ) -> None:
-        self._model, self._counted, self._run = model, counted, run
-        self._models = {
-            ModelChoice(name, int(n)): reduction.model(name, row)
-            for name, found in reduction.heuristics.items()
-            for row, n in enumerate(found.n)
-        }
-        self._structures = {key: structure(one, model) for key, one in self._models.items()}
-
-    @property
-    def are_few(self) -> bool:
-        """Whether all models are counted in a few seconds."""
-        return len(set(self._structures.values())) * self._model.values.size <= _FEW
-
-    def estimate(self, heuristics: Heuristics) -> Heuristics:
-        """Return the validation of heuristics with operations that are nearly right for all models."""
-        counts = Counts(self._model, self._counted)
-        kept = {key: one.standard != 0 for key, one in self._models.items()}
-        found = {
-            key: (counts.estimate(one), counts.estimate(one, direct=True))
-            for key, one in kept.items()
-        }
-        return _with_operations(heuristics, found)
-
-    def count(self, heuristics: Heuristics, shown: Sequence[ModelChoice]) -> Heuristics:
-        """Return the validation of heuristics with the operations of some models, and of all that take the same."""
-        known = {
-            self._structures[key]: tuple(getattr(result, name)[row] for name in COUNTS)
-            for key in self._models
-            for result in [heuristics[key.heuristic]]
-            for row in [result.row(key.n)]
-            if row is not None and np.isfinite(result.operations_inverse[row])
-        }
-        asked = {self._structures[key]: self._models[key] for key in shown}
-        missing = [key for key in asked if key not in known]
-        if missing:
-            models = [asked[key] for key in missing]
-            counts = count_all(self._model, self._counted, models, self._run)
-            known |= dict(zip(missing, map(tuple, counts.tolist()), strict=True))
-        found = {key: known[name] for key, name in self._structures.items() if name in known}
-        return _with_operations(heuristics, found)
-
-
-def _with_operations(
-    heuristics: Heuristics, operations: Mapping[ModelChoice, tuple[float, ...]]
-) -> Heuristics:
-    """Return the validation of heuristics with operations by model, not a number for the others."""
-    unknown = (np.nan,) * len(COUNTS)
-    found = {}
-    for name, result in heuristics.items():
-        rows = [operations.get(ModelChoice(name, n), unknown) for n in result.n.tolist()]
-        columns = np.array(rows, dtype=float).reshape(-1, len(COUNTS)).T
-        found[name] = replace(result, **dict(zip(COUNTS, columns, strict=True)))
-    return found
 
 
 def _counts_by_name(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
