@@ -24,7 +24,7 @@ help:
 	@echo "make test-cluster    sweeps here and on a Slurm of its own, with kills, against plain runs"
 	@echo "make test        run the tests"
 	@echo "make check       lint, format and types"
-	@echo "make regression  compare with the committed references; make optimiser, with the condition numbers of anew optimised trajectories"
+	@echo "make regression  compare with the committed references; make optimiser does so with freshly optimised trajectories"
 	@echo "make campaign    all that takes too long for every change: an hour and more"
 	@echo "make reference   renew the committed references"
 	@echo "make benchmark   measure speed, as ratios, and CPU seconds; BEFORE=REVISION compares the stages with it"
@@ -38,14 +38,14 @@ help:
 	@echo "make torture     damage files and kill runs, and see that nothing is lost"
 	@echo "make results/ROBOT/FILE.h5   just what is missing for that file"
 
-# Wheels hold some libraries three times, as they cannot hold links; a fifth of the environment is copies.
+# Wheels hold some libraries three times, as they cannot hold links; an eighth of the environment is copies.
 SMALLER = ! command -v hardlink >/dev/null || hardlink --quiet --ignore-time --minimum-size 20k $(VENV)
 
 $(VENV)/.installed: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/pip install --quiet --disable-pip-version-check --editable .
 	@$(SMALLER)
-	@$(BIN)/paramreduce doctor
+	-@$(BIN)/paramreduce doctor
 	@touch $@
 
 $(VENV)/.installed-dev: $(VENV)/.installed
@@ -108,7 +108,7 @@ format: $(VENV)/.installed-dev
 	$(BIN)/ruff format .
 
 # Everything after the optimiser is repeated from the committed coefficients and must agree, proofs
-# as far as they come in ten seconds; the tests prove more.
+# as far as they come in ten seconds.
 REFERENCES := $(patsubst results/reference/%.json,%,$(wildcard results/reference/*.json))
 whole_search = $(if $(filter $*,$(PAPER)),$(WHOLE_SEARCH))
 

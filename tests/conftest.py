@@ -133,7 +133,7 @@ def random_states(mechanism, count, seed=0):
 
 
 ONE_FORMAT = "report.formats=[svg]"
-"""Figures in all formats take longer than all else in a small run."""
+"""The format that is the default, for runs whose settings must not change with it."""
 
 
 NO_PICTURE = b'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 1 1"/>'

@@ -14,13 +14,17 @@ class Wanted:
 def searched_formulations():
     """Search the leanest formulations of models that are built meanwhile, as the program does."""
     Wanted.formulations = True
-    yield
-    Wanted.formulations = False
+    try:
+        yield
+    finally:
+        Wanted.formulations = False
 
 
 @contextlib.contextmanager
 def drawn_figures():
     """Draw the figures of reports that are made meanwhile, as the program does."""
     Wanted.figures = True
-    yield
-    Wanted.figures = False
+    try:
+        yield
+    finally:
+        Wanted.figures = False

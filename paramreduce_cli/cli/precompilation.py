@@ -25,12 +25,12 @@ def compile_loops() -> None:
     Raises:
         DataError: A process died.
     """
-    with workers(2, _nothing) as pool:
+    with workers(2, _prepare) as pool:
         for _ in as_done(pool, _call, ["proofs", "terms"]):
             pass
 
 
-def _nothing() -> None:
+def _prepare() -> None:
     """Prepare a worker process, which needs nothing."""
 
 

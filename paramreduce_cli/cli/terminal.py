@@ -214,7 +214,7 @@ def show_progress(
         as_json: Whether progress is written as events for programs.
 
     Yields:
-        The callback that is told of progress.
+        The progress callback.
     """
     with _shown_progress(label, quiet, as_json) as show:
 
@@ -235,7 +235,7 @@ def _shown_progress(label: str, quiet: bool, as_json: bool) -> Iterator[Callable
     elif journal.verbose:
         yield _Lines(0.0, lambda p, left: complain(_plain_line(p, left))).show
     elif not err.is_terminal:
-        yield _Paced(lambda p, left: complain(f"{label}: {_plain_line(p, left)}")).show
+        yield _PacedLines(lambda p, left: complain(f"{label}: {_plain_line(p, left)}")).show
     else:
         with _moving_line(label) as show:
             yield show
@@ -243,7 +243,7 @@ def _shown_progress(label: str, quiet: bool, as_json: bool) -> Iterator[Callable
 
 @contextmanager
 def _moving_line(label: str) -> Iterator[Callable[[Progress], None]]:
-    """One line of a terminal, which vanishes at the end: what is done at present, and the seconds left for that."""
+    """Show one line on a terminal: the task at hand and the seconds that it still takes; the line vanishes at the end."""
     columns = (
         rich.progress.SpinnerColumn(),
         rich.progress.TextColumn("{task.description}"),
@@ -274,8 +274,8 @@ def show_start(name: str) -> Iterator[None]:
         yield
 
 
-class _Paced:
-    """Progress as a line every ten seconds.
+class _PacedLines:
+    """Lines of progress, one every ten seconds.
 
     Args:
         tell: Given a step and the seconds that are left for its task; None where that cannot be told.

@@ -94,9 +94,9 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
         KeyboardInterrupt: After all workers have been stopped; finished parts are kept.
     """
     found = {key: run.parts[key] for key in keys if key in run.parts}
-    told = _Told(run, keys)
+    total = _TotalProgress(run, keys)
     if found:
-        told.done(found, f"{len(found)} kept from before")
+        total.report_done(found, f"{len(found)} kept from before")
     missing = [key for key in keys if key not in found]
     if not missing:
         return found
@@ -104,14 +104,14 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
 
     def keep(key: str, made: Trajectory) -> None:
         found[key] = run.parts[key] = made
-        told.done([key], f"{key}: kappa {made.kappa:.4g}")
+        total.report_done([key], f"{key}: kappa {made.kappa:.4g}")
 
     if run.jobs < 2:
         for key in missing:
-            keep(key, _optimised(task, excitation, key, told.step))
+            keep(key, _optimised(task, excitation, key, total.report_fraction))
         return found
     with (
-        _news_for(told) as news,
+        _news_for(total) as news,
         workers(min(run.jobs, len(missing)), _start_worker, task, news) as pool,
     ):
         for key, made in as_done(pool, _optimise, missing):
@@ -119,11 +119,11 @@ def optimise_all(task: ExcitationTask, keys: list[str], run: Run) -> dict[str, T
     return found
 
 
-class _Told:
-    """Tells how far all trajectories are together.
+class _TotalProgress:
+    """The progress of all trajectories together.
 
     Args:
-        run: Told of progress.
+        run: Whose progress callback is called.
         keys: Names of the trajectories.
     """
 
@@ -131,26 +131,26 @@ class _Told:
         self._run = run
         self._fractions = dict.fromkeys(keys, 0.0)
 
-    def step(self, key: str, fraction: float) -> None:
-        """Tell how far one trajectory is."""
+    def report_fraction(self, key: str, fraction: float) -> None:
+        """Report which fraction of one trajectory is done."""
         self._fractions[key] = fraction
-        self._tell("")
+        self._report("")
 
-    def done(self, keys: Iterable[str], remark: str) -> None:
-        """Tell that some trajectories are done."""
+    def report_done(self, keys: Iterable[str], remark: str) -> None:
+        """Report that some trajectories are done."""
         self._fractions |= dict.fromkeys(keys, 1.0)
-        self._tell(remark)
+        self._report(remark)
 
-    def _tell(self, remark: str) -> None:
-        done, total = sum(self._fractions.values()), len(self._fractions)
-        self._run.progress(Progress("trajectories", round(done, 3), total, remark))
+    def _report(self, remark: str) -> None:
+        done = round(sum(self._fractions.values()), 3)
+        self._run.progress(Progress("trajectories", done, len(self._fractions), remark))
 
 
 @contextlib.contextmanager
-def _news_for(told: _Told) -> Iterator[Queue[tuple[str, float] | None]]:
+def _news_for(total: _TotalProgress) -> Iterator[Queue[tuple[str, float] | None]]:
     """Make a queue whose news, keys with fractions that are done, reach the progress of the run."""
     news: Queue[tuple[str, float] | None] = process_context().Queue()
-    listener = threading.Thread(target=_listen, args=(news, told), daemon=True)
+    listener = threading.Thread(target=_listen, args=(news, total), daemon=True)
     listener.start()
     try:
         yield news
@@ -162,7 +162,7 @@ def _news_for(told: _Told) -> Iterator[Queue[tuple[str, float] | None]]:
         listener.join(timeout=5)
 
 
-def _listen(news: Queue[tuple[str, float] | None], told: _Told) -> None:
+def _listen(news: Queue[tuple[str, float] | None], total: _TotalProgress) -> None:
     while True:
         try:
             item = news.get()
@@ -170,7 +170,7 @@ def _listen(news: Queue[tuple[str, float] | None], told: _Told) -> None:
             return
         if item is None:
             return
-        told.step(*item)
+        total.report_fraction(*item)
 
 
 class _Worker:

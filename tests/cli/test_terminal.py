@@ -73,7 +73,7 @@ def test_a_second_task_of_a_name_begins_anew(lines):
 def test_a_line_every_ten_seconds_where_there_is_no_terminal(monkeypatch):
     now, told = [0.0], []
     monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
-    shown = terminal._Paced(lambda p, left: told.append((p.task, p.done, left)))
+    shown = terminal._PacedLines(lambda p, left: told.append((p.task, p.done, left)))
     for time in range(26):
         now[0] = float(time)
         shown.show(Progress("first" if time < 15 else "second", time % 15, 20.0))
