@@ -5,6 +5,7 @@ of the time of reading.
 """
 
 import math
+from functools import cached_property
 from typing import Any
 
 import h5py
@@ -14,6 +15,8 @@ import xxhash
 _ATTRIBUTE = "checks"
 _BLOCK = 1 << 16
 """Bytes of rows that a checksum is of."""
+_NUMBERS = "fiub"
+"""Kinds of arrays that HDF5 reads without h5py."""
 
 
 class RowChecks:
@@ -62,15 +65,23 @@ class CheckedRows:
     """A dataset that is read in slices of rows, each compared with its checksums; one without any is read as it is.
 
     Slices follow each other mostly: of the last block what was read is kept for the next one.
+
+    Args:
+        identifier: HDF5's own of the dataset: h5py's objects take longer than reading what is small.
     """
 
-    def __init__(self, data: h5py.Dataset) -> None:
-        self._data = data
-        self.shape, self.dtype, self.ndim = data.shape, data.dtype, data.ndim
-        self.size, self.nbytes = data.size, data.nbytes
-        self._checks = _checks_of(data)
-        self._rows = _rows_of_block(_row_bytes(data)) if data.ndim else 0
+    def __init__(self, identifier: h5py.h5d.DatasetID) -> None:
+        self._identifier = identifier
+        self.shape, self.dtype = identifier.shape or (), identifier.dtype
+        self.ndim, self.size = len(self.shape), math.prod(self.shape)
+        self.nbytes = self.size * self.dtype.itemsize
+        self._checks = _checks_of(identifier)
+        self._rows = _rows_of_block(_row_bytes(self)) if self.ndim else 0
         self._kept: tuple[int, np.ndarray] = (-1, np.zeros(0))
+
+    @cached_property
+    def _data(self) -> h5py.Dataset:
+        return h5py.Dataset(self._identifier)
 
     def __len__(self) -> int:
         return int(self.shape[0])
@@ -100,7 +111,11 @@ class CheckedRows:
         Raises:
             OSError: A checksum does not fit.
         """
-        value = self._data[()]
+        if self.dtype.kind in _NUMBERS and self._identifier.shape is not None:
+            value = np.empty(self.shape, self.dtype)
+            self._identifier.read(h5py.h5s.ALL, h5py.h5s.ALL, value)
+        else:
+            value = self._data[()]
         if self._checks is not None:
             self._compare(np.ascontiguousarray(value), 0)
         return value
@@ -118,12 +133,12 @@ class CheckedRows:
                 raise OSError(f"the checksum of {self._data.name} does not fit")
 
 
-def _checks_of(data: h5py.Dataset) -> np.ndarray | None:
+def _checks_of(identifier: h5py.h5d.DatasetID) -> np.ndarray | None:
     # By hand: h5py's own way to an attribute takes as long as reading a small dataset several times.
     name = _ATTRIBUTE.encode()
-    if not h5py.h5a.exists(data.id, name):
+    if not h5py.h5a.exists(identifier, name):
         return None
-    attribute = h5py.h5a.open(data.id, name)
+    attribute = h5py.h5a.open(identifier, name)
     checks = np.empty(attribute.shape, np.uint64)
     attribute.read(checks)
     return checks

@@ -10,6 +10,7 @@ import contextlib
 import dataclasses
 import hashlib
 import json
+import math
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -246,6 +247,7 @@ class Reader:
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
         self.file = file
+        self._attributes = file.attrs
         self._inside: set[str] = set()
         """Places that no link to another file leads to."""
 
@@ -254,7 +256,7 @@ class Reader:
 
     def array(self, name: str, dimensions: int | None = None) -> np.ndarray:
         """A numeric dataset as a whole."""
-        value = np.asarray(CheckedRows(self._dataset(name)).whole())
+        value = np.asarray(self._dataset(name).whole())
         if value.dtype.kind not in "fiub":
             raise ArtifactError(f"{self.path}: /{name} must hold numbers.")
         if dimensions is not None and value.ndim != dimensions:
@@ -268,7 +270,7 @@ class Reader:
         data = self._dataset(name)
         if not h5py.check_string_dtype(data.dtype) and data.size:
             raise ArtifactError(f"{self.path}: /{name} must hold text.")
-        values = np.atleast_1d(CheckedRows(data).whole())
+        values = np.atleast_1d(data.whole())
         return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
     def text(self, name: str) -> str:
@@ -277,7 +279,7 @@ class Reader:
 
     def attribute(self, name: str, default: Any = None) -> Any:
         """An attribute of the file."""
-        value = self.file.attrs.get(name, default)
+        value = self._attributes.get(name, default)
         value = value.item() if isinstance(value, np.generic) else value
         return value.decode() if isinstance(value, bytes) else value
 
@@ -286,7 +288,7 @@ class Reader:
         data = self._dataset(name)
         if data.dtype.kind not in "fiu" or data.ndim == 0:
             raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")
-        return CheckedRows(data)
+        return data
 
     def verify(self) -> None:
         """Read all there is, and so have all checksums compared.
@@ -294,14 +296,14 @@ class Reader:
         Raises:
             ArtifactError: Something is damaged.
         """
-        for name in self.file.attrs:
+        for name in self._attributes:
             self.attribute(name)
         self.file.visititems(self._verify_item)
 
     def _verify_item(self, name: str, item: h5py.Group | h5py.Dataset) -> None:
         if not isinstance(item, h5py.Dataset):
             return
-        data = CheckedRows(self._plausible(name, item))
+        data = self._plausible(name, item.id)
         if not data.ndim:
             data.whole()
             return
@@ -309,39 +311,50 @@ class Reader:
         for start in range(0, len(data), step):
             data[start : start + step]
 
-    def _dataset(self, name: str) -> h5py.Dataset:
-        parts = name.split("/")
-        for k in range(len(parts)):
-            place = "/".join(parts[: k + 1])
-            if place in self._inside:
-                continue
-            if isinstance(self.file.get(place, getlink=True), h5py.ExternalLink):
-                raise ArtifactError(
-                    f"{self.path}: /{name} is in another file; copy it into this one."
-                )
-            self._inside.add(place)
-        found = self.file.get(name)
-        if not isinstance(found, h5py.Dataset):
+    def _dataset(self, name: str) -> CheckedRows:
+        # Through HDF5's own functions, which take a fifth of the time of h5py's for a small dataset.
+        try:
+            self._refuse_other_files(name)
+            found = h5py.h5o.open(self.file.id, name.encode())
+        except (KeyError, RuntimeError):
+            found = None
+        if not isinstance(found, h5py.h5d.DatasetID):
             self.verify()  # a damaged group hides what is in it
             raise ArtifactError(
                 f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
             )
         return self._plausible(name, found)
 
-    def _plausible(self, name: str, found: h5py.Dataset) -> h5py.Dataset:
+    def _refuse_other_files(self, name: str) -> None:
+        parts = name.split("/")
+        for k in range(len(parts)):
+            place = "/".join(parts[: k + 1])
+            if place in self._inside:
+                continue
+            if self.file.id.links.get_info(place.encode()).type == h5py.h5l.TYPE_EXTERNAL:
+                raise ArtifactError(
+                    f"{self.path}: /{name} is in another file; copy it into this one."
+                )
+            self._inside.add(place)
+
+    def _plausible(self, name: str, found: h5py.h5d.DatasetID) -> CheckedRows:
         """A dataset, if it holds what it declares.
 
         Raises:
             ArtifactError: Its numbers are in another file, or are not there.
         """
-        if found.is_virtual or found.external:
+        properties = found.get_create_plist()
+        layout = properties.get_layout()
+        outside = layout == h5py.h5d.CONTIGUOUS and properties.get_external_count()
+        if layout == h5py.h5d.VIRTUAL or outside:
             raise ArtifactError(f"{self.path}: /{name} is in another file; copy it into this one.")
-        if found.nbytes > _SMALL + _MOST_COMPRESSED * found.id.get_storage_size():
+        data = CheckedRows(found)
+        if data.nbytes > _SMALL + _MOST_COMPRESSED * found.get_storage_size():
             raise ArtifactError(
-                f"{self.path}: /{name} declares {' x '.join(map(str, found.shape))} numbers, but "
+                f"{self.path}: /{name} declares {' x '.join(map(str, data.shape))} numbers, but "
                 "holds hardly any."
             )
-        return found
+        return data
 
 
 class StoredRows:
@@ -432,21 +445,26 @@ def _attributes(stamp: Stamp) -> dict[str, Any]:
 def read_stamp(path: Path) -> Stamp | None:
     """The provenance of a file, None if it is not an artifact of this project."""
     with reading(path) as reader:
-        if reader.attribute("schema") is None or reader.attribute("stage") is None:
-            return None
-        return Stamp(
-            schema=int(reader.attribute("schema")),
-            robot=str(reader.attribute("robot")),
-            stage=str(reader.attribute("stage")),
-            versions={
-                name: str(reader.attribute(f"{name}_version", "?"))
-                for name in ("paramreduce", "numpy", "scipy", "casadi")
-            },
-            sections=json.loads(reader.attribute("config_sections", "{}")),
-            inputs=json.loads(reader.attribute("inputs", "{}")),
-            seed=int(reader.attribute("seed", 0)),
-            seconds=float(reader.attribute("wall_seconds", 0.0)),
-            digest=str(reader.attribute("digest", "")),
-            cut_short=bool(reader.attribute("cut_short", False)),
-            warnings=tuple(json.loads(reader.attribute("warnings", "[]"))),
-        )
+        return stamp_of(reader)
+
+
+def stamp_of(reader: Reader) -> Stamp | None:
+    """The provenance of an open file, None if it is not an artifact of this project."""
+    if reader.attribute("schema") is None or reader.attribute("stage") is None:
+        return None
+    return Stamp(
+        schema=int(reader.attribute("schema")),
+        robot=str(reader.attribute("robot")),
+        stage=str(reader.attribute("stage")),
+        versions={
+            name: str(reader.attribute(f"{name}_version", "?"))
+            for name in ("paramreduce", "numpy", "scipy", "casadi")
+        },
+        sections=json.loads(reader.attribute("config_sections", "{}")),
+        inputs=json.loads(reader.attribute("inputs", "{}")),
+        seed=int(reader.attribute("seed", 0)),
+        seconds=float(reader.attribute("wall_seconds", 0.0)),
+        digest=str(reader.attribute("digest", "")),
+        cut_short=bool(reader.attribute("cut_short", False)),
+        warnings=tuple(json.loads(reader.attribute("warnings", "[]"))),
+    )

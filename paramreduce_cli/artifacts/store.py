@@ -13,7 +13,16 @@ import filelock
 
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
-from paramreduce_cli.artifacts.hdf5 import SCHEMA, Reader, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.hdf5 import (
+    SCHEMA,
+    Reader,
+    Stamp,
+    Writer,
+    read_stamp,
+    reading,
+    stamp_of,
+    write,
+)
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import (
     load_json,
@@ -189,7 +198,7 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
     """
     hint = f"Make it with `paramreduce {maker}`." if maker else ""
     with reading(path, hint) as reader:
-        stamp = read_stamp(path)
+        stamp = stamp_of(reader)
         if stamp is not None:
             check_schema(path, stamp)
         if stamp is None and robot is not None:

@@ -38,5 +38,15 @@ def cross(a: Sequence, b: Sequence) -> Vector:
 
 
 def apply(matrix: Sequence[Sequence], a: Vector) -> Vector:
-    """The product of a matrix, by rows, with a."""
-    return (dot(matrix[0], a), dot(matrix[1], a), dot(matrix[2], a))
+    """The product of a matrix, by rows, with a; entries that are the numbers 0 and 1 take no time."""
+    return (_weighted(matrix[0], a), _weighted(matrix[1], a), _weighted(matrix[2], a))
+
+
+def _weighted(weights: Sequence, a: Vector) -> Any:
+    # An operation of CasADi takes long even where nothing comes of it, and turns are mostly zeros.
+    terms = [
+        entry if isinstance(weight, float) and weight == 1 else weight * entry
+        for weight, entry in zip(weights, a, strict=True)
+        if not (isinstance(weight, float) and weight == 0)
+    ]
+    return sum(terms[1:], terms[0]) if terms else 0 * a[0]

@@ -36,8 +36,8 @@ class _Point:
     residual: FloatArray
     """(z̈_R - z̈) / nom, (n_samples, n_dof)."""
     ddz: FloatArray
-    inverse: FloatArray
-    """M_R^-1, rows divided by nom, (n_samples, n_dof, n_dof)."""
+    M: FloatArray
+    """Mass matrices M_R, (n_samples, n_dof, n_dof)."""
 
 
 class _Accelerations:
@@ -49,6 +49,9 @@ class _Accelerations:
 
     def __init__(self, data: AccelerationData, reference: FloatArray) -> None:
         self.data = data
+        # Columns first: subsets of them are then copied in one piece each.
+        self._A = np.ascontiguousarray(np.moveaxis(data.A, -1, 0))
+        self._B = np.ascontiguousarray(np.moveaxis(data.B, -1, 0))
         self._total = float(np.linalg.norm(data.ddz / data.nominal))
         M = data.A @ reference
         try:
@@ -70,23 +73,23 @@ class _Accelerations:
     def point(self, columns: IntArray, parameters: FloatArray) -> _Point | None:
         """The accelerations of a model; None where its mass matrix is singular."""
         d = self.data
-        M = d.A[..., columns] @ parameters
+        M = np.tensordot(parameters, self._A[columns], 1)
+        left = d.tau - np.tensordot(parameters, self._B[columns], 1)
         try:
-            inverse = np.linalg.inv(M)
+            ddz = np.linalg.solve(M, left[..., None])[..., 0]
         except np.linalg.LinAlgError:
             return None
-        ddz = np.einsum("sij,sj->si", inverse, d.tau - d.B[..., columns] @ parameters)
         residual = (ddz - d.ddz) / d.nominal
         error = float(np.linalg.norm(residual)) / self._total
         if not np.isfinite(error):
             return None
-        return _Point(parameters, error, residual, ddz, inverse / d.nominal[:, None])
+        return _Point(parameters, error, residual, ddz, M)
 
     def slope(self, point: _Point, columns: IntArray) -> FloatArray:
         """Minus the derivative of the residual by the parameters, (n_samples n_dof, n)."""
-        d = self.data
-        K = np.einsum("sijp,sj->sip", d.A[..., columns], point.ddz) + d.B[..., columns]
-        return (point.inverse @ K).reshape(-1, columns.size)
+        K = (self._A[columns] @ point.ddz[..., None])[..., 0] + self._B[columns]
+        slope = np.linalg.inv(point.M) @ np.moveaxis(K, 0, -1) / self.data.nominal[:, None]
+        return slope.reshape(-1, columns.size)
 
     def fit(self, columns: IntArray, start: FloatArray) -> _Point | None:
         """Minimise the exact error by Gauss-Newton steps that are halved until they help."""
