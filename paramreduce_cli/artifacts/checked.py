@@ -72,7 +72,8 @@ class CheckedRows:
 
     def __init__(self, identifier: h5py.h5d.DatasetID) -> None:
         self._identifier = identifier
-        self.shape, self.dtype = identifier.shape or (), identifier.dtype
+        self.shape: tuple[int, ...] = identifier.shape or ()
+        self.dtype = identifier.dtype
         self.ndim, self.size = len(self.shape), math.prod(self.shape)
         self.nbytes = self.size * self.dtype.itemsize
         self._checks = _checks_of(identifier)

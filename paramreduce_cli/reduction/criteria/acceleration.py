@@ -73,10 +73,10 @@ class _Accelerations:
     def point(self, columns: IntArray, parameters: FloatArray) -> _Point | None:
         """The accelerations of a model; None where its mass matrix is singular."""
         d = self.data
-        M = np.tensordot(parameters, self._A[columns], 1)
+        M: FloatArray = np.tensordot(parameters, self._A[columns], 1)
         left = d.tau - np.tensordot(parameters, self._B[columns], 1)
         try:
-            ddz = np.linalg.solve(M, left[..., None])[..., 0]
+            ddz = np.asarray(np.linalg.solve(M, left[..., None])[..., 0], dtype=float)
         except np.linalg.LinAlgError:
             return None
         residual = (ddz - d.ddz) / d.nominal
