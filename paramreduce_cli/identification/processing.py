@@ -12,6 +12,7 @@ from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.doubts import doubts
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.pieces import Piece, moving, split
+from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
 from paramreduce_cli.identification.shown import (
     Outliers,
     place_to_show,
@@ -94,7 +95,11 @@ def processed(
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
     suspected = dict.fromkeys(
-        text for piece in recorded for text in doubts(piece, rate, names, unmeasured)
+        [
+            *files.doubts,
+            *others.doubts,
+            *(text for piece in recorded for text in doubts(piece, rate, names, unmeasured)),
+        ]
     )
     learned_from, tested_on = _parts(training, held_out, wanted)
     _check_left(learned_from, files.sources, wanted)
@@ -156,6 +161,8 @@ class _Files:
     motions: list[list[Signals]] = field(default_factory=list)
     sources: list[str] = field(default_factory=list)
     outliers: list[Outliers] = field(default_factory=list)
+    doubts: list[str] = field(default_factory=list)
+    """Sentences on positions that jump."""
     rate: float = 0.0
     """Samples per second of them all."""
 
@@ -171,15 +178,18 @@ def _read(
     for log in logs:
         source = log.source
         recorded = signals(log, wanted, names, unmeasured)
+        rows, first_line = recorded.time.size, log.first_line
         del log  # the next one is read while this name would hold it
-        if wanted.delay:
-            _undelay(recorded, wanted.delay, source)
         try:
-            pieces, rate, said = evened(recorded)
+            recorded, parted, jumps = _without_jumps(recorded, wanted, names, first_line)
+            files.doubts += [f"{source}: {text}" for text in jumps]
+            if wanted.delay:
+                _undelay(recorded, wanted.delay, source)
+            pieces, rate, said = evened(recorded, parted)
         except DataError as error:
             raise DataError(f"{source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
-        steps.append(f"{source}: {recorded.time.size} rows, {duration:.4g} s at {rate:.5g} Hz.")
+        steps.append(f"{source}: {rows} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         outliers = replace_outliers(pieces) if wanted.outliers == "replace" else {}
         steps += _said_of_outliers(outliers, names)
@@ -193,6 +203,44 @@ def _read(
         files.outliers.append(outliers)
         files.motions.append(pieces)
     return files
+
+
+def _without_jumps(
+    recorded: Signals, wanted: LogSection, names: Sequence[str], first_line: int | None
+) -> tuple[Signals, list[int], list[str]]:
+    """Cut out the rows of a recording in which positions jump.
+
+    Args:
+        recorded: The recording with all of its rows.
+        wanted: The section of the config, which may ask for outliers to be kept.
+        names: Names of the coordinates.
+        first_line: Line of the first row in its file, None where the file has no lines.
+
+    Returns:
+        The recording; its rows with which a motion begins anew after a step; sentences on what was done.
+    """
+    said = []
+    if any(recorded.turns):
+        counts = zip(names, recorded.turns, strict=True)
+        counted = ", ".join(f"{name} {count} times" for name, count in counts if count)
+        said.append(f"positions jump by whole turns ({counted}); the turns are added.")
+    if wanted.outliers == "keep":
+        return recorded, [], said
+    jumps = find_position_jumps(recorded)
+    if jumps.bad.any():
+        bad = np.flatnonzero(jumps.bad)
+        said.append(
+            f"positions jump to and fro, so {bad.size} of {jumps.bad.size} rows are cut out "
+            f"({name_rows(bad, first_line)}): dropouts, or a second publisher?"
+        )
+        recorded = recorded.part(~jumps.bad)
+    if jumps.steps.size:
+        said.append(
+            f"positions jump and do not come back ({name_rows(jumps.steps, first_line)}), so the log is parted there: "
+            "was the zero of a joint set anew, or are these several recordings?"
+        )
+    parted = jumps.steps - np.cumsum(jumps.bad)[jumps.steps]
+    return recorded, parted.tolist(), said
 
 
 def _undelay(recorded: Signals, delay: float, source: str) -> None:

@@ -19,7 +19,8 @@ from paramreduce_cli.config.logs import (
 )
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import per_joint
-from paramreduce_cli.records import FloatArray, RawLog
+from paramreduce_cli.identification.turns import unwrap_positions
+from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.scratch import large_matrix, side_by_side
 
 _EVEN = 0.005
@@ -46,8 +47,10 @@ class Signals:
     dz: FloatArray | None
     ddz: FloatArray | None
     tau: FloatArray
+    turns: tuple[int, ...] = ()
+    """Number of whole turns that were added to each position, empty where not known, (n_dof,)."""
 
-    def part(self, rows: slice) -> "Signals":
+    def part(self, rows: slice | BoolArray) -> "Signals":
         """Some of its samples."""
         dz = None if self.dz is None else self.dz[rows]
         ddz = None if self.ddz is None else self.ddz[rows]
@@ -94,7 +97,8 @@ def signals(
     assert z is not None
     assert tau is not None
     _check_time(log, columns.time, time)
-    return _of_joints(Signals(time, z, dz, ddz, tau), wanted, len(names))
+    turns = unwrap_positions(z) if wanted.outliers == "replace" else ()
+    return _of_joints(Signals(time, z, dz, ddz, tau, turns), wanted, len(names))
 
 
 def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
@@ -121,7 +125,7 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
     z, dz, ddz = motion
     assert z is not None
     z += _each(wanted, "offsets", n_dof)
-    return Signals(found.time, z, dz, ddz, tau)
+    return Signals(found.time, z, dz, ddz, tau, found.turns)
 
 
 def _multiply(values: FloatArray, factors: FloatArray) -> None:
@@ -218,10 +222,14 @@ def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
         )
 
 
-def evened(found: Signals) -> tuple[list[Signals], float, list[str]]:
-    """Uninterrupted motions at an even rate.
+def evened(found: Signals, steps: Collection[int] = ()) -> tuple[list[Signals], float, list[str]]:
+    """Part a recording into uninterrupted motions at an even rate.
 
     Uneven time is resampled by cubic splines; gaps part motions.
+
+    Args:
+        found: The recording.
+        steps: Rows with which a motion begins anew although no time is missing.
 
     Returns:
         The motions, samples per second, and what was done.
@@ -231,7 +239,7 @@ def evened(found: Signals) -> tuple[list[Signals], float, list[str]]:
     """
     step = float(np.median(np.diff(found.time)))
     gaps = np.flatnonzero(np.diff(found.time) > _GAP * step)
-    edges = [0, *(gaps + 1).tolist(), found.time.size]
+    edges = sorted({0, *(gaps + 1).tolist(), *steps, found.time.size})
     pieces = [found.part(slice(a, b)) for a, b in itertools.pairwise(edges)]
     kept = [piece for piece in pieces if piece.time.size >= _FEWEST]
     if not kept:
@@ -249,7 +257,7 @@ def evened(found: Signals) -> tuple[list[Signals], float, list[str]]:
     if uneven > _EVEN:
         kept = [_resampled(piece, step) for piece in kept]
         said.append(
-            f"Time steps differ by up to {100 * uneven:.2g} %; resampled to {1 / step:.6g} Hz by cubic "
+            f"Time steps differ by up to {100 * uneven:.3g} %; resampled to {1 / step:.6g} Hz by cubic "
             "splines."
         )
     return kept, 1 / step, said

@@ -9,7 +9,7 @@ from simulated_logs import two_link_log, write_log
 
 from paramreduce_cli.artifacts import log_files
 from paramreduce_cli.artifacts.log_files import load_log
-from paramreduce_cli.config.log_template import guessed_columns, joints_by_name
+from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
 from paramreduce_cli.identification.signals import evened, signals
@@ -274,13 +274,13 @@ def columns_of(*stems):
     ],
 )  # fmt: skip
 def test_guesses(names, expected):
-    found = guessed_columns(names, NAMES)
+    found = guess_columns(names, NAMES)
     assert (found["time"], found["position"], found["torque"]) == expected
 
 
 def test_nothing_to_guess():
     with pytest.raises(ConfigError, match="no columns for torque of 2 joints"):
-        guessed_columns(["t", "q1", "q2"], NAMES)
+        guess_columns(["t", "q1", "q2"], NAMES)
 
 
 @pytest.mark.parametrize("torque", ["tau{}", ["tau1"], ["tau1", "none"]], ids=str)
@@ -313,8 +313,8 @@ def test_joints_are_read_from_columns_of_their_names(names, joints):
 def test_a_log_with_more_joints_than_the_robot_is_refused():
     names = ["t", *(f"{kind}{j}" for kind in ("q", "tau") for j in (1, 2, 3))]
     with pytest.raises(ConfigError, match="3 joints by its columns, the robot 2"):
-        guessed_columns(names, ["a", "b"])
-    assert guessed_columns(names, ["a", "b", "c"])["position"] == "q{}"
+        guess_columns(names, ["a", "b"])
+    assert guess_columns(names, ["a", "b", "c"])["position"] == "q{}"
 
 
 @pytest.mark.parametrize(
@@ -322,5 +322,5 @@ def test_a_log_with_more_joints_than_the_robot_is_refused():
 )
 def test_joints_are_to_be_locked_where_they_have_no_column_at_all(names, locked):
     with pytest.raises(ConfigError) as caught:
-        guessed_columns(names, NAMES)
+        guess_columns(names, NAMES)
     assert ("--lock fore=0" in str(caught.value)) == locked

@@ -9,7 +9,7 @@ import rich.table
 from paramreduce_cli.cli.options import SET
 from paramreduce_cli.cli.terminal import LOG, remark, say, say_table
 from paramreduce_cli.config import load_config, placed_errors
-from paramreduce_cli.config.log_template import guessed_columns, joints_by_name
+from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.texts import share
@@ -48,7 +48,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     joints = _joints(names) if mechanism is None else list(mechanism.coordinate_names)
     section = None if loaded is None else loaded.sampling.log
     if section is None:
-        columns = ColumnsSection(**guessed_columns(names, joints))  # type: ignore[arg-type]
+        columns = ColumnsSection(**guess_columns(names, joints))  # type: ignore[arg-type]
         section = LogSection(files=[file], columns=columns)
     section = section.model_copy(update={"held_out_files": []})
     with placed_errors(config, overrides):
@@ -95,10 +95,10 @@ def _joints(names: list[str]) -> list[str]:
     for n in range(_MOST_JOINTS, 0, -1):
         joints = [f"q{k + 1}" for k in range(n)]
         try:
-            guessed_columns(names, joints)
+            guess_columns(names, joints)
         except ConfigError:
             continue
         return joints
     joints = joints_by_name(names) or ["q1"]
-    guessed_columns(names, joints)  # says what is missing
+    guess_columns(names, joints)  # says what is missing
     return joints

@@ -10,9 +10,10 @@ from shlex import quote
 import click
 
 from paramreduce_cli.cli.terminal import say
+from paramreduce_cli.config.column_matching import guess_columns
 from paramreduce_cli.config.examples import copy_example
 from paramreduce_cli.config.loading import load_config
-from paramreduce_cli.config.log_template import guessed_columns, log_text
+from paramreduce_cli.config.log_template import log_text
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.config.template import (
     dh_template,
@@ -122,11 +123,11 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
 
     names = list(load_log(logs[0]).columns)
     try:
-        columns = guessed_columns(names, joints)
+        columns = guess_columns(names, joints)
     except ConfigError as error:
         if not base:
             raise
-        guessed_columns(names, joints[len(base) :])
+        guess_columns(names, joints[len(base) :])
         raise ConfigError(
             f"{logs[0]}: has columns for the joints, but none for the coordinates of the base ({', '.join(base)}). If it stood "
             "still, leave --floating out. If its motion was recorded under other names, leave --log out, and write sampling.log into the config."

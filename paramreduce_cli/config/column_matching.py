@@ -1,0 +1,237 @@
+"""Columns of a recording, matched with the joints of a robot by their usual names."""
+
+import itertools
+import re
+from collections.abc import Collection, Mapping, Sequence
+
+from paramreduce_cli.config.logs import NUMBER
+from paramreduce_cli.errors import ConfigError
+
+_WORDS = {
+    "position": ("q", "pos", "position", "positions", "z", "theta", "actual_q", "joint_position", "qm"),
+    "velocity": ("dq", "qd", "qdot", "v", "vel", "velocity", "velocities", "dz", "actual_qd", "omega"),
+    "acceleration": ("ddq", "qdd", "qddot", "acc", "acceleration", "accelerations", "ddz"),
+    "torque": (
+        "tau", "torque", "torques", "effort", "efforts", "moment", "taum", "actual_current", "current", "i",
+    ),
+}  # fmt: skip
+_TIMES = ("t", "time", "timestamp", "stamp", "time_s", "seconds")
+_WANTED_ONLY = ("command", "desired", "target", "ref", "setpoint")
+"""Parts of names of what was asked of the machine, not measured."""
+_NEEDED = ("position", "torque")
+_MOST_JOINTS = _MOST_SHOWN = 12
+"""Joints, and columns, that a message names."""
+_SHORT = 2
+"""Letters of a word that counts only where it stands alone."""
+_BY_HAND = "Take a config without --log, and write sampling.log with lists of columns into it."
+
+
+def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str | list[str]]:
+    """Choose the columns of time, positions, speeds, accelerations and torques.
+
+    Joints are numbered from 0 or 1, or their names stand in the names of columns. Speeds and
+    accelerations are left out where no column has a usual name.
+
+    Args:
+        names: Names of all columns.
+        joints: Names of the coordinates.
+
+    Returns:
+        By quantity a pattern such as ``q{}``, or a list with a column for each joint.
+
+    Raises:
+        ConfigError: Time, positions or torques have no usual name, or several columns fit one joint.
+    """
+    times = [name for name in names if _plain(name) in _TIMES]
+    times += [name for name in names if _plain(name.rpartition("/")[2]) in _TIMES]
+    found: dict[str, str | list[str]] = {}
+    for key, words in _WORDS.items():
+        columns = _numbered(names, words, len(joints)) or match_joint_names(names, words, joints)
+        if columns is not None:
+            found[key] = columns
+    more = _more_joints(names, len(joints))
+    if more and not match_joint_names(names, _WORDS["position"], joints):
+        raise ConfigError(
+            f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}): is "
+            f"it of this robot? If it is: {_BY_HAND[0].lower()}{_BY_HAND[1:]}"
+        )
+    missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
+    if missing:
+        raise ConfigError(
+            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by "
+            f"any usual name among {', '.join(names[:30])}. {_remedy(names, joints)}"
+        )
+    return {"time": _time_of(times, found["position"]), **found}
+
+
+def joints_by_name(names: Sequence[str]) -> list[str]:
+    """Joints whose positions stand in columns of their names, such as ``/joint_states/position/elbow``."""
+    words = _WORDS["position"]
+    found: dict[str, None] = {}
+    for name in names:
+        parts = _segments(name)
+        others = [part for part in parts if part.lower() not in words]
+        before, _, last = name.rpartition("_")
+        if others and len(others) < len(parts):
+            found.setdefault(others[-1])
+        elif before and last.lower() in words:
+            found.setdefault(before)
+    return list(found)
+
+
+def _more_joints(names: Sequence[str], n: int) -> int:
+    """How many joints the numbered columns are of, if more than n; else zero."""
+    most = n
+    while all(_numbered(names, _WORDS[key], most + 1) is not None for key in _NEEDED):
+        most += 1
+    return most if most > n else 0
+
+
+def _remedy(names: Sequence[str], joints: Sequence[str]) -> str:
+    """What to do about joints without columns: to lock those after the ones that the log has, if it has any."""
+    by_hand = "Write sampling.log.columns by hand"
+    most = [_joints_counted(names, _WORDS[key], len(joints)) for key in _NEEDED]
+    if 0 < min(most) == max(most) < len(joints):
+        locks = " ".join(f"--lock {joint}=0" for joint in joints[most[0] :][:_MOST_JOINTS])
+        return f"The log has {most[0]} joints: if the others stood still, try {locks}. Or: {by_hand[0].lower()}{by_hand[1:]}."
+    return f"{by_hand}; joints that the log does not have are locked by init's --lock JOINT=VALUE."
+
+
+def _joints_counted(names: Sequence[str], words: Sequence[str], n: int) -> int:
+    """How many joints the numbered columns are of, n at most."""
+    return next((k for k in range(n, 0, -1) if _numbered(names, words, k) is not None), 0)
+
+
+def _time_of(times: Sequence[str], positions: str | list[str]) -> str:
+    """The time that stands with the positions: of the same topic or group."""
+    name = positions if isinstance(positions, str) else positions[0]
+    return max(times, key=lambda time: _alike(time, name))
+
+
+def _alike(one: str, other: str) -> int:
+    """Characters with which both begin."""
+    pairs = zip(one, other, strict=False)
+    return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
+
+
+def _plain(name: str) -> str:
+    return name.strip().strip("/").lower()
+
+
+def _numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
+    """A pattern where joints count from 1, a list where from 0; None if there are none."""
+    known = set(names)
+    stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
+    for stem in sorted(stems, key=lambda stem: (_rank(stem, words), stem)):
+        if _rank(stem, words) == _UNLIKE:
+            continue
+        for form in (f"{stem}{NUMBER}", f"{stem}[{NUMBER}]"):
+            if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
+                return form
+            listed = [form.replace(NUMBER, str(j)) for j in range(n)]
+            if all(name in known for name in listed):
+                return listed
+    return None
+
+
+_UNLIKE = 1000
+
+
+def _rank(stem: str, words: Sequence[str]) -> int:
+    """How likely a stem is one of the words: the earlier the word, the likelier; what was asked for comes last."""
+    word = _plain(re.split(r"[/.]", stem.rstrip("_./"))[-1])
+    for k, known in enumerate(words):
+        if word == known or (len(known) > 2 and word.endswith(f"_{known}")):
+            return k + len(words) * any(part in word for part in _WANTED_ONLY)
+    return _UNLIKE
+
+
+def match_joint_names(
+    names: Sequence[str], words: Sequence[str], joints: Sequence[str]
+) -> list[str] | None:
+    """Find the column of one quantity for each joint, by the names of the joints.
+
+    A joint's whole name between slashes or dots, or joined to the word by an underscore, counts
+    first; then a name that contains the joint's, such as ``robot1_elbow``. No column is used twice.
+
+    Args:
+        names: Names of all columns.
+        words: Usual names of the quantity, the likeliest first.
+        joints: Names of the coordinates.
+
+    Returns:
+        A column for each joint; None where a joint has none.
+
+    Raises:
+        ConfigError: Several columns fit one joint equally well.
+    """
+    exact = {joint: _likeliest(_exact(names, words, joint), words) for joint in joints}
+    taken = {name for found in exact.values() for name in found}
+    partial = {
+        joint: exact[joint] or _likeliest(_partial(names, words, joint, taken), words)
+        for joint in joints
+    }
+    if not all(partial.values()):
+        return None
+    _check_unambiguous(partial)
+    return [found[0] for found in partial.values()]
+
+
+def _check_unambiguous(found: Mapping[str, Sequence[str]]) -> None:
+    """Raise ConfigError where several columns fit a joint, or one column several joints."""
+    for joint, candidates in found.items():
+        rivals = [other for other in found if other != joint and found[other] == candidates]
+        if len(candidates) > 1:
+            raise ConfigError(
+                f"several columns may be of the joint {joint}: {', '.join(candidates[:_MOST_SHOWN])}. {_BY_HAND}"
+            )
+        if rivals:
+            raise ConfigError(
+                f"the column {candidates[0]} may be of the joints {joint} and {', '.join(rivals)}. {_BY_HAND}"
+            )
+
+
+def _exact(names: Sequence[str], words: Collection[str], joint: str) -> list[str]:
+    """Columns in which the whole name of a joint stands beside a word of the quantity."""
+    joined = {text for word in words for text in (f"{joint}_{word}", f"{word}_{joint}")}
+    found = []
+    for name in names:
+        segments = _segments(name)
+        others = {segment.lower().strip("_") for segment in segments if segment != joint}
+        whole = joint in segments and not others.isdisjoint(words)
+        if whole or any(segment in joined for segment in segments):
+            found.append(name)
+    return found
+
+
+def _partial(
+    names: Sequence[str], words: Collection[str], joint: str, taken: Collection[str]
+) -> list[str]:
+    """Columns in which a joint's name is part of a longer one, beside a word of the quantity."""
+    pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])")
+    found = []
+    for name in names:
+        if name in taken or not pattern.search(name):
+            continue
+        rest = [part.lower() for part in _segments(pattern.sub("", name))]
+        tokens = {token for part in rest for token in part.split("_") if len(token) > _SHORT}
+        if not (tokens | {part.strip("_") for part in rest}).isdisjoint(words):
+            found.append(name)
+    return found
+
+
+def _likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
+    """Keep the columns with the likeliest word; what was asked for counts where nothing was measured."""
+
+    def rank(name: str) -> int:
+        tokens = {part.lower() for part in re.split(r"[/._]", name)}
+        whole = {part.lower().strip("_") for part in _segments(name)} | tokens
+        first = min((k for k, word in enumerate(words) if word in whole), default=len(words))
+        return first + len(words) * (not tokens.isdisjoint(_WANTED_ONLY))
+
+    ranks = [rank(name) for name in found]
+    return [name for name, place in zip(found, ranks, strict=True) if place == min(ranks)]
+
+
+def _segments(name: str) -> list[str]:
+    return [part for part in re.split(r"[/.]", name) if part]

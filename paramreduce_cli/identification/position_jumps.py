@@ -1,0 +1,180 @@
+"""Jumps of recorded positions: rows that belong to no motion, and steps that stay."""
+
+import itertools
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy  # whose ndimage is loaded when it is used
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.identification.signals import Signals
+from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+
+_FASTER = 2.0
+"""Factor of the largest speed of a joint from which on a step counts as a jump."""
+_SMALL = 0.02
+"""Share of a joint's range below which a step is no jump."""
+_LONGEST = 0.25
+"""Longest duration of a run of bad rows, s."""
+_FEW_ROWS = 20
+"""Rows that such a run may have at any rate."""
+_MOST_BAD = 0.4
+"""Share of bad rows beyond which nothing tells the good rows from the bad ones."""
+_SPIKE, _WINDOW = 5, 15
+"""Samples of the median filters that recorded speeds, and positions, pass before their largest slope is taken."""
+_UNBROKEN = 2
+"""Edges of a recording without jumps."""
+_NAMED = 4
+"""Runs of rows that a message names."""
+
+
+@dataclass(frozen=True)
+class PositionJumps:
+    """Rows of a recording to be cut out, and where the recording is to be parted."""
+
+    bad: BoolArray
+    """Whether a row belongs to no motion of the robot, (n_rows,)."""
+    steps: IntArray
+    """Rows with which positions begin anew after a step that stays, (n_steps,)."""
+
+
+def find_position_jumps(found: Signals) -> PositionJumps:
+    """Find runs of bad rows, and steps of positions that stay.
+
+    The recording is followed from its longest stretch without jumps to both ends. What lies between two
+    stretches that the joints can reach from each other is bad; where no stretch within a quarter of a second can be
+    reached a step stays. A stretch between jumps that holds the same numbers throughout is bad, and so are rows with the
+    numbers of a bad row.
+
+    Args:
+        found: A recording with all of its rows.
+
+    Raises:
+        DataError: Too many rows are bad.
+    """
+    speed, slack = _largest_speeds(found), _SMALL * _ranges(found.z)
+    bad = np.zeros(found.time.size, bool)
+    edges = [0, *(_jumps(found, speed, slack) + 1).tolist(), found.time.size]
+    if len(edges) == _UNBROKEN:
+        return PositionJumps(bad, np.zeros(0, np.int64))
+    stretches = []
+    for a, b in itertools.pairwise(edges):
+        if b - a > 1 and _is_frozen(found, slice(a, b)):
+            bad[a:b] = True
+        else:
+            stretches.append((a, b))
+    if not stretches:
+        return PositionJumps(np.zeros_like(bad), np.zeros(0, np.int64))
+    longest = max(range(len(stretches)), key=lambda k: stretches[k][1] - stretches[k][0])
+
+    def reachable(one: int, other: int) -> bool:
+        """Whether the joints can move from a row to another, later or earlier one."""
+        most = slack + _FASTER * speed * abs(found.time[other] - found.time[one])
+        return bool(np.all(np.abs(found.z[other] - found.z[one]) <= most))
+
+    def soon(one: int, other: int) -> bool:
+        return abs(other - one) <= _FEW_ROWS or abs(found.time[other] - found.time[one]) <= _LONGEST
+
+    steps: list[int] = []
+    after = [(a, b - 1) for a, b in stretches[longest:]]
+    before = [(b - 1, a) for a, b in reversed(stretches[: longest + 1])]
+    for way in (after, before):
+        for last, first, skipped in _followed(way, reachable, soon):
+            for a, b in skipped:
+                bad[min(a, b) : max(a, b) + 1] = True
+            if not reachable(last, first):
+                steps.append(max(first, last))
+    bad |= _same_numbers(found, bad)
+    if np.mean(bad) > _MOST_BAD:
+        raise DataError(
+            f"positions jump in {np.count_nonzero(bad)} of {bad.size} rows, faster than the joints move otherwise. Bring "
+            "a recording of one publisher, or write sampling.log.outliers: keep."
+        )
+    return PositionJumps(bad, np.array(sorted(steps), dtype=np.int64))
+
+
+_Way = Sequence[tuple[int, int]]
+"""First and last row of stretches, in the order in which they are passed."""
+
+
+def _followed(
+    way: _Way, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
+) -> Iterator[tuple[int, int, _Way]]:
+    """Yield the row that is left, the one that is gone on with, and the stretches between them."""
+    last, k = way[0][1], 1
+    while k < len(way):
+        found = k
+        while found < len(way) and soon(last, way[found][0]) and not reachable(last, way[found][0]):
+            found += 1
+        if found == len(way) or not reachable(last, way[found][0]):
+            found = k
+        yield last, way[found][0], way[k:found]
+        last, k = way[found][1], found + 1
+
+
+def _jumps(found: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
+    """Rows after which a position goes farther than its joint can, (n_jumps,)."""
+    duration = np.diff(found.time)
+    jumps = np.zeros(duration.size, bool)
+    for j, column in enumerate(found.z.T):  # one after the other, as there may be gigabytes
+        jumps |= np.abs(np.diff(column)) > slack[j] + _FASTER * speed[j] * duration
+    return np.flatnonzero(jumps)
+
+
+def _is_frozen(found: Signals, rows: slice) -> bool:
+    """Whether all rows hold the same positions and torques."""
+    return bool(
+        np.all(np.ptp(found.z[rows], axis=0) == 0) and np.all(np.ptp(found.tau[rows], axis=0) == 0)
+    )
+
+
+def _largest_speeds(found: Signals) -> FloatArray:
+    """Largest speeds that joints keep for some samples, recorded or by their positions, (n_dof,)."""
+    speeds = []
+    for j in range(found.z.shape[1]):
+        smooth = scipy.ndimage.median_filter(found.z[:, j], _WINDOW, mode="nearest")
+        slopes = [np.gradient(smooth, found.time)]
+        if found.dz is not None:
+            slopes.append(found.dz[:, j])
+        speeds.append(
+            max(
+                np.abs(scipy.ndimage.median_filter(slope, _SPIKE, mode="nearest")).max()
+                for slope in slopes
+            )
+        )
+    return np.array(speeds)
+
+
+def _ranges(z: FloatArray) -> FloatArray:
+    """Ranges of positions without single rows far away, (n_dof,)."""
+    smooth = (scipy.ndimage.median_filter(column, _WINDOW, mode="nearest") for column in z.T)
+    return np.array([np.ptp(column) for column in smooth])
+
+
+def _same_numbers(found: Signals, bad: BoolArray) -> BoolArray:
+    """Whether rows hold the numbers that most rows with these numbers are bad by."""
+    if not bad.any():
+        return bad
+    parts = [part for part in (found.z, found.dz, found.ddz, found.tau) if part is not None]
+    rows = np.ascontiguousarray(np.column_stack(parts))
+    kinds = np.unique(rows.view(f"V{rows.itemsize * rows.shape[1]}").ravel(), return_inverse=True)[
+        1
+    ]
+    size, wrong = np.bincount(kinds), np.bincount(kinds, bad)
+    same: BoolArray = ((size > 1) & (2 * wrong >= size))[kinds]
+    return same
+
+
+def name_rows(rows: IntArray, first_line: int | None) -> str:
+    """Name runs of rows for a message, the first few of them.
+
+    Args:
+        rows: Numbers of rows from 0, in order, (n_rows,).
+        first_line: Line of the first row in its file, None where the file has no lines.
+    """
+    first = 1 if first_line is None else first_line
+    runs = np.split(rows + first, np.flatnonzero(np.diff(rows) > 1) + 1)
+    named = [f"{run[0]}" if run.size == 1 else f"{run[0]} to {run[-1]}" for run in runs[:_NAMED]]
+    more = f" and {len(runs) - _NAMED} more" if len(runs) > _NAMED else ""
+    return f"{'rows' if first_line is None else 'lines'} {', '.join(named)}{more}"

@@ -1,0 +1,50 @@
+"""Whole turns by which recorded angles jump where a sensor begins anew."""
+
+import numpy as np
+
+from paramreduce_cli.records import FloatArray, IntArray
+
+_OFF_A_TURN = 0.3
+"""Distance from a whole turn up to which a step counts as one, rad."""
+_BESIDE = 4
+"""Steps before and after a large one that say how fast the joint moves."""
+
+
+def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
+    """Add whole turns where positions jump by them, in place.
+
+    A step counts as a whole turn where the positions before and after it go on as if it were not there.
+
+    Args:
+        z: Positions, rad, (n_rows, n_dof).
+
+    Returns:
+        Number of such jumps by column, (n_dof,).
+    """
+    counts = [0] * z.shape[1]
+    turn = 2 * np.pi
+    for j, column in enumerate(z.T):
+        steps = np.diff(column)
+        large = np.flatnonzero(np.abs(steps) > np.pi)
+        if not large.size:
+            continue
+        usual = _usual_steps(steps, large)
+        turns = np.round((usual - steps[large]) / turn)
+        whole = np.abs(steps[large] + turns * turn - usual) < _OFF_A_TURN
+        turns[~whole] = 0
+        added = np.zeros(column.size)
+        added[large + 1] = turns * turn
+        column += np.cumsum(added)
+        counts[j] = int(np.count_nonzero(turns))
+    return tuple(counts)
+
+
+def _usual_steps(steps: FloatArray, large: IntArray) -> FloatArray:
+    """Median of the steps around large ones that are not large themselves, (n_large,); zero where there are none."""
+    small = np.abs(steps) <= np.pi
+    found = np.zeros(large.size)
+    for k, place in enumerate(large.tolist()):
+        around = slice(max(0, place - _BESIDE), place + _BESIDE + 1)
+        beside = steps[around][small[around]]
+        found[k] = np.median(beside) if beside.size else 0.0
+    return found
