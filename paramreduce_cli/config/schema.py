@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated, ClassVar, Literal, get_args
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
 from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.constraints import ConstraintSection
@@ -28,6 +28,7 @@ from paramreduce_cli.fields.section import (
     Section,
     Seed,
     Span,
+    as_words,
     per_joint,
 )
 from paramreduce_cli.records import (
@@ -387,8 +388,12 @@ class ReportSection(Section):
 
     title: str | None = None
     """Heading; the robot's name if left out."""
-    formats: Annotated[list[Literal["pdf", "svg", "png"]], Field(min_length=1)] = ["svg"]
-    """File formats of the figures. PDF figures have the width of a paper's column."""
+    formats: Annotated[
+        list[Literal["pdf", "svg", "png"]],
+        BeforeValidator(as_words, json_schema_input_type=list[Literal["pdf", "svg", "png"]] | str),
+        Field(min_length=1),
+    ] = ["svg"]
+    """File formats of the figures: pdf, svg, png, or a list of these. PDF figures have the width of a paper's column."""
     tracking: TrackingSection | None = None
     """Whether control with the exported models is demonstrated, for open trees."""
     poses: Annotated[list[PerJoint], Field(min_length=1)] | None = None

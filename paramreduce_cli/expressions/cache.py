@@ -44,7 +44,7 @@ def cache_folder() -> Path:
                 ParamreduceWarning,
                 stacklevel=2,
             )
-        return Path(_temporary_folder().name)
+        return temporary_folder()
     others = stat.S_IWGRP | stat.S_IWOTH
     if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & others):
         warnings.warn(
@@ -53,7 +53,15 @@ def cache_folder() -> Path:
             ParamreduceWarning,
             stacklevel=2,
         )
-        return Path(_temporary_folder().name)
+        return temporary_folder()
+    if not os.access(folder, os.W_OK | os.X_OK):
+        warnings.warn(
+            f"{folder} cannot be written, so compiled models are compiled in every run; name another folder in "
+            "PARAMREDUCE_CACHE",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+        return temporary_folder()
     return folder
 
 
@@ -77,6 +85,11 @@ def _wanted_folder() -> Path:
     if named:
         return Path(named)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
+
+
+def temporary_folder() -> Path:
+    """Return a folder that lasts as long as this process."""
+    return Path(_temporary_folder().name)
 
 
 @cache

@@ -21,7 +21,13 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.expressions.cache import cache_folder, keep, kept, machine_type
+from paramreduce_cli.expressions.cache import (
+    cache_folder,
+    keep,
+    kept,
+    machine_type,
+    temporary_folder,
+)
 from paramreduce_cli.records import FloatArray
 
 _FLAGS = ("-O2", "-fPIC", "-shared", "-fno-math-errno")
@@ -157,11 +163,18 @@ def load(text: str) -> ctypes.CDLL | None:
     digest = hashlib.sha256(
         "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version(), machine_type()]).encode()
     ).hexdigest()
-    library = cache_folder() / f"{digest[:32]}.so"
+    name, command = f"{digest[:32]}.so", [*cc, *_FLAGS]
     try:
-        if not kept(library):
-            _compile([*cc, *_FLAGS], text, library)
-        return ctypes.CDLL(str(library))
+        try:
+            return _library(command, text, cache_folder() / name)
+        except OSError as error:
+            warnings.warn(
+                f"{cache_folder()} cannot hold compiled models ({error.strerror or error}), so they are compiled in every "
+                "run; name another folder in PARAMREDUCE_CACHE",
+                ParamreduceWarning,
+                stacklevel=2,
+            )
+            return _library(command, text, temporary_folder() / name)
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)
         warnings.warn(
@@ -171,6 +184,18 @@ def load(text: str) -> ctypes.CDLL | None:
             stacklevel=2,
         )
         return None
+
+
+def _library(command: list[str], text: str, path: Path) -> ctypes.CDLL:
+    """Load a library, compiled first where it is not kept.
+
+    Raises:
+        OSError: Nothing can be written there, or run from there.
+        subprocess.CalledProcessError: The compiler fails.
+    """
+    if not kept(path):
+        _compile(command, text, path)
+    return ctypes.CDLL(str(path))
 
 
 def _c_text(function: ca.Function) -> str:

@@ -28,6 +28,11 @@ def as_list(value: Any) -> Any:
     return value if isinstance(value, list) else [value]
 
 
+def as_words(value: Any) -> Any:
+    """Split words that commas part into a list."""
+    return [word.strip() for word in value.split(",")] if isinstance(value, str) else value
+
+
 def as_pairs(value: Any) -> Any:
     """One pair for all joints, as a list of one."""
     if isinstance(value, list) and value and not isinstance(value[0], list):

@@ -206,8 +206,8 @@ def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> L
 def _say_late(name: str) -> None:
     """Of a search that might have found less."""
     warnings.warn(
-        f"terms.time_limit: it ended the search for the {name} dynamics; with more time it may have found fewer "
-        "operations",
+        f"terms.time_limit ended the search for the {name} dynamics; --set terms.time_limit=null searches to the end and "
+        "may find fewer operations",
         ParamreduceWarning,
         stacklevel=3,
     )

@@ -76,7 +76,7 @@ def report(
     """Draw the figures, set the tables and write the page and summary.json.
 
     Works on any samples.h5, also one that a user brings: without a model what is of a mechanism is
-    left out.
+    left out. Figures are SVG; --set report.formats=pdf,png draws others instead.
     """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
     from paramreduce_cli.report.page import render_page

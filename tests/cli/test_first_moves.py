@@ -284,6 +284,13 @@ def test_a_log_keeps_what_is_said(invoke, folder):
         assert any(line.rstrip() in kept for kept in lines)
 
 
+def test_doctor_says_that_the_cache_cannot_be_written(invoke, monkeypatch):
+    monkeypatch.setenv("PARAMREDUCE_CACHE", "/sys/kernel")
+    found = {one["what"]: one for one in json.loads(invoke("doctor", "--json").out)["findings"]}
+    assert found["cache of compiled models"]["state"] == "slow"
+    assert "/sys/kernel cannot " in found["cache of compiled models"]["found"]
+
+
 def test_doctor_names_what_is_missing(invoke, monkeypatch):
     found = {one["what"]: one for one in json.loads(invoke("doctor", "--json").out)["findings"]}
     assert found["linear algebra"]["state"] == "ok"

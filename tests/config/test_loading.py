@@ -219,3 +219,9 @@ def test_nothing_in_a_config_raises_anything_but_a_config_error(write_config, ke
     path = write_config()
     with contextlib.suppress(ConfigError):
         assert load_config(path, [f"{key}={json.dumps(value)}"]).robot
+
+
+@pytest.mark.parametrize("listed", ["pdf,png", "[pdf, png]", "pdf, png"])
+def test_words_may_be_listed_with_commas(listed):
+    config = config_of("two_link", f"report.formats={listed}")
+    assert config.report.formats == ["pdf", "png"]

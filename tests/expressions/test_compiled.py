@@ -1,3 +1,4 @@
+import errno
 import os
 import warnings
 
@@ -45,6 +46,29 @@ def test_a_cache_that_is_named_but_cannot_be_is_said(monkeypatch, tmp_path):
     monkeypatch.setenv("PARAMREDUCE_CACHE", str(tmp_path / "file" / "cache"))
     with pytest.warns(ParamreduceWarning, match="PARAMREDUCE_CACHE cannot be used"):
         assert compiled.cache_folder().is_dir()
+
+
+def test_a_cache_that_can_be_read_alone_is_said_and_models_are_compiled_all_the_same(monkeypatch):
+    if compiled.compiler() is None:
+        pytest.skip("there is no C compiler")
+    monkeypatch.setenv("PARAMREDUCE_CACHE", "/sys/kernel")  # whatever the user's rights
+    with pytest.warns(ParamreduceWarning, match="/sys/kernel cannot (be written|hold)") as said:
+        check(example())
+    assert not any("compiler" in str(one.message) for one in said)
+
+
+def test_a_cache_that_cannot_hold_models_is_no_fault_of_the_compiler(monkeypatch):
+    if compiled.compiler() is None:
+        pytest.skip("there is no C compiler")
+
+    def full(built, library):
+        if library.parent == compiled.cache_folder():
+            raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(compiled, "keep", full)
+    with pytest.warns(ParamreduceWarning, match="cannot hold compiled models .No space left"):
+        library = compiled.load("int one(void) { return 1; }")
+    assert library is None or library.one() == 1
 
 
 def test_machines_of_two_kinds_share_a_folder(monkeypatch):

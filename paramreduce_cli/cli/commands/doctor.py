@@ -1,5 +1,6 @@
 """The command that says what this machine has."""
 
+import importlib
 import importlib.metadata
 import os
 import platform
@@ -22,8 +23,13 @@ from paramreduce_cli.cli.options import cores
 from paramreduce_cli.cli.terminal import JSON, emit, say_table
 from paramreduce_cli.errors import ParamreduceError
 
-_EXTRAS = {"identify": "cvxpy", "pandas": "pandas", "mjcf": "mujoco", "rosbag": "rosbags", "parquet": "pyarrow", "sweep": "snakemake"}  # fmt: skip
-"""A distribution that each extra brings."""
+_EXTRAS = {
+    "identify": ("cvxpy", "clarabel"), "pandas": ("pandas",), "mjcf": ("mujoco",), "rosbag": ("rosbags",),
+    "parquet": ("pyarrow",), "sweep": ("snakemake",),
+}  # fmt: skip
+"""Packages that each extra brings, under the names that they are imported by."""
+_WIDTHS = (24, 6, None)
+"""Columns of the table."""
 _SHOWN = {"ok": "[green]ok[/]", "slow": "[yellow]slower[/]", "none": "-", "wrong": "[red]wrong[/]"}
 WRONG = 1
 
@@ -37,14 +43,17 @@ def doctor(as_json: bool) -> int:
 
     Exit code 1 if something is missing that everything needs.
     """
-    findings = list(_findings())
+    findings = []
+    for what, state, found in _findings():
+        findings.append((what, state, found))
+        if not as_json:  # row by row, as some take seconds
+            table = rich.table.Table(box=None, pad_edge=False, show_header=False)
+            for width in _WIDTHS:
+                table.add_column(width=width)
+            table.add_row(what, _SHOWN[state], rich.markup.escape(found))
+            say_table(table)
     if as_json:
         emit(findings=[dict(zip(("what", "state", "found"), one, strict=True)) for one in findings])
-    else:
-        table = rich.table.Table(box=None, pad_edge=False, show_header=False)
-        for what, state, found in findings:
-            table.add_row(what, _SHOWN[state], rich.markup.escape(found))
-        say_table(table)
     return WRONG if any(state == "wrong" for _, state, _ in findings) else 0
 
 
@@ -59,10 +68,23 @@ def _findings() -> Iterator[tuple[str, str, str]]:
     threads = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
     yield "threads", "ok", ", ".join(f"{k}={v}" for k, v in threads.items() if v)
     yield _algebra()
-    for extra, name in _EXTRAS.items():
-        found = _version(name)
-        how = f"pip install 'paramreduce[{extra}]' brings {name}"
-        yield f"extra {extra}", "ok" if found else "none", f"{name} {found}" if found else how
+    for extra, names in _EXTRAS.items():
+        yield _extra(extra, names)
+
+
+def _extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
+    """Look whether the packages of an extra are there and can be imported."""
+    versions = [_version(name) for name in names]
+    if None in versions:
+        text = f"pip install 'paramreduce[{extra}]' brings {' and '.join(names)}"
+        return f"extra {extra}", "none", text
+    try:
+        for name in names:
+            importlib.import_module(name)
+    except Exception as error:  # whatever is broken in it
+        return f"extra {extra}", "wrong", f"{', '.join(names)} cannot be imported: {error}"
+    listed = (f"{name} {version}" for name, version in zip(names, versions, strict=True))
+    return f"extra {extra}", "ok", ", ".join(listed)
 
 
 def _compiler() -> tuple[str, str, str]:
@@ -91,18 +113,7 @@ def _compiler() -> tuple[str, str, str]:
 
 
 def _caches() -> Iterator[tuple[str, str, str]]:
-    from paramreduce_cli.expressions.cache import cache_folder
-
-    try:
-        folder = cache_folder()
-    except (ParamreduceError, OSError) as error:
-        yield "cache of compiled models", "wrong", str(error)
-    else:
-        files = list(folder.glob("*.so"))
-        size = sum(file.stat().st_size for file in files) / 1e6
-        free = shutil.disk_usage(folder).free / 1e9
-        text = f"{folder}: {len(files)} models, {size:.1f} MB; {free:.1f} GB are free"
-        yield "cache of compiled models", "ok", text
+    yield _model_cache()
     package = Path(__file__).parents[2]
     place = os.environ.get("NUMBA_CACHE_DIR")
     writable = place is not None or os.access(package, os.W_OK)
@@ -111,6 +122,27 @@ def _caches() -> Iterator[tuple[str, str, str]]:
         or f"beside the package{'' if writable else ', which cannot be written: set NUMBA_CACHE_DIR'}"
     )
     yield "cache of Numba", "ok" if writable else "slow", text
+
+
+def _model_cache() -> tuple[str, str, str]:
+    """Compile a small library, keep it in the cache and load it from there."""
+    from paramreduce_cli.expressions.cache import cache_folder
+    from paramreduce_cli.expressions.compiled import load
+
+    what = "cache of compiled models"
+    with warnings.catch_warnings(record=True) as said:
+        warnings.simplefilter("always")
+        try:
+            folder = cache_folder()
+            load("int paramreduce_doctor(void) { return 1; }\n")
+        except (ParamreduceError, OSError) as error:
+            return what, "wrong", str(error)
+    if said:
+        return what, "slow", str(said[-1].message)
+    files = list(folder.glob("*.so"))
+    size = sum(file.stat().st_size for file in files) / 1e6
+    free = shutil.disk_usage(folder).free / 1e9
+    return what, "ok", f"{folder}: {len(files)} models, {size:.1f} MB; {free:.1f} GB are free"
 
 
 def _loops() -> tuple[str, str, str]:
