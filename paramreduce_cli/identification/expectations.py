@@ -17,6 +17,8 @@ _OTHER_UNIT = 3.0
 """Factor beyond which that is no error of the parameters."""
 _FAR_LESS = 0.5
 """What squared residuals fall to once gravity is along the axis that it has, or a joint counts as it does."""
+_LESS_WITHOUT = 0.8
+"""The same without gravity, which nothing but its absence can bring: the model has no column more."""
 _TOO_LARGE, _TOO_SMALL = 3.0, 0.01
 """Largest torques over the nominal ones that make another unit likely."""
 _NEAR = 0.1
@@ -110,7 +112,7 @@ def _left(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
 def doubted_gravity(
     W: FloatArray, pulls: FloatArray, tau: FloatArray, deviation: FloatArray, gravity: FloatArray
 ) -> list[str]:
-    """A sentence where another axis of the base fits far better as that of gravity.
+    """Say where the residuals are far smaller with gravity along another axis of the base, or without gravity.
 
     Args:
         W: Observation matrix with the gravity of the config, (n_samples, n_dof, n).
@@ -121,21 +123,25 @@ def doubted_gravity(
     """
     size = float(np.linalg.norm(gravity))
 
-    def left(direction: FloatArray) -> float:
-        added = np.tensordot(size * direction - gravity, pulls, axes=1)
+    def left(assumed: FloatArray) -> float:
+        added = np.tensordot(assumed - gravity, pulls, axes=1)
         return _left(W + added, tau, deviation)
 
     if size == 0:
         return []
     others = [
-        (sign * axis, f"{'-' if sign < 0 else ''}{name}")
+        (sign * size * axis, f"along {'-' if sign < 0 else ''}{name} of the base")
         for axis, name in zip(np.eye(3), "xyz", strict=True)
         for sign in (1, -1)
-        if np.linalg.norm(size * sign * axis - gravity) > _NEAR * size
+        if np.linalg.norm(sign * size * axis - gravity) > _NEAR * size
     ]
-    least, name = min(((left(direction), name) for direction, name in others))
-    if least > _FAR_LESS * left(gravity / size):
+    least, where = min((left(assumed), where) for assumed, where in others)
+    without, usual = left(np.zeros(3)), left(gravity)
+    if without < min(least, _LESS_WITHOUT * usual):
+        return [
+            "Without gravity the residuals are smaller: has the controller taken gravity out of the recorded torques "
+            "already? If so, set description.gravity to [0, 0, 0]."
+        ]
+    if least > _FAR_LESS * usual:
         return []
-    return [
-        f"With gravity along {name} of the base the residuals are far smaller: is description.gravity right?"
-    ]
+    return [f"With gravity {where} the residuals are far smaller: is description.gravity right?"]

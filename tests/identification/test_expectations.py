@@ -35,7 +35,7 @@ def torques(gravity, seed):
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize(
     ("gravity", "said"),
-    [((0, 0, -9.81), None), ((0, -9.81, 0), "-y"), ((9.81, 0, 0), "along x"), ((0, 0, 9.81), "along z")],
+    [((0, 0, -9.81), None), ((0, 0, 0), "Without gravity"), ((0, -9.81, 0), "-y"), ((9.81, 0, 0), "along x"), ((0, 0, 9.81), "along z")],
 )  # fmt: skip
 def test_the_axis_of_gravity_is_found(gravity, said, seed):
     W, pulls, tau, noise = torques(gravity, seed)
