@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.identification.processing import UNUSED
 from paramreduce_cli.identification.samples import LoggedSet
-from paramreduce_cli.multibody.base_parameters import base_parameters
+from paramreduce_cli.multibody.base_parameters import affecting_parameters, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.random_states import random_states
@@ -45,7 +45,10 @@ def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQ
     dynamics = Dynamics(mechanism, once=True)
     states = random_states(mechanism, _STATES, np.random.default_rng(0))
     K = dynamics.regressor(*states)[:, measured]
-    base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE)
+    affects = affecting_parameters(mechanism, K)
+    base = base_parameters(
+        K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE, affects
+    )
     factors = LoggedSet(log.training, log, dynamics, "training part").factors()
     scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, np.inf)

@@ -9,29 +9,74 @@ import scipy.linalg
 
 from paramreduce_cli.errors import Concern, ConcernError
 from paramreduce_cli.multibody.orthogonal import independent_columns
-from paramreduce_cli.records import BaseParameters, BoolArray, FloatArray, IntArray
+from paramreduce_cli.records import (
+    INERTIAL,
+    BaseParameters,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Kind,
+    Mechanism,
+)
 
 _AFFECTING_TOLERANCE = 1e-11
 """Against the largest column: round-off leaves 1e-15 in columns that cancel exactly."""
 
 _NUMERICALLY_ZERO = 1e-10
+_LENGTHS = {Kind.M: 2, Kind.MX: 1, Kind.MY: 1, Kind.MZ: 1}
+"""Powers of a length in the effect of a parameter on a moment."""
+_OF_A_STATE = (Kind.ROTOR, Kind.VISCOUS, Kind.STIFFNESS)
+"""Parameters of drives whose force grows with the motion of the drive."""
 
 
 def affecting_columns(W: FloatArray) -> BoolArray:
-    """Columns that are not zero to rounding, (n,)."""
+    """Find the columns that are not zero to rounding beside the longest one, (n,)."""
     norms = np.linalg.norm(W, axis=0)
     largest = norms.max(initial=0.0)
     result: BoolArray = norms > _AFFECTING_TOLERANCE * largest
     return result
 
 
-def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> BaseParameters:
+def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
+    """Find the parameters whose effect on some joint is not zero to rounding.
+
+    Effects are compared joint by joint, and in units in which the mechanism has the size one: so neither the
+    size of the robot, nor a column of another unit, nor a joint with far larger torques hides an effect.
+
+    Args:
+        mechanism: The robot.
+        K: Regressors of random states whose speeds and accelerations are about one, (n_states, n_dof, n).
+
+    Returns:
+        Whether each parameter has an effect, (n,).
+    """
+    norms = np.linalg.norm(K, axis=0)
+    kinds = [parameter.kind for parameter in mechanism.parameters]
+    scale = np.ones_like(norms)
+    inertial = np.array([kind in INERTIAL for kind in kinds], dtype=bool)
+    if inertial.any():
+        size = mechanism.size
+        units = np.array([size ** _LENGTHS.get(kind, 0) for kind in kinds])[inertial]
+        largest = np.max(norms[:, inertial] / units, axis=1, keepdims=True)
+        scale[:, inertial] = largest * units
+    for drive in mechanism.drives:
+        weight = float(np.abs(drive.weights).max())
+        for kind, column in mechanism.drive_columns(drive).items():
+            forces = weight if kind in _OF_A_STATE else 1.0
+            scale[:, column] = np.sqrt(len(K)) * weight * forces
+    return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0) & (norms.max(axis=0) > 0)
+
+
+def base_parameters(
+    W: FloatArray, preference: IntArray, tolerance: float, affects: BoolArray | None = None
+) -> BaseParameters:
     """Choose independent columns greedily and express the others in them.
 
     Args:
         W: Observation matrix of random states, (n_rows, n).
         preference: All column indices, the most wanted first.
         tolerance: Singular values below this share of the largest one count as zero.
+        affects: Whether each column has an effect, (n,); decided beside the longest column if left out.
 
     Returns:
         Columns in the order of preference in which they were taken, and beta.
@@ -40,7 +85,8 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
         ConcernError: The greedy choice and the singular values disagree, so that no rank can
             be told.
     """
-    affecting = np.flatnonzero(affecting_columns(W))
+    affects = affecting_columns(W) if affects is None else affects
+    affecting = np.flatnonzero(affects)
     norms = np.linalg.norm(W[:, affecting], axis=0)
     scaled = W[:, affecting] / norms
     singular = np.linalg.svd(scaled, compute_uv=False)
@@ -57,22 +103,23 @@ def base_parameters(W: FloatArray, preference: IntArray, tolerance: float) -> Ba
             Concern.RANK,
         )
     columns = np.array(taken, dtype=np.int64)
-    return BaseParameters(columns, regrouping(W, columns), singular, gap)
+    return BaseParameters(columns, regrouping(W, columns, affects), singular, gap)
 
 
-def regrouping(W: FloatArray, columns: IntArray) -> FloatArray:
+def regrouping(W: FloatArray, columns: IntArray, affects: BoolArray) -> FloatArray:
     """Express all other columns in the independent ones, W_others = W_columns beta.
 
     Args:
         W: Observation matrix, (n_rows, n).
         columns: Independent columns, (r,).
+        affects: Whether each column has an effect, (n,).
 
     Returns:
         beta, (r, n - r); the others in ascending order, columns without effect as zeros.
     """
     others = np.setdiff1d(np.arange(W.shape[1]), columns)
     beta = np.zeros((columns.size, others.size))
-    live = affecting_columns(W)[others]
+    live = affects[others]
     if not live.any() or columns.size == 0:
         return beta
     own = np.linalg.norm(W[:, columns], axis=0)

@@ -229,6 +229,15 @@ class Mechanism:
         return preference_order([parameter.preference for parameter in self.parameters])
 
     @property
+    def size(self) -> float:
+        """Sum of all distances between joints, bodies and payloads, m; one if there are none."""
+        frames = [
+            frame for body in self.bodies for frame in (body.parent_to_joint, body.joint_to_body)
+        ]
+        frames += [payload.frame for payload in self.payloads]
+        return float(sum(np.linalg.norm(frame[:3, 3]) for frame in frames)) or 1.0
+
+    @property
     def symbols(self) -> dict[str, str]:
         """Formulas of parameters and lengths by their names."""
         items: tuple[Parameter | Length, ...] = (*self.parameters, *self.lengths)

@@ -8,12 +8,24 @@ from paramreduce_cli.config.schema import ModelSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.formulations import formulations
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters, regrouping
+from paramreduce_cli.multibody.base_parameters import (
+    affecting_parameters,
+    base_parameters,
+    regrouping,
+)
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.multibody.relations import regrouping_expressions
-from paramreduce_cli.records import BaseParameters, FloatArray, IntArray, Mechanism, Model, Run
+from paramreduce_cli.records import (
+    BaseParameters,
+    BoolArray,
+    FloatArray,
+    IntArray,
+    Mechanism,
+    Model,
+    Run,
+)
 from paramreduce_cli.robots import Robot
 
 _STATES = 300
@@ -47,16 +59,16 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
             "nominal_torque in the config, in N m (N for a prismatic joint).",
             ("nominal_torque",),
         )
-    base = base_parameters(W, _preference(model, mechanism), model.rank_tolerance)
+    affects = affecting_parameters(mechanism, K[:, measured])
+    base = base_parameters(W, _preference(model, mechanism), model.rank_tolerance, affects)
     _check_named(model, mechanism, base)
-    texts = _expressions(robot, mechanism, base, states, rng)
-    affecting = affecting_columns(W)
-    lean = formulations(mechanism, affecting, base.columns, run)
-    check_formulations(mechanism, lean, np.flatnonzero(affecting), states, rng)
+    texts = _expressions(robot, mechanism, base, affects, states, rng)
+    lean = formulations(mechanism, affects, base.columns, run)
+    check_formulations(mechanism, lean, np.flatnonzero(affects), states, rng)
     return Model(
         mechanism=mechanism,
         values=values,
-        affecting=affecting,
+        affecting=affects,
         base=dataclasses.replace(base, expressions=tuple(texts)),
         nominal_torque=nominal,
         nominal_torque_given=given is not None,
@@ -80,6 +92,7 @@ def _expressions(
     robot: Robot,
     mechanism: Mechanism,
     base: BaseParameters,
+    affects: BoolArray,
     states: States,
     rng: np.random.Generator,
 ) -> list[str]:
@@ -91,7 +104,7 @@ def _expressions(
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
         changed = robot.stretched(lambda length: length * rng.uniform(0.8, 1.25)).mechanism()
         K = Dynamics(changed, once=True).regressor(*states)[:, robot.measured()]
-        betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns))
+        betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns, affects))
         geometries.append(changed)
     lengths = [{length.name: length.value for length in entry.lengths} for entry in geometries]
     return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
