@@ -5,13 +5,14 @@ from typing import Any
 
 import numpy as np
 
+from paramreduce_cli.export.term_sizes import entry_sizes
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.checking import TOLERANCE, refuse_if_off
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.records import FloatArray, Mechanism, ReducedModel, TermModel
+from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
 
 _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
@@ -102,14 +103,18 @@ def _simplified(
 
 
 def check(
-    functions: tuple[Function, ...], stored: Mapping[str, FloatArray], tolerance: float = TOLERANCE
+    functions: tuple[Function, ...],
+    stored: Mapping[str, FloatArray],
+    least: Mapping[str, float],
+    tolerance: float = TOLERANCE,
 ) -> None:
-    """Compare functions with stored results.
+    """Compare functions with stored results, joint by joint.
 
     Args:
         functions: To be checked.
         stored: Their arguments and expected results, (n_states, ...) by name.
-        tolerance: Of the largest value of each result.
+        least: Smallest sizes that results are judged by, by name.
+        tolerance: Share of the size of each result that is allowed.
 
     Raises:
         FormulationError: They are not the same.
@@ -117,11 +122,31 @@ def check(
     for function in functions:
         for name, got in _evaluated(function, stored).items():
             wanted = stored[name].reshape(got.shape)
-            refuse_if_off(f"{function.name}: {name}", got - wanted, wanted, tolerance)
+            sizes = entry_sizes(name, wanted, least[name])
+            refuse_if_off(f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance)
+
+
+def check_against_mechanism(
+    model: Model, stored: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> None:
+    """Compare the torques of a model without any reduction with those of all parameters of the robot.
+
+    Args:
+        model: The robot.
+        stored: States and the torques of the exported model, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+
+    Raises:
+        FormulationError: A parameter that was taken for one without effect has one.
+    """
+    plain = Dynamics(model.mechanism, once=True)
+    wanted = plain.inverse(stored["q"], stored["dq"], stored["ddq"], model.values)
+    off = (stored["tau"] - wanted) / entry_sizes("tau", wanted, least["tau"])
+    refuse_if_off("the full model", off, np.ones(1))
 
 
 def single_precision_errors(
-    functions: tuple[Function, ...], stored: Mapping[str, FloatArray]
+    functions: tuple[Function, ...], stored: Mapping[str, FloatArray], least: Mapping[str, float]
 ) -> dict[str, float]:
     """What single precision costs: the largest error of each result, a share of its largest value.
 
@@ -130,28 +155,43 @@ def single_precision_errors(
     Args:
         functions: With their arguments and results.
         stored: Arguments and exact results, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
     """
     rounded: dict[str, Any] = {name: values.astype(np.float32) for name, values in stored.items()}
     return {
         name: float(
-            np.abs(got - stored[name].reshape(got.shape)).max() / np.abs(stored[name]).max()
+            np.abs(got - stored[name].reshape(got.shape)).max()
+            / max(np.abs(stored[name]).max(), least[name])
         )
         for function in functions
         for name, got in _evaluated(function, rounded).items()
-        if stored[name].any()
     }
 
 
-def check_closures(closures: tuple[Function, ...], stored: Mapping[str, FloatArray]) -> None:
-    """The loops are closed, and their derivatives are those of R and b."""
+def check_closures(
+    closures: tuple[Function, ...], stored: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> None:
+    """Check that the loops are closed, and that their derivatives are those of R and b.
+
+    Args:
+        closures: Functions of the closures.
+        stored: States of closed loops with R and b, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+
+    Raises:
+        FormulationError: They are not.
+    """
     values: dict[str, FloatArray] = {}
     for function in closures:
         values |= _evaluated(function, stored)
-    refuse_if_off("closure", values["Phi"], stored["q"], TOLERANCE)
     along = values["Phi_d"] @ stored["R"]
-    refuse_if_off("closure_jacobian", along + values["Phi_z"], along, TOLERANCE)
     drift = np.einsum("kij,kj->ki", values["Phi_d"], stored["b"])
-    refuse_if_off("closure_bias", drift - values["gamma"], drift, TOLERANCE)
+    for what, off, name, against in (
+        ("closure", values["Phi"], "Phi", stored["q"]),
+        ("closure_jacobian", along + values["Phi_z"], "Phi_z", along),
+        ("closure_bias", drift - values["gamma"], "gamma", drift),
+    ):
+        refuse_if_off(what, off / entry_sizes(name, against, least[name]), np.ones(1))
 
 
 def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str, FloatArray]:

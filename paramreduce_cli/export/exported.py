@@ -49,6 +49,9 @@ class ExportedModel:
     cases: Mapping[str, FloatArray]
     """Arguments and results by the straightforward model for the self-test, (n_cases, ...); what has
     the name of an argument is handed in, what has that of a result is compared."""
+    least: Mapping[str, float]
+    """Smallest sizes that results are judged by in the self-test, by their names: results that are zero but for rounding
+    have no size of their own."""
 
     @property
     def dependent(self) -> tuple[int, ...]:

@@ -10,12 +10,14 @@ from paramreduce_cli import __version__
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.check import (
     check,
+    check_against_mechanism,
     check_closures,
     doubtful_mass_matrices,
     random_cases,
     single_precision_errors,
 )
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
+from paramreduce_cli.export.term_sizes import term_sizes
 from paramreduce_cli.export.validity import validity, within
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
@@ -98,9 +100,13 @@ def exported_model(
     tell(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
     checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
-    check(functions, checked)
+    least = term_sizes(mechanism, chosen, checked)
+    check(functions, checked, least)
+    whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
+    if whole and simplified is None:
+        check_against_mechanism(model, checked, least)
     if closures:
-        check_closures(closures, checked)
+        check_closures(closures, checked, least)
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
     if simplified is None and "direct" in _FUNCTIONS[what]:
@@ -109,7 +115,7 @@ def exported_model(
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     worth = _worth(model, unsafe, simplified, validation)
     if single:
-        worth.append(_rounding(functions, checked))
+        worth.append(_rounding(functions, checked, least))
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
@@ -129,6 +135,7 @@ def exported_model(
         closures=closures,
         single=single,
         cases={name: values for name, values in stored.items() if name in used},
+        least=least,
     )
 
 
@@ -157,9 +164,11 @@ def _made(mechanism: Mechanism, origin: str) -> tuple[str, str]:
     )
 
 
-def _rounding(functions: tuple[Function, ...], checked: Mapping[str, FloatArray]) -> str:
+def _rounding(
+    functions: tuple[Function, ...], checked: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> str:
     """What single precision costs, on the states that the functions are checked on."""
-    errors = single_precision_errors(functions, checked)
+    errors = single_precision_errors(functions, checked, least)
     listed = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
     return f"Single precision, on {_CHECKED} random states off by about (of the largest): {listed}."
 

@@ -94,6 +94,7 @@ class _Writer:
             "angles": any(_dependence(f).angles for f in (*model.functions, *model.closures)),
             "sines": self.sines(),
             "cases": self.cases(),
+            "least": {name: self.number(size) for name, size in self._model.least.items()},
             "n_cases": (n_cases := len(next(iter(model.cases.values())))),
             "n_states": n_cases * (BLOCK // n_cases + 1),
             "tolerance": "1e-3f" if model.single else "1e-12",

@@ -85,7 +85,7 @@ def _test(model: ExportedModel) -> str:
 
     def checks(what: str, results: list[str]) -> str:
         return "\n".join(
-            f"  failures = failures + differs('{what}, {r}', {r}, {one(r)}, cases.{r});"
+            f"  failures = failures + differs('{what}, {r}', {r}, {one(r)}, cases.{r}, {model.least[r]!r});"
             for r in results
         )
 

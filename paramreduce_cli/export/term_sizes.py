@@ -1,0 +1,80 @@
+"""Sizes of the terms that results are sums of, against which differences of results are judged.
+
+Results may be zero but for rounding: the torque of gravity about a vertical axis, the bias of a parallelogram. Beside
+their own values every difference would then be large.
+"""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from paramreduce_cli.records import INERTIAL, FloatArray, Kind, Mechanism, ReducedModel
+
+_SHARE = 1e-3
+"""Share of the bound of all terms that a result is taken for at least; bounds are far from being reached."""
+_SMALLEST = 1e-300
+
+
+def term_sizes(
+    mechanism: Mechanism, model: ReducedModel, stored: Mapping[str, FloatArray]
+) -> dict[str, float]:
+    """Estimate the smallest size that each result is judged by.
+
+    Args:
+        mechanism: The robot.
+        model: The model that is exported.
+        stored: Arguments and results for some states, (n_states, ...) by name.
+
+    Returns:
+        A size in the unit of each result, by its name.
+    """
+    turn = float(np.abs(stored["dq"]).sum(axis=1).max())
+    change = float(np.abs(stored["ddq"]).sum(axis=1).max()) + turn**2
+    reach = mechanism.size + float(np.abs(stored["q"]).max())
+    tangent = max(1.0, float(np.abs(stored["R"]).max())) if "R" in stored else 1.0
+    fall = float(np.linalg.norm(mechanism.gravity)) + reach * change
+    moments = _by_kind(mechanism, reach * fall, fall, change) * tangent
+    inertias = _by_kind(mechanism, reach**2, reach, 1.0) * tangent**2
+    values = np.abs(model.standard)
+    kept = moments[model.kept]
+    sizes = {
+        "tau": float(moments @ values),
+        "delta": float(moments @ values),
+        "M": float(inertias @ values),
+        "K": float(kept[kept > 0].min()) if kept.any() else 0.0,
+        "gamma": reach * turn**2,
+        "Phi": reach,
+        "Phi_z": reach,
+        "Phi_d": reach,
+    }
+    least = {name: max(_SHARE * sizes.get(name, 1.0), _SMALLEST) for name in {*stored, *sizes}}
+    # The bias b is added to the accelerations that the independent coordinates bring.
+    return {**least, "b": max(float(np.abs(stored["ddq"]).max()), _SMALLEST)}
+
+
+def _by_kind(mechanism: Mechanism, mass: float, moment: float, inertia: float) -> FloatArray:
+    """Assign a value to each inertial parameter by its kind, zero to those of drives, (n_parameters,)."""
+    values = dict.fromkeys(INERTIAL, inertia)
+    values |= {Kind.M: mass, Kind.MX: moment, Kind.MY: moment, Kind.MZ: moment}
+    return np.array([values.get(parameter.kind, 0.0) for parameter in mechanism.parameters])
+
+
+def entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArray:
+    """Size by which each entry of a result is judged: of its joint, of all states.
+
+    Args:
+        name: Name of the result.
+        expected: Its values, (n_states, ...).
+        least: Its smallest size.
+
+    Returns:
+        An array that broadcasts to one state of the result.
+    """
+    if name in ("tau", "delta"):
+        return np.maximum(np.abs(expected).max(axis=0), least)
+    if name == "M":
+        diagonal = np.sqrt(np.abs(np.diagonal(expected, axis1=1, axis2=2)).max(axis=0))
+        return np.maximum(np.outer(diagonal, diagonal), least)
+    if name == "K":
+        return np.maximum(np.abs(expected).max(axis=(0, 1)), least)
+    return np.array(max(float(np.abs(expected).max(initial=0.0)), least))
