@@ -17,12 +17,14 @@ from paramreduce_cli.errors import Concern, ConcernError, ParamreduceWarning
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.closures import closure_equations, equation_owners
 from paramreduce_cli.multibody.orthogonal import independent_columns
-from paramreduce_cli.records import BASE, FloatArray, Loops, Mechanism
+from paramreduce_cli.records import BASE, FloatArray, IntArray, Loops, Mechanism
 
 _ASSEMBLED = 1e-9
 """Largest gap of an assembled loop, m."""
 _RANK = 1e-7
 """Share of its length that must be left of a row or column that counts as independent."""
+_ROUNDING = 1e-9
+"""Share of the longest row of the Jacobian below which a row is zero to rounding."""
 _MOVES = 8
 _MOVE = 0.05
 """Length of a random move, rad or m."""
@@ -136,9 +138,15 @@ def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:
 
 
 def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
-    """The Jacobian of the largest rank, and its rows that do not depend on those before them."""
-    found = ((J, independent_columns(J.T, np.arange(len(J)), _RANK)) for J in jacobians)
+    """Choose the Jacobian of the largest rank, and its rows that do not depend on those before them."""
+    found = ((J, independent_columns(J.T, _rows_beyond_rounding(J), _RANK)) for J in jacobians)
     return max(found, key=lambda pair: len(pair[1]))
+
+
+def _rows_beyond_rounding(jacobian: FloatArray) -> IntArray:
+    """Find the rows that are not zero to rounding, which every row of a unit length of its own would hide."""
+    lengths = np.linalg.norm(jacobian, axis=1)
+    return np.flatnonzero(lengths > _ROUNDING * lengths.max(initial=0.0))
 
 
 def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:

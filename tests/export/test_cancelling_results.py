@@ -1,0 +1,86 @@
+"""Exported code of mechanisms some of whose results are zero but for rounding passes its self-tests."""
+
+import shutil
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from loop_texts import PARALLELOGRAM, TURNTABLE, loaded
+
+from paramreduce_cli.errors import FormulationError
+from paramreduce_cli.export.check import check
+from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.term_sizes import entry_sizes, term_sizes
+from paramreduce_cli.export.writing import (
+    Exported,
+    exported_functions,
+    exported_model,
+    random_cases,
+)
+from paramreduce_cli.records import Run
+from paramreduce_cli.stages.build_model import build_model
+
+
+def built(folder, text, **values):
+    config = loaded(folder, text, **values)
+    return build_model(config, config.model, Run())
+
+
+def parallelogram(folder, kind="revolute", long=0.6, short=0.15):
+    return built(folder, PARALLELOGRAM, kind=kind, long=long, short=short)
+
+
+def turntable(folder, tilt=0.3):
+    axis = [0.0, float(np.sin(tilt)), float(np.cos(tilt))]
+    return built(folder, TURNTABLE, axis=axis, tilt=tilt)
+
+
+CASES = {
+    "hinge": parallelogram,
+    "pin": lambda folder: parallelogram(folder, "planar"),
+    "longer": lambda folder: parallelogram(folder, "revolute", 1.37, 0.31),
+    "turntable": turntable,
+    "tilted": lambda folder: turntable(folder, -1.1),
+}
+
+
+@pytest.mark.filterwarnings("ignore::paramreduce_cli.errors.ParamreduceWarning")
+@pytest.mark.parametrize("kind", ["c", "python", "matlab"])
+@pytest.mark.parametrize("name", CASES)
+def test_self_tests_pass(name, kind, tmp_path):
+    program = {"c": "gcc", "python": sys.executable, "matlab": "octave-cli"}[kind]
+    if shutil.which(program) is None:
+        pytest.skip(f"there is no {program}")
+    model = CASES[name](tmp_path)
+    chosen, title = chosen_model("full", model, None, None)
+    files = languages[kind](exported_model(model, chosen, title=title, what=Exported.BOTH))
+    for file, content in files.items():
+        (tmp_path / file).write_bytes(content)
+    stem = model.mechanism.robot
+    command = {
+        "c": f"gcc -O2 -o t {stem}.c {stem}_test.c -lm && ./t",
+        "python": f"{sys.executable} {stem}_test.py",
+        "matlab": f"octave-cli --quiet --no-window-system --eval {stem}_test",
+    }[kind]
+    done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_a_wrong_torque_of_a_weak_joint_is_found_beside_a_strong_one(tmp_path):
+    model = turntable(tmp_path)
+    chosen, _ = chosen_model("full", model, None, None)
+    functions = exported_functions(model, chosen, Exported.IDM)
+    stored = random_cases(model.mechanism, chosen, 20, np.random.default_rng(0))
+    least = term_sizes(model.mechanism, chosen, stored)
+    check(functions, stored, least)
+    stored["tau"][3] += 1e-9 * np.abs(stored["tau"]).max()
+    with pytest.raises(FormulationError, match="tau is off by"):
+        check(functions, stored, least)
+
+
+def test_joints_have_sizes_of_their_own():
+    tau = np.array([[1e8, 1.0], [-2e8, 3.0]])
+    np.testing.assert_array_equal(entry_sizes("tau", tau, 1e-3), [2e8, 3.0])
+    np.testing.assert_array_equal(entry_sizes("tau", 0 * tau, 1e-3), [1e-3, 1e-3])
