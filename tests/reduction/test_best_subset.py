@@ -416,3 +416,15 @@ def test_one_column_alone():
     proofs = found("best-subset", problem(W, np.ones(5))).proofs
     assert proofs.status == ("optimal",)
     assert proofs.torque_error == pytest.approx([error_by_definition(W, np.ones(5), [0])])
+
+
+@pytest.mark.parametrize("seed", [3, 51, 58])
+def test_columns_of_which_round_off_leaves_nothing_end_no_search(seed):
+    """Nearly dependent columns in units 1e18 apart; two of these divided by zero once."""
+    rng = np.random.default_rng(seed)
+    W = rng.normal(size=(40, 7)) @ rng.normal(size=(7, 14))
+    W[:, :9] += 10.0 ** rng.uniform(-12, -3, size=9) * rng.normal(size=(40, 9))
+    W *= 10.0 ** rng.uniform(-9, 9, size=14)
+    chi = W @ (rng.normal(size=14) / np.linalg.norm(W, axis=0)) + 1e-6 * rng.normal(size=40)
+    proofs = found("best-subset", problem(W, chi), effort=Effort(node_limit=20_000)).proofs
+    assert np.all(proofs.lower_bound <= proofs.torque_error)

@@ -181,7 +181,9 @@ def _exclude(
 ) -> None:
     n, row = sheet.shape[1], sheet.shape[0] - 1
     share = _share(sheet, numbers[NULLITY], j)
-    if numbers[NEAR] == 1 or APART < share < INVOLVED:
+    # Round-off may leave nothing of what an exclusion costs where columns are nearly dependent.
+    known = share > APART or sheet[n + j, j] > 0
+    if numbers[NEAR] == 1 or APART < share < INVOLVED or not known:
         _drop(sheet, numbers, j)
         _fit_anew(sheet, numbers, errors, s, data)
         return
@@ -231,7 +233,7 @@ def _fit_anew(
     for c in range(numbers[NULLITY]):
         _copied(left[:free, rank + c], sheet[2 * n + c, :free])
     _copied(own @ (inner / values[:rank]), sheet[sheet.shape[0] - 1, :free])
-    ratio = values[rank - 1] / values[0]
+    ratio = values[rank - 1] / values[0] if rank > 0 else 1.0
     numbers[NEAR] = 1 if ratio < NEARLY else 0
     length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
     errors[BOUND] = max(errors[BOUND], max(length, 0.0) ** 2)
@@ -523,6 +525,8 @@ def _last_two_places(
     limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
     for i in range(numbers[FREE]):
         own[i] = sheet[i, i]
+        if not own[i] > GONE:  # its pairs are other columns alone
+            continue
         step = moments[i] / own[i]
         left = inside - moments[i] * step
         if left < limit:  # every pair may be dependent
