@@ -1,8 +1,11 @@
-"""Tables of numbers as CSV."""
+"""Tables of numbers as text: CSV, and its relatives with tabs, semicolons or blanks."""
 
 import csv
 import gzip
+import itertools
+import math
 import zlib
+from collections.abc import Iterator
 from pathlib import Path
 
 from paramreduce_cli.artifacts.atomic import check_is_file, missing
@@ -12,11 +15,18 @@ from paramreduce_cli.scratch import LargeTable
 
 
 def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], FloatArray]:
-    """Headings and numbers of a CSV, also gzipped, (n_rows, n_columns); held as numbers from the start.
+    """Read the headings and numbers of a table, also gzipped.
+
+    Columns are separated by commas, tabs, semicolons or blanks, as the line of headings is. Numbers are held as numbers from
+    the start.
 
     Args:
         path: The file.
-        leave_out_text: Whether columns that hold text in the first row are left out, and no error.
+        leave_out_text: Whether columns that hold text in the first row are left out; empty cells are not a number
+            then. Otherwise both are errors.
+
+    Returns:
+        The headings, and the numbers, (n_rows, n_columns).
 
     Raises:
         DataError: It is no table of numbers under headings that differ.
@@ -26,16 +36,16 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
     try:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(path, "rt", encoding="utf-8-sig", newline="") as file, LargeTable() as table:
-            rows = csv.reader(file)
+            first = next(file, "")
+            delimiter = _delimiter(first)
+            lines: Iterator[str] = itertools.chain([first.lstrip("# ")], file)
+            if delimiter == " ":
+                lines = (line.strip() + "\n" for line in lines)
+            rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
             header = [name.strip() for name in next(rows, [])]
-            if len(header) == 1 and ";" in header[0]:
-                raise DataError(f"{path}, line 1: columns must be separated by commas, not by ;.")
-            twice = sorted({name for name in header if header.count(name) > 1})
-            if twice:
-                raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
-            if not header:
-                raise DataError(f"{path}, line 1: the file is empty.")
+            _check_header(path, header)
             kept = list(range(len(header)))
+            begun_empty: set[int] = set()
             blank = None
             for row in rows:
                 if not row:
@@ -46,18 +56,46 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                 ):  # at the end they do no harm; inside, lines would be miscounted
                     raise DataError(f"{path}, line {blank}: is empty. Remove it.")
                 if leave_out_text and not table:
-                    kept = [k for k, cell in enumerate(row) if _is_number(cell)]
+                    begun_empty = {k for k, cell in enumerate(row) if not cell.strip()}
+                    kept = [k for k, c in enumerate(row) if k in begun_empty or _is_number(c)]
+                    kept = [k for k in kept if header[k]]
                 if len(row) != len(header):
                     raise DataError(
                         f"{path}, line {rows.line_num}: {len(row)} values under {len(header)} "
                         "headings."
                     )
-                table.extend(_number(path, rows.line_num, header[k], row[k]) for k in kept)
+                table.extend(
+                    math.nan
+                    if leave_out_text
+                    and (not row[k].strip() or (k in begun_empty and not _is_number(row[k])))
+                    else _number(path, rows.line_num, header[k], row[k])
+                    for k in kept
+                )
             return [header[k] for k in kept], table.matrix(len(kept))
     except FileNotFoundError as error:
         raise missing(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
+
+
+def _delimiter(header: str) -> str:
+    """Tell what separates the headings."""
+    found = next((mark for mark in ",\t;" if mark in header), None)
+    return found or (" " if len(header.split()) > 1 else ",")
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    """Raise DataError unless a line holds headings that differ."""
+    if not header:
+        raise DataError(f"{path}, line 1: the file is empty.")
+    if all(map(_is_number, header)):
+        raise DataError(
+            f"{path}, line 1: holds numbers where headings should be. Write a first line with a name for each of the "
+            f"{len(header)} columns, such as t,q1,q2,tau1,tau2."
+        )
+    twice = sorted({name for name in header if name and header.count(name) > 1})
+    if twice:
+        raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
 
 
 def _is_number(cell: str) -> bool:
@@ -73,5 +111,9 @@ def _number(path: Path, line: int, heading: str, cell: str) -> float:
         return float(cell)
     except ValueError as error:
         raise DataError(
-            f"{path}, line {line}, column {heading}: {cell!r} is not a number."
+            f"{path}, line {line}, column {heading}: {cell!r} is not a number.{_remedy(cell)}"
         ) from error
+
+
+def _remedy(cell: str) -> str:
+    return " Write decimal points." if _is_number(cell.replace(",", ".")) else ""

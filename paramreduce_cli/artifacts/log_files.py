@@ -5,7 +5,7 @@ import lzma
 import tokenize
 import zipfile
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -13,11 +13,13 @@ import numpy as np
 
 from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.artifacts.csv_files import read_csv
-from paramreduce_cli.artifacts.hdf5 import Reader, reading
+from paramreduce_cli.artifacts.hdf5 import reading
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray, RawLog
 from paramreduce_cli.scratch import large_matrix
 
+_MOST_COLUMNS = 64
+"""Columns of a matrix beyond which they are samples, where rows are fewer."""
 _BAGS = (".db3", ".mcap")
 _HDF5 = (".h5", ".hdf5")
 _AT_ONCE = 1 << 16
@@ -51,8 +53,12 @@ def load_log(path: Path) -> RawLog:
         with reading(path) as reader:
             names: list[str] = []
             reader.file.visit(names.append)
-            numeric = [name for name in names if _is_numeric(reader.file[name])]
-            return _from_arrays(path, ((name, _read(reader, name)) for name in numeric))
+            kinds = {name: _kind(reader.file[name]) for name in names}
+            numeric = [name for name, kind in kinds.items() if kind == _NUMBERS]
+            others = {name: kind for name, kind in kinds.items() if kind not in ("", _NUMBERS)}
+            return _from_arrays(
+                path, ((name, _columns(reader.rows(name))) for name in numeric), others
+            )
     if path.suffix == ".npz":
         return _npz(path)
     header, table = read_csv(path, leave_out_text=True)
@@ -60,15 +66,17 @@ def load_log(path: Path) -> RawLog:
     return RawLog(str(path), columns, first_line=2)
 
 
-def _is_numeric(item: Any) -> bool:
+_NUMBERS = "numbers"
+_KINDS = {"c": "complex numbers", "b": "true and false", "S": "text", "U": "text", "O": "text"}
+"""What arrays hold by NumPy's kind of their type, where it is no real number."""
+
+
+def _kind(item: Any) -> str:
+    """Tell what a dataset holds; empty for a group, and for what has no rows."""
     kind = getattr(getattr(item, "dtype", None), "kind", "")
-    return kind != "" and kind in "fiub" and item.ndim in (1, 2)
-
-
-def _read(reader: Reader, name: str) -> FloatArray:
-    if reader.file[name].dtype.kind == "b":
-        return _columns(reader.array(name).astype(float))
-    return _columns(reader.rows(name))
+    if kind == "" or item.ndim not in (1, 2):
+        return ""
+    return _NUMBERS if kind in "fiu" else _KINDS.get(kind, "no numbers")
 
 
 def _columns(rows: Any) -> FloatArray:
@@ -84,22 +92,30 @@ def _npz(path: Path) -> RawLog:
     check_is_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
-            return _from_arrays(path, _members(archive))
+            others: dict[str, str] = {}
+            return _from_arrays(path, _members(archive, others), others)
     except FileNotFoundError as error:
         raise missing(path) from error
     except _UNREADABLE as error:
         raise ArtifactError(f"{path}: cannot be read as NPZ ({error}).") from error
 
 
-def _members(archive: zipfile.ZipFile) -> Iterator[tuple[str, FloatArray]]:
-    """Arrays of numbers; not by numpy.load, as one may be larger than memory."""
+def _members(archive: zipfile.ZipFile, others: dict[str, str]) -> Iterator[tuple[str, FloatArray]]:
+    """Yield arrays of numbers; not by numpy.load, as one may be larger than memory.
+
+    Args:
+        archive: The file.
+        others: What other arrays hold is added, by name.
+    """
     for info in archive.infolist():
         with archive.open(info) as file:
             version = np.lib.format.read_magic(file)
             if version not in _HEADERS:  # of text in many alphabets
                 continue
             shape, by_column, kind = _HEADERS[version](file)
-            if kind.kind not in "fiub" or len(shape) not in (1, 2):
+            if kind.kind in _KINDS:
+                others[info.filename.removesuffix(".npy")] = _KINDS[kind.kind]
+            if kind.kind not in "fiu" or len(shape) not in (1, 2):
                 continue
             n_rows, n_columns = (*shape, 1)[:2]
             if n_rows == 0:
@@ -117,16 +133,35 @@ def _members(archive: zipfile.ZipFile) -> Iterator[tuple[str, FloatArray]]:
             yield info.filename.removesuffix(".npy"), result
 
 
-def _from_arrays(path: Path, matrices: Iterator[tuple[str, FloatArray]]) -> RawLog:
+def _from_arrays(
+    path: Path, matrices: Iterable[tuple[str, FloatArray]], others: Mapping[str, str] | None = None
+) -> RawLog:
+    """Number the columns of matrices.
+
+    Args:
+        path: The file.
+        matrices: Names and arrays, (n_rows, n_columns) each.
+        others: What datasets without numbers hold, by name.
+    """
+    found = dict(matrices)
+    lengths = {matrix.shape[0] for matrix in found.values() if matrix.shape[1] == 1}
     columns: dict[str, FloatArray] = {}
-    for name, matrix in matrices:
+    for name, matrix in found.items():
+        if matrix.shape[1] in lengths and matrix.shape[0] not in lengths:
+            matrix = matrix.T  # joints x samples, as single columns tell
         if matrix.shape[1] == 1:
             columns[name] = matrix[:, 0]
+        elif matrix.shape[1] > _MOST_COLUMNS and matrix.shape[0] < matrix.shape[1]:
+            raise DataError(
+                f"{path}: {name} has {matrix.shape[0]} rows and {matrix.shape[1]} columns. Bring it with a row for each "
+                "sample."
+            )
         else:
             columns |= {f"{name}{k + 1}": column for k, column in enumerate(matrix.T)}
     if not columns:
-        raise DataError(f"{path}: holds no columns of numbers.")
-    return RawLog(str(path), columns, first_line=None)
+        held = "".join(f" {name} holds {kind}." for name, kind in (others or {}).items())
+        raise DataError(f"{path}: holds no columns of numbers.{held}")
+    return RawLog(str(path), columns, first_line=None, others=others or {})
 
 
 def _bag(path: Path) -> RawLog:
@@ -143,24 +178,51 @@ def _bag(path: Path) -> RawLog:
         raise missing(path)
     if not path.is_dir():
         check_is_file(path)
-    found: dict[str, array.array] = {}
+    found: dict[tuple[str, str], tuple[array.array, array.array]] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             for connection, stamp, raw in reader.messages():
                 message = reader.deserialize(raw, connection.msgtype)
-                row = {"time": _stamp(message, stamp)} | dict(_fields(message))
-                for name, value in row.items():
-                    found.setdefault(f"{connection.topic}/{name}", array.array("d")).append(value)
+                time = _stamp(message, stamp)
+                for name, value in _fields(message):
+                    column = found.setdefault(
+                        (connection.topic, name), (array.array("d"), array.array("d"))
+                    )
+                    column[0].append(time)
+                    column[1].append(value)
     except (AnyReaderError, OSError, ValueError, KeyError, TypeError) as error:
         raise ArtifactError(f"{path}: cannot be read as a ROS 2 bag ({error}).") from error
     if not found:
         raise DataError(f"{path}: holds no messages with numbers.")
-    start = min(min(values) for name, values in found.items() if name.endswith("/time"))
-    columns = {
-        name: np.frombuffer(values) - start if name.endswith("/time") else np.frombuffer(values)
-        for name, values in found.items()
-    }
+    start = min(min(times) for times, _ in found.values())
+    columns: dict[str, FloatArray] = {}
+    for topic in dict.fromkeys(topic for topic, _ in found):
+        fields = {name: columns for (own, name), columns in found.items() if own == topic}
+        columns |= _of_topic(topic, fields, start)
     return RawLog(str(path), columns, first_line=None)
+
+
+def _of_topic(
+    topic: str, fields: Mapping[str, tuple[array.array, array.array]], start: float
+) -> dict[str, FloatArray]:
+    """Name the columns of a topic, and their times: TOPIC/time of most columns, of others TOPIC/time_of/FIELD.
+
+    Several nodes may publish to one topic, each some joints; a column has the times of the messages that hold it.
+
+    Args:
+        topic: Name of the topic.
+        fields: Times and values by name of the field.
+        start: Time of the first message of the recording, s.
+    """
+    groups: dict[bytes, list[str]] = {}
+    for name, (times, _) in fields.items():
+        groups.setdefault(times.tobytes(), []).append(name)
+    columns: dict[str, FloatArray] = {}
+    for k, names in enumerate(sorted(groups.values(), key=len, reverse=True)):
+        key = f"{topic}/time" if k == 0 else f"{topic}/time_of/{names[0]}"
+        columns[key] = np.frombuffer(fields[names[0]][0]) - start
+        columns |= {f"{topic}/{name}": np.frombuffer(fields[name][1]) for name in names}
+    return columns
 
 
 def _stamp(message: Any, received: int) -> float:

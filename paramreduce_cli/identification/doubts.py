@@ -11,6 +11,8 @@ from paramreduce_cli.records import FloatArray
 
 _SLOW = 5.0
 """Samples per second below which nobody records motions."""
+_STEPS = {"nanoseconds": 3e5, "microseconds": 300.0, "milliseconds": 0.0}
+"""Time steps, in the unit at hand taken for seconds, beyond which time is rather in another unit."""
 _SURE = 0.9
 """Correlation from which on two signals are the same but for a factor."""
 _UNLIKE = 0.5
@@ -37,26 +39,42 @@ def doubts(
         unmeasured: Those without torques.
     """
     if rate < _SLOW:
-        yield f"there are {rate:.3g} samples a second: is time in milliseconds? Then say so under units."
+        unit = next(name for name, step in _STEPS.items() if 1 / rate > step)
+        yield f"there are {rate:.3g} samples a second: is time in {unit}? Then set units.time under sampling.log."
+        return  # speeds and slopes cannot be compared
+    far, largest, constant, frozen, limited = [], 0.0, [], [], []
     for j, name in enumerate(names):
         z, tau = piece.z[:, j], piece.tau[:, j]
         if np.ptp(z) == 0:
             yield f"{name} never moves, so its inertia is not seen."
         elif np.abs(z).max() > RATHER_DEGREES:
-            yield (
-                f"positions of {name} go up to {np.abs(z).max():.3g} rad: are they degrees, or of a motor before its "
-                "gears? Then say so under units, or transmission."
-            )
+            far.append(name)
+            largest = max(largest, float(np.abs(z).max()))
         elif piece.dz is not None and np.ptp(piece.dz[:, j]) == 0:
-            yield f"{name} moves, but its recorded speed is constant: is it recorded?"
+            constant.append(name)
         if name in unmeasured:
             continue
         if np.ptp(tau) == 0:
-            yield f"the torque of {name} is constant: is it recorded?"
+            frozen.append(name)
         elif _longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:
-            yield f"the torque of {name} stays at its largest value: is it at a limit there?"
+            limited.append(name)
+    if far:
+        yield (
+            f"positions of {_listed(far)} go up to {largest:.3g} rad: are they degrees, or of a motor before its "
+            "gears? Then say so under units, or transmission."
+        )
+    if constant:
+        yield f"{_listed(constant)}: positions change, but recorded speeds are constant: are speeds recorded?"
+    if frozen:
+        yield f"torques of {_listed(frozen)} are constant: are they recorded?"
+    if limited:
+        yield f"torques of {_listed(limited)} stay at their largest value: are they at a limit there?"
     if piece.dz is not None:
         yield from _speeds_against_positions(piece.z, piece.dz, rate, names)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
 
 
 def _longest_run(flags: np.ndarray) -> int:
@@ -79,6 +97,7 @@ def _speeds_against_positions(
 ) -> Iterator[str]:
     slopes = _slow((np.gradient(column, 1 / rate) for column in z.T), rate)
     speeds = _slow(dz.T, rate)
+    said: dict[str, list[str]] = {}
     for j, name in enumerate(names):
         lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
         if not lengths[j] > 0:
@@ -87,12 +106,20 @@ def _speeds_against_positions(
         gain = float(speeds[:, j] @ slopes[:, j] / (slopes[:, j] @ slopes[:, j]))
         other = int(np.argmax(np.abs(alike)))
         if abs(alike[j]) < _UNLIKE and abs(alike[other]) > _SURE:
-            yield f"the speed of {name} is that of {names[other]}: are columns swapped?"
+            said.setdefault(f"is that of {names[other]}: are columns swapped?", []).append(name)
         elif alike[j] < -_SURE:
-            yield f"the speed of {name} has the other sign than its position's slope."
+            said.setdefault("has the other sign than the slope of the position.", []).append(name)
         elif alike[j] > _SURE and abs(gain / _PER_DEGREE - 1) < _NEAR:
-            yield f"the speed of {name} is 57.3 times its position's slope: is it in degrees?"
+            said.setdefault(
+                "is 57.3 times the slope of the position: is the speed in degrees?", []
+            ).append(name)
         elif alike[j] > _SURE and abs(gain * _PER_DEGREE - 1) < _NEAR:
-            yield f"the position of {name} moves 57.3 times faster than its speed says: degrees?"
+            said.setdefault(
+                "is the slope of the position over 57.3: is the position in degrees?", []
+            ).append(name)
         elif alike[j] > _SURE and abs(gain - 1) > 2 * _NEAR:
-            yield f"the speed of {name} is {gain:.3g} times its position's slope: units?"
+            said.setdefault(f"is {gain:.3g} times the slope of the position: units?", []).append(
+                name
+            )
+    for what, joints in said.items():
+        yield f"the speed of {_listed(joints)} {what}"

@@ -190,6 +190,8 @@ def _matrix(
 
 def _column(log: RawLog, name: str) -> FloatArray:
     column = log.columns.get(name)
+    if column is None and name in log.others:
+        raise DataError(f"{log.source}: column {name} holds {log.others[name]}; bring numbers.")
     if column is None:
         known = list(log.columns)
         shown = ", ".join(known[:_MOST_SHOWN]) + (", ..." if len(known) > _MOST_SHOWN else "")
@@ -198,10 +200,15 @@ def _column(log: RawLog, name: str) -> FloatArray:
             "sampling.log.columns what is where."
         )
     wrong = np.flatnonzero(~(np.abs(column) < _LARGEST))
+    if wrong.size == column.size:
+        raise DataError(
+            f"{log.source}: column {name} holds no number at all. Leave it out of sampling.log.columns; speeds and "
+            "accelerations are then made of the positions."
+        )
     if wrong.size:
         more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
-            f"{log.place(int(wrong[0]))}, column {name}: is not a finite number below {_LARGEST:g}{more}. "
+            f"{log.place(int(wrong[0]))}, column {name}: is empty or not a finite number below {_LARGEST:g}{more}. "
             "Remove such rows."
         )
     if column.size < _FEWEST:

@@ -1,7 +1,7 @@
 """Logs of a machine: columns as recorded, and the motions that are made of them."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -23,6 +23,8 @@ class RawLog:
     """By name, (n_rows,) each; matrices are one column for each of theirs."""
     first_line: int | None
     """Line of the first row in the file, None where it has no lines."""
+    others: Mapping[str, str] = field(default_factory=dict)
+    """What columns hold that hold no numbers, such as text, by name."""
 
     def place(self, row: int) -> str:
         """Where a row stands, for messages."""

@@ -241,10 +241,10 @@ def test_noise_is_what_lies_above_the_band():
         (lambda log: log | {"q1": np.degrees(log["q1"]) * 1, "dq1": log["dq1"]}, "degrees"),
         (lambda log: log | {"dq2": -log["dq2"]}, "fore has the other sign"),
         (lambda log: log | {"dq1": log["dq2"], "dq2": log["dq1"]}, "columns swapped"),
-        (lambda log: log | {"dq1": np.degrees(log["dq1"])}, "is it in degrees"),
-        (lambda log: log | {"dq1": np.full_like(log["t"], 0.2)}, "its recorded speed is constant"),
+        (lambda log: log | {"dq1": np.degrees(log["dq1"])}, "is the speed in degrees"),
+        (lambda log: log | {"dq1": np.full_like(log["t"], 0.2)}, "recorded speeds are constant"),
         (lambda log: log | {"tau1": np.clip(log["tau1"], -5, 5)}, "at a limit"),
-        (lambda log: log | {"tau2": np.zeros_like(log["t"])}, "is constant"),
+        (lambda log: log | {"tau2": np.zeros_like(log["t"])}, "are constant"),
         (
             lambda log: log | {"q2": np.zeros_like(log["t"]), "dq2": np.zeros_like(log["t"])},
             "never moves",

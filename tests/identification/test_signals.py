@@ -1,5 +1,6 @@
 import gzip
 import io
+import re
 import zipfile
 
 import h5py
@@ -60,8 +61,9 @@ def test_all_formats_hold_the_same(name, write, tmp_path):
     assert all(np.allclose(found[key], LOG[key], rtol=1e-8, atol=1e-12) for key in LOG)
 
 
-def test_joint_states_of_a_bag(tmp_path):
-    """Joints come in another order than in the robot, as they do in bags."""
+@pytest.mark.parametrize("gripper", [0, 1, 3], ids=lambda every: f"a gripper {every} times")
+def test_joint_states_of_a_bag(tmp_path, gripper):
+    """Joints come in another order than in the robot, and other nodes publish to the same topic, as in bags."""
     pytest.importorskip("rosbags")
     from rosbags.rosbag2 import Writer
     from rosbags.typesys import Stores, get_typestore
@@ -79,6 +81,9 @@ def test_joint_states_of_a_bag(tmp_path):
             rows = [np.array([LOG[f"{key}2"][k], LOG[f"{key}1"][k]]) for key in ("q", "dq", "tau")]
             message = State(header, ["fore", "upper"], *rows)
             writer.write(connection, stamp, store.serialize_cdr(message, State.__msgtype__))
+            for _ in range(gripper):
+                message = State(header, ["finger"], *[np.zeros(1)] * 3)
+                writer.write(connection, stamp, store.serialize_cdr(message, State.__msgtype__))
     log = load_log(tmp_path / "bag")
     columns = {
         "time": "/joint_states/time",
@@ -140,10 +145,13 @@ def with_at(values, row, value):
     [
         ({"t": swapped_rows(LOG["t"])}, r"log\.csv, line 103, column t: time goes back"),
         ({"t": with_at(LOG["t"], 7, LOG["t"][6])}, r"line 9, column t: time stands still"),
-        ({"q2": with_at(LOG["q2"], 50, np.nan)}, r"line 52, column q2: is not a finite number"),
+        (
+            {"q2": with_at(LOG["q2"], 50, np.nan)},
+            r"line 52, column q2: is empty or not a finite number",
+        ),
         (
             {"q2": with_at(LOG["q2"], 50, 1e308)},
-            r"line 52, column q2: is not a finite number below 1e\+30",
+            r"line 52, column q2: is empty or not a finite number below 1e\+30",
         ),
         ({"tau1": with_at(LOG["tau1"], 3, np.inf)}, r"line 5, column tau1"),
         ({"q3": LOG["q1"]}, r"column q3, but the robot has 2 joints"),
@@ -228,10 +236,11 @@ def test_arrays_of_all_kinds_of_numbers_and_orders(tmp_path, save, monkeypatch):
         "dq": np.asfortranarray(q).astype(">f8"), "cube": np.ones((2, 2, 2)),
     }  # fmt: skip
     save(tmp_path / "log.npz", **brought)
-    found = load_log(tmp_path / "log.npz").columns
+    log = load_log(tmp_path / "log.npz")
+    found = log.columns
     names = [f"{name}{k + 1}" for name in ("q", "dq") for k in range(3)]
-    assert set(found) == {"t", "on", *names}
-    np.testing.assert_array_equal(found["on"], brought["on"])
+    assert set(found) == {"t", *names}
+    assert log.others == {"on": "true and false"}
     for name in names:
         np.testing.assert_array_equal(found[name], brought[name[:-1]][:, int(name[-1]) - 1])
 
@@ -324,3 +333,93 @@ def test_joints_are_to_be_locked_where_they_have_no_column_at_all(names, locked)
     with pytest.raises(ConfigError) as caught:
         guess_columns(names, NAMES)
     assert ("--lock fore=0" in str(caught.value)) == locked
+
+
+@pytest.mark.parametrize("mark", [",", "\t", ";", " ", "   "])
+@pytest.mark.parametrize("comment", ["", "# "])
+def test_tables_are_separated_by_what_their_headings_are(tmp_path, mark, comment):
+    rows = np.random.default_rng(0).normal(size=(60, 3)).round(6)
+    lines = [mark.join(["t", "q1", "tau1"]), *(mark.join(map(str, row)) for row in rows.tolist())]
+    path = tmp_path / "log.txt"
+    path.write_text(comment + "\n".join(lines) + "\n")
+    found = load_log(path).columns
+    assert list(found) == ["t", "q1", "tau1"]
+    np.testing.assert_array_equal(np.column_stack(list(found.values())), rows)
+
+
+def test_cells_that_are_empty_are_missing_numbers_and_no_text(tmp_path):
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1,mode,tau1\n" + "".join(f"{k},{k},run,{k or ''}\n" for k in range(60)))
+    log = load_log(path)
+    assert list(log.columns) == ["t", "q1", "tau1"]
+    with pytest.raises(DataError, match="line 2, column tau1: is empty or not a finite number"):
+        signals(log, LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("0.0,1.0,2.0\n1.0,2.0,3.0\n", "line 1: holds numbers where headings should be"),
+        ("t;q1\n0;1,5\n", "line 2, column q1: '1,5' is not a number. Write decimal points"),
+    ],
+)
+def test_tables_that_cannot_be_read_say_why(tmp_path, text, says):
+    (tmp_path / "log.csv").write_text(text)
+    with pytest.raises(DataError, match=re.escape(says)):
+        load_log(tmp_path / "log.csv")
+
+
+def test_speeds_without_any_number_are_to_be_left_out():
+    log = RawLog("x.csv", {**LOG, "dq1": np.full(LOG["t"].size, np.nan)}, 2)
+    with pytest.raises(DataError, match=r"column dq1 holds no number at all\. Leave it out"):
+        signals(log, section(columns={"velocity": "dq{}"}), NAMES)
+
+
+def test_joints_in_rows_are_told_by_the_time(tmp_path):
+    q = np.random.default_rng(0).normal(size=(3, 100))
+    np.savez(tmp_path / "log.npz", t=np.arange(100.0), q=q)
+    found = load_log(tmp_path / "log.npz").columns
+    np.testing.assert_array_equal([found[f"q{k}"] for k in (1, 2, 3)], q)
+    np.savez(tmp_path / "log.npz", q=q)
+    with pytest.raises(DataError, match="q has 3 rows and 100 columns"):
+        load_log(tmp_path / "log.npz")
+
+
+@pytest.mark.parametrize(
+    ("values", "held"),
+    [
+        (np.ones(60, complex), "complex numbers"),
+        (np.ones(60, bool), "true and false"),
+        (np.array([b"x"] * 60), "text"),
+    ],
+)
+@pytest.mark.parametrize("kind", ["h5", "npz"])
+def test_columns_that_hold_no_numbers_are_named(tmp_path, values, held, kind):
+    path = tmp_path / f"log.{kind}"
+    arrays = {"t": np.arange(60.0), "q1": np.arange(60.0), "tau1": values}
+    if kind == "npz":
+        np.savez(path, **arrays)
+    else:
+        with h5py.File(path, "w") as file:
+            for name, array in arrays.items():
+                file[name] = array
+    with pytest.raises(DataError, match=f"column tau1 holds {held}"):
+        signals(load_log(path), LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
+
+
+def test_a_column_of_one_joint_is_not_that_of_another():
+    names = ["t", "left_lift/q", "lift/q", "lift/tau", "left_lift/tau"]
+    assert guess_columns(names, ["lift"])["position"] == ["lift/q"]
+    names = ["t", "joint_10/q", "joint_1/q", "joint_10/tau", "joint_1/tau"]
+    found = guess_columns(names, ["joint_1", "joint_10"])
+    assert found["torque"] == ["joint_1/tau", "joint_10/tau"]
+    names = ["t", "left_lift/q", "right_lift/q", "left_lift/tau", "right_lift/tau"]
+    with pytest.raises(
+        ConfigError, match="several columns may be of the joint lift: left_lift/q, right_lift/q"
+    ):
+        guess_columns(names, ["lift"])
+    assert guess_columns(["t", "robot_lift/q", "robot_lift/tau"], ["lift"])["torque"] == [
+        "robot_lift/tau"
+    ]
+    names = ["t", "arm/q", "arm/target_q", "arm/tau"]
+    assert guess_columns(names, ["arm"])["position"] == ["arm/q"]

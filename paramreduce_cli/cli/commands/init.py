@@ -119,9 +119,16 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
     Raises:
         ConfigError: Positions or torques have none, of the joints or of a base that floats.
     """
-    from paramreduce_cli.artifacts.log_files import load_log  # late: HDF5 and NumPy
+    # Late: HDF5 and NumPy.
+    import numpy as np
 
-    names = list(load_log(logs[0]).columns)
+    from paramreduce_cli.artifacts.log_files import load_log
+
+    recorded = load_log(logs[0]).columns
+    empty = [name for name, column in recorded.items() if not np.isfinite(column).any()]
+    if empty:
+        say(f"- {', '.join(empty)}: no numbers, left out.")
+    names = [name for name in recorded if name not in empty]
     try:
         columns = guess_columns(names, joints)
     except ConfigError as error:
