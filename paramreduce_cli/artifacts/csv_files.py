@@ -57,7 +57,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                     raise DataError(f"{path}, line {blank}: is empty. Remove it.")
                 if leave_out_text and not table:
                     begun_empty = {k for k, cell in enumerate(row) if not cell.strip()}
-                    kept = [k for k, c in enumerate(row) if k in begun_empty or _is_number(c)]
+                    kept = [k for k, c in enumerate(row) if k in begun_empty or _looks_numeric(c)]
                     kept = [k for k in kept if header[k]]
                 if len(row) != len(header):
                     raise DataError(
@@ -106,6 +106,11 @@ def _is_number(cell: str) -> bool:
     return True
 
 
+def _looks_numeric(cell: str) -> bool:
+    """Whether a cell is a number, perhaps with a decimal comma."""
+    return _is_number(cell.replace(",", "."))
+
+
 def _number(path: Path, line: int, heading: str, cell: str) -> float:
     try:
         return float(cell)
@@ -116,4 +121,4 @@ def _number(path: Path, line: int, heading: str, cell: str) -> float:
 
 
 def _remedy(cell: str) -> str:
-    return " Write decimal points." if _is_number(cell.replace(",", ".")) else ""
+    return " Write decimal points." if _looks_numeric(cell) else ""
