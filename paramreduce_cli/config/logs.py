@@ -94,7 +94,7 @@ class LogSection(Section):
     standstill: Literal["cut", "keep"] = "cut"
     """What becomes of the time before the first joint moves and after the last one stops."""
     outliers: Literal["replace", "keep"] = "replace"
-    """What becomes of single torques and positions far from their neighbours; interpolated, or left."""
+    """`replace` adds whole turns that positions jump by, cuts out rows in which positions jump to and fro, and interpolates single torques and positions far from their neighbours; `keep` leaves all of them."""
     state_cutoff: Frequency = "auto"
     """Of the zero-phase low-pass on positions and speeds, Hz; auto takes it from the spectrum."""
     torque_cutoff: Frequency = "auto"

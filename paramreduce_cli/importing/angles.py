@@ -6,18 +6,26 @@ from fractions import Fraction
 
 _NOTHING = 1e-9
 """What is left of zero, rad, m or of a direction."""
+_CUT_OFF = 3
+"""Digits after the point from which on an angle may have been cut off instead of rounded."""
+_NEAR = 1.5
+"""Units of the last digit within which a number is worth a hint."""
 _SLIP = 1e-8
 """Of angles with many digits, rad: some files have the last one wrong."""
 
 
-def meant(text: str) -> float:
-    """The angle that a number was rounded, or cut off, from, rad.
+def unround_angle(text: str) -> float:
+    """Return the angle that a number was rounded, or cut off, from, rad.
 
-    The more digits it has the finer the angles it can stand for: quarter turns with two digits after
-    the point, eighths with three, multiples of 15 degrees with four or more.
+    The more digits the number has the finer the angles it can stand for: quarter turns with two digits after
+    the point, eighths with three, multiples of 15 degrees with four or more. Numbers with fewer than three digits are not
+    taken for cut off.
 
     Args:
         text: The number as it is written.
+
+    Returns:
+        The exact angle, or the number itself where it stands for none.
 
     Raises:
         ValueError: It is no number.
@@ -25,13 +33,30 @@ def meant(text: str) -> float:
     value = float(text)
     if abs(value) < _NOTHING or not math.isfinite(value):
         return 0.0 if math.isfinite(value) else value
+    digits, nice = _nearest(text)
+    if nice is None:
+        return value
+    unit = 10.0**-digits
+    rounded = abs(value - nice) <= max(unit / 2, _SLIP)
+    cut_off = digits >= _CUT_OFF and 0 <= abs(nice) - abs(value) < unit
+    return nice if rounded or cut_off else value
+
+
+def near_angle(text: str) -> float | None:
+    """Return the angle that a number almost stands for, None where it stands for it or for none near by."""
+    if not math.isfinite(float(text)):
+        return None
+    digits, nice = _nearest(text)
+    off = nice is not None and unround_angle(text) != nice
+    return nice if off and abs(float(text) - (nice or 0.0)) <= _NEAR * 10.0**-digits else None
+
+
+def _nearest(text: str) -> tuple[int, float | None]:
+    """Return the digits of a number after the point, and the nearest angle that so many digits can stand for."""
     digits = -int(Decimal(text.strip()).as_tuple().exponent)
     parts = next((n for least, n in ((4, 12), (3, 4), (2, 2)) if digits >= least), None)
-    if parts is None:
-        return value
-    whole = round(value / (math.pi / parts))
-    nice = whole * math.pi / parts
-    return nice if whole and abs(value - nice) <= max(10.0**-digits, _SLIP) else value
+    whole = round(float(text) / (math.pi / parts)) if parts is not None else 0
+    return digits, whole * math.pi / parts if parts is not None and whole else None
 
 
 def without_dust(value: float) -> float:

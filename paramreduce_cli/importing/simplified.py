@@ -309,6 +309,10 @@ class _Simplification:
             leader, ratio, offset = self._led(joint)
             if leader.kind == "fixed" or leader.name in self._locked or not ratio:
                 value = ratio * self._locked.get(leader.name, 0.0) + offset
+                if joint is not leader and leader.kind == "fixed":
+                    self._remarks.append(
+                        f"{joint.name} follows {leader.name}, which is fixed, and so is locked at {value:g}"
+                    )
                 if joint is not leader:
                     self._locked.setdefault(joint.name, value)
 

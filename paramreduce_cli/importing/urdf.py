@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.angles import meant, without_dust
+from paramreduce_cli.importing.angles import angle_text, near_angle, unround_angle, without_dust
 from paramreduce_cli.importing.imported import (
     ImportedJoint,
     ImportedRobot,
@@ -126,6 +126,10 @@ class _Reader:
         if element is None or element.get(key) is None:
             return None
         value = float(self._numbers(element, key, 1, "")[0])
+        if value < 0 and key in ("velocity", "effort"):
+            self._remarks.append(
+                f"line {element.sourceline}: {key}={value:g} is taken for {-value:g}"
+            )
         return value if abs(value) <= most else None
 
     def _origin(self, element: Any, owner: str) -> Steps:
@@ -139,9 +143,14 @@ class _Reader:
         steps: list[tuple[str, float | tuple[float, ...]]] = [("xyz", shift)] if any(shift) else []
         texts = self._numbers(origin, "rpy", 3, "0 0 0")
         for key, text in reversed(list(zip(("rx", "ry", "rz"), texts, strict=True))):
-            angle = meant(text)
+            angle = unround_angle(text)
             if abs(angle - float(text)) > _SNAPPED:
                 self._remarks.append(f"{owner}: {key} {text} is taken for {angle:.15g}")
+            elif (near := near_angle(text)) is not None:
+                self._remarks.append(
+                    f"{owner}: {key} {text} is kept; it is near {angle_text(near)}, but not what that is rounded to. "
+                    f"Write {near:.10g} into the file if that is meant"
+                )
             if angle:
                 steps.append((key, angle))
         return tuple(steps)

@@ -263,4 +263,5 @@ trajectories:
   harmonics: 4
   period: 2*pi                  # s
   points: 100                   # samples over a period
+  rest_to_rest: true            # begin and end at rest, as a controller needs it
 """

@@ -37,6 +37,9 @@ def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: O
         drive: The drive.
         states: Generalised coordinates q, velocities dq and accelerations ddq, (n_q,) each.
         odd: Functions of these scalars.
+
+    Raises:
+        ValueError: The parameter is none of a drive.
     """
     q, dq, ddq = states
     if kind is Kind.ROTOR:
@@ -47,6 +50,8 @@ def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: O
         return along(drive, q) - drive.rest
     if kind is Kind.OFFSET:
         return 1.0
+    if kind is not Kind.COULOMB:
+        raise ValueError(f"{kind} is no parameter of a drive")
     speed = along(drive, dq)
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 

@@ -377,3 +377,20 @@ def test_the_command(tmp_path, invoke):
         "was made with another trajectories section"
         in invoke(*arguments, settings=others, code=2).err
     )
+
+
+def test_code_for_a_controller_that_begins_in_motion_is_refused(two_link_copy, invoke):
+    arguments = (
+        "export-trajectory",
+        ROOT / "configs" / "two_link.yaml",
+        "--results",
+        two_link_copy,
+    )
+    for kind in ("ros", "urscript"):
+        refused = invoke(*arguments, "--format", kind, code=2).err
+        assert "begins in motion, at up to" in refused
+        assert "--allow-moving-start" in refused
+        assert not (two_link_copy / "export").exists()
+    out = invoke(*arguments, "--format", "ros", "--allow-moving-start").out
+    assert "which begins in motion at up to" in out
+    assert "begins in motion" in invoke(*arguments, "--format", "csv").out

@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paramreduce_cli.fields.numbers import parse_number
-from paramreduce_cli.importing.angles import angle_text, meant, number_text
+from paramreduce_cli.importing.angles import angle_text, near_angle, number_text, unround_angle
 
 
 @pytest.mark.parametrize(
@@ -16,17 +16,27 @@ from paramreduce_cli.importing.angles import angle_text, meant, number_text
         ("1.57", math.pi / 2), ("3.14", math.pi), ("-1.5708", -math.pi / 2), ("1.5707", math.pi / 2),
         ("0.785", math.pi / 4), ("2.6180", 5 * math.pi / 6), ("1.570796325", math.pi / 2),
         ("0.78", 0.78), ("0.52", 0.52), ("1.5", 1.5), ("2", 2.0), ("1.56", 1.56), ("1.5718", 1.5718),
-        ("-2.22045e-16", 0.0), ("0", 0.0), ("0.0001", 0.0001), ("15e-1", 1.5),
+        ("1.58", 1.58), ("0.786", 0.786), ("3.15", 3.15), ("3.141", math.pi), ("3.1415", math.pi), ("3.1417", 3.1417),
+        ("1.571", math.pi / 2), ("1.572", 1.572), ("-2.22045e-16", 0.0), ("0", 0.0), ("0.0001", 0.0001), ("15e-1", 1.5),
     ],
 )  # fmt: skip
 def test_what_an_angle_was_rounded_from(text, angle):
-    assert meant(text) == angle
+    assert unround_angle(text) == angle
+
+
+@pytest.mark.parametrize(
+    ("text", "near"),
+    [("1.58", math.pi / 2), ("0.786", math.pi / 4), ("3.15", math.pi), ("1.57", None), ("1.3", None), ("0", None),
+     ("0.3", None), ("1.6", None)],
+)  # fmt: skip
+def test_angles_that_are_almost_rounded_ones_are_hinted_at(text, near):
+    assert near_angle(text) == near
 
 
 @given(st.integers(-24, 24), st.integers(4, 15))
 def test_multiples_of_15_degrees_survive_rounding(twelfths, digits):
     angle = twelfths * math.pi / 12
-    assert meant(f"{angle:.{digits}f}") == pytest.approx(angle, abs=1e-15)
+    assert unround_angle(f"{angle:.{digits}f}") == pytest.approx(angle, abs=1e-15)
 
 
 @given(st.floats(-7, 7))

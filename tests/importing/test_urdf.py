@@ -401,3 +401,20 @@ def test_another_axis_is_another_robot(tmp_path, invoke):
     invoke("build-model", *given)
     out = invoke("export", *given, "--format", "urdf", "--model", "full", code=2)
     assert "its bodies are not those of the config" in " ".join(out.err.split())
+
+
+def test_followers_of_a_fixed_joint_and_negative_speeds_are_said(tmp_path):
+    file = tmp_path / "grip.urdf"
+    link = "<link name='{0}'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1'/></inertial></link>"
+    joint = "<joint name='{0}' type='{1}'><parent link='{2}'/><child link='{3}'/><axis xyz='0 0 1'/>{4}</joint>"
+    limit = "<limit lower='-1' upper='1' effort='5' velocity='{}'/>"
+    file.write_text(
+        "<robot name='grip'>" + "".join(link.format(name) for name in "abcd")
+        + joint.format("j", "revolute", "a", "b", limit.format(-1))
+        + joint.format("f", "fixed", "b", "c", "")
+        + joint.format("m", "revolute", "b", "d", limit.format(1) + "<mimic joint='f' multiplier='2' offset='0.1'/>")
+        + "</robot>"
+    )  # fmt: skip
+    found = imported(SourceSection(file=file))
+    assert "m follows f, which is fixed, and so is locked at 0.1" in found.remarks
+    assert any("velocity=-1 is taken for 1" in remark for remark in found.remarks)

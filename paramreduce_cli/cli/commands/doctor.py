@@ -1,6 +1,5 @@
 """The command that says what this machine has."""
 
-import importlib
 import importlib.metadata
 import os
 import platform
@@ -78,11 +77,12 @@ def _extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
     if None in versions:
         text = f"pip install 'paramreduce[{extra}]' brings {' and '.join(names)}"
         return f"extra {extra}", "none", text
-    try:
-        for name in names:
-            importlib.import_module(name)
-    except Exception as error:  # whatever is broken in it
-        return f"extra {extra}", "wrong", f"{', '.join(names)} cannot be imported: {error}"
+    # In a process of its own, which a broken library may end.
+    words = [sys.executable, "-c", f"import {', '.join(names)}"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    if done.returncode:
+        said = done.stderr.strip().rpartition("\n")[2] or f"exit code {done.returncode}"
+        return f"extra {extra}", "wrong", f"{', '.join(names)} cannot be imported: {said}"
     listed = (f"{name} {version}" for name, version in zip(names, versions, strict=True))
     return f"extra {extra}", "ok", ", ".join(listed)
 

@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import click
+import numpy as np
 
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
@@ -17,6 +18,9 @@ from paramreduce_cli.export.trajectory_formats import trajectory_formats
 from paramreduce_cli.export.ways import Ways
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Model, Trajectories, Trajectory
+
+_RUN = ("ros", "urscript")
+"""Formats that a controller runs as they are."""
 
 
 @click.command("export-trajectory")
@@ -33,6 +37,8 @@ from paramreduce_cli.records import Model, Trajectories, Trajectory
 )  # fmt: skip
 @click.option("--rate", type=click.FloatRange(1, 1e5), default=125.0, show_default=True,
               help="Samples per second.")  # fmt: skip
+@click.option("--allow-moving-start", "moving", is_flag=True,
+              help="Also write code for a controller that begins in motion.")  # fmt: skip
 @click.option(
     "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/trajectory-FORMAT]",
@@ -45,6 +51,7 @@ def export_trajectory(
     kind: str,
     which: str | None,
     rate: float,
+    moving: bool,
     output: Path | None,
 ) -> None:
     """Write an exciting trajectory as a controller runs it.
@@ -68,10 +75,17 @@ def export_trajectory(
         )  # fmt: skip
 
     which, motion = (which, timed(which)) if which else _first(trajectories, timed)
+    speed = float(np.abs(motion.dz[0]).max())
+    at_rest = trajectories.rest_to_rest or pose is not None
+    if not at_rest and kind in _RUN and not moving:
+        raise ConfigError(
+            f"{which} begins in motion, at up to {speed:.2g} rad/s (m/s), and a controller would jump to that. Set "
+            "trajectories.start_pose or trajectories.rest_to_rest in the config; or add --allow-moving-start."
+        )
     files = trajectory_formats[kind](motion)
     folder = output or store.folder / "export" / f"trajectory-{kind}"
     save_files(folder, {name: text.encode() for name, text in files.items()})
-    rests = "" if trajectories.rest_to_rest or pose is not None else ", which begins in motion"
+    rests = "" if at_rest else f", which begins in motion at up to {speed:.2g} rad/s (m/s)"
     say(f"{which}{rests}, {motion.time[-1]:.4g} s: {', '.join(files)} in {folder}")
 
 

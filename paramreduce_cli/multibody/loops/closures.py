@@ -74,6 +74,8 @@ def _equations(joints: list[JointMotion], closure: Closure, q: ca.SX) -> list[ca
         return list(gap)
     if closure.kind == "universal":
         return [*gap, *along((0,), axis(1))]
+    if closure.kind not in EQUATIONS:
+        raise ValueError(f"there is no closure of the kind {closure.kind!r}")
     place = along((0, 1), gap) if closure.kind in ("prismatic", "cylindrical") else list(gap)
     turn = along((1,), axis(0)) if closure.kind in ("prismatic", "fixed") else []
     return [*place, *along((0, 1), axis(2)), *turn]
