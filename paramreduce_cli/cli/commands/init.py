@@ -4,6 +4,7 @@ import os
 import re
 import tempfile
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from shlex import quote
 
@@ -96,6 +97,8 @@ def init(
     else:
         robot = imported(choice)
         path = output or Path("configs") / f"{robot.name}.yaml"
+        if re.fullmatch(NAME, path.stem, re.ASCII):  # results go to a folder of the robot's name
+            robot = replace(robot, name=path.stem)
         base = robot.independent[:_BASE] if floating else ()
         log = _log(path, logs, robot.independent, base) if logs else ""
         text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
