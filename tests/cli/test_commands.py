@@ -236,6 +236,12 @@ def test_init_writes_a_config_that_runs(invoke, tmp_path):
     invoke("run", path, "--results", tmp_path / "r", "--quiet", settings=small)
 
 
+def test_a_robot_is_called_after_its_config(invoke, tmp_path):
+    urdf = next((CONFIGS / "robots").glob("*.urdf"))
+    invoke("init", urdf, "--output", tmp_path / "my_arm.yaml")
+    assert load_config(tmp_path / "my_arm.yaml").robot == "my_arm"
+
+
 @pytest.mark.parametrize("kind", ["--tree", "--loop", "--recorded"])
 def test_init_writes_configs_to_be_filled_in_that_build(invoke, tmp_path, kind):
     path = tmp_path / "new.yaml"
