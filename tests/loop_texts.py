@@ -62,7 +62,7 @@ trajectories: {{position_limits: [-1, 1], velocity_limits: 1}}
 """A vertical axis that is reached by rotations: gravity cancels."""
 
 
-def loaded(folder, text, **values):
+def load_text(folder, text, **values):
     """The config of a text with values filled in."""
     path = folder / "config.yaml"
     path.write_text(text.format(**values))

@@ -198,11 +198,11 @@ def _bag(path: Path) -> RawLog:
     columns: dict[str, FloatArray] = {}
     for topic in dict.fromkeys(topic for topic, _ in found):
         fields = {name: columns for (own, name), columns in found.items() if own == topic}
-        columns |= _of_topic(topic, fields, start)
+        columns |= _name_columns(topic, fields, start)
     return RawLog(str(path), columns, first_line=None)
 
 
-def _of_topic(
+def _name_columns(
     topic: str, fields: Mapping[str, tuple[array.array, array.array]], start: float
 ) -> dict[str, FloatArray]:
     """Name the columns of a topic, and their times: TOPIC/time of most columns, of others TOPIC/time_of/FIELD.

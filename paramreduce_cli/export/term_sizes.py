@@ -15,7 +15,7 @@ _SHARE = 1e-3
 _SMALLEST = 1e-300
 
 
-def term_sizes(
+def estimate_term_sizes(
     mechanism: Mechanism, model: ReducedModel, stored: Mapping[str, FloatArray]
 ) -> dict[str, float]:
     """Estimate the smallest size that each result is judged by.

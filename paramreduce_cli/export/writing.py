@@ -17,7 +17,7 @@ from paramreduce_cli.export.check import (
     single_precision_errors,
 )
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
-from paramreduce_cli.export.term_sizes import term_sizes
+from paramreduce_cli.export.term_sizes import estimate_term_sizes
 from paramreduce_cli.export.validity import validity, within
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
@@ -100,7 +100,7 @@ def exported_model(
     tell(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
     checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
-    least = term_sizes(mechanism, chosen, checked)
+    least = estimate_term_sizes(mechanism, chosen, checked)
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
     if whole and simplified is None:

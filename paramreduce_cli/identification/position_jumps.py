@@ -55,7 +55,7 @@ def find_position_jumps(found: Signals) -> PositionJumps:
     """
     speed, slack = _largest_speeds(found), _SMALL * _ranges(found.z)
     bad = np.zeros(found.time.size, bool)
-    edges = [0, *(_jumps(found, speed, slack) + 1).tolist(), found.time.size]
+    edges = [0, *(_find_jumps(found, speed, slack) + 1).tolist(), found.time.size]
     if len(edges) == _UNBROKEN:
         return PositionJumps(bad, np.zeros(0, np.int64))
     stretches = []
@@ -79,13 +79,13 @@ def find_position_jumps(found: Signals) -> PositionJumps:
     steps: list[int] = []
     after = [(a, b - 1) for a, b in stretches[longest:]]
     before = [(b - 1, a) for a, b in reversed(stretches[: longest + 1])]
-    for way in (after, before):
-        for last, first, skipped in _followed(way, reachable, soon):
+    for stretches_passed in (after, before):
+        for last, first, skipped in _follow_stretches(stretches_passed, reachable, soon):
             for a, b in skipped:
                 bad[min(a, b) : max(a, b) + 1] = True
             if not reachable(last, first):
                 steps.append(max(first, last))
-    bad |= _same_numbers(found, bad)
+    bad |= _repeat_bad_rows(found, bad)
     if np.mean(bad) > _MOST_BAD:
         raise DataError(
             f"positions jump in {np.count_nonzero(bad)} of {bad.size} rows, faster than the joints move otherwise. Bring "
@@ -94,13 +94,13 @@ def find_position_jumps(found: Signals) -> PositionJumps:
     return PositionJumps(bad, np.array(sorted(steps), dtype=np.int64))
 
 
-_Way = Sequence[tuple[int, int]]
+_Stretches = Sequence[tuple[int, int]]
 """First and last row of stretches, in the order in which they are passed."""
 
 
-def _followed(
-    way: _Way, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
-) -> Iterator[tuple[int, int, _Way]]:
+def _follow_stretches(
+    way: _Stretches, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
+) -> Iterator[tuple[int, int, _Stretches]]:
     """Yield the row that is left, the one that is gone on with, and the stretches between them."""
     last, k = way[0][1], 1
     while k < len(way):
@@ -113,7 +113,7 @@ def _followed(
         last, k = way[found][1], found + 1
 
 
-def _jumps(found: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
+def _find_jumps(found: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
     """Rows after which a position goes farther than its joint can, (n_jumps,)."""
     duration = np.diff(found.time)
     jumps = np.zeros(duration.size, bool)
@@ -152,7 +152,7 @@ def _ranges(z: FloatArray) -> FloatArray:
     return np.array([np.ptp(column) for column in smooth])
 
 
-def _same_numbers(found: Signals, bad: BoolArray) -> BoolArray:
+def _repeat_bad_rows(found: Signals, bad: BoolArray) -> BoolArray:
     """Whether rows hold the numbers that most rows with these numbers are bad by."""
     if not bad.any():
         return bad

@@ -181,7 +181,7 @@ def _read(
         rows, first_line = recorded.time.size, log.first_line
         del log  # the next one is read while this name would hold it
         try:
-            recorded, parted, jumps = _without_jumps(recorded, wanted, names, first_line)
+            recorded, parted, jumps = _cut_out_jumps(recorded, wanted, names, first_line)
             files.doubts += [f"{source}: {text}" for text in jumps]
             if wanted.delay:
                 _undelay(recorded, wanted.delay, source)
@@ -205,7 +205,7 @@ def _read(
     return files
 
 
-def _without_jumps(
+def _cut_out_jumps(
     recorded: Signals, wanted: LogSection, names: Sequence[str], first_line: int | None
 ) -> tuple[Signals, list[int], list[str]]:
     """Cut out the rows of a recording in which positions jump.

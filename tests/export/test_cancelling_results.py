@@ -6,13 +6,13 @@ import sys
 
 import numpy as np
 import pytest
-from loop_texts import PARALLELOGRAM, TURNTABLE, loaded
+from loop_texts import PARALLELOGRAM, TURNTABLE, load_text
 
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.export.check import check
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.term_sizes import entry_sizes, term_sizes
+from paramreduce_cli.export.term_sizes import entry_sizes, estimate_term_sizes
 from paramreduce_cli.export.writing import (
     Exported,
     exported_functions,
@@ -24,7 +24,7 @@ from paramreduce_cli.stages.build_model import build_model
 
 
 def built(folder, text, **values):
-    config = loaded(folder, text, **values)
+    config = load_text(folder, text, **values)
     return build_model(config, config.model, Run())
 
 
@@ -73,7 +73,7 @@ def test_a_wrong_torque_of_a_weak_joint_is_found_beside_a_strong_one(tmp_path):
     chosen, _ = chosen_model("full", model, None, None)
     functions = exported_functions(model, chosen, Exported.IDM)
     stored = random_cases(model.mechanism, chosen, 20, np.random.default_rng(0))
-    least = term_sizes(model.mechanism, chosen, stored)
+    least = estimate_term_sizes(model.mechanism, chosen, stored)
     check(functions, stored, least)
     stored["tau"][3] += 1e-9 * np.abs(stored["tau"]).max()
     with pytest.raises(FormulationError, match="tau is off by"):

@@ -18,7 +18,7 @@ from paramreduce_cli.export.check import check, random_cases
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.exported import identifier, plain, wrapped
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.term_sizes import term_sizes
+from paramreduce_cli.export.term_sizes import estimate_term_sizes
 from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
@@ -204,7 +204,7 @@ def test_functions_are_the_reference_on_a_thousand_states(name, request):
     chosen, _ = chosen_model("full", model, None, None)
     functions = exported_functions(model, chosen, Exported.BOTH)
     stored = random_cases(model.mechanism, chosen, 1000, np.random.default_rng(11))
-    check(functions, stored, term_sizes(model.mechanism, chosen, stored), 1e-12)
+    check(functions, stored, estimate_term_sizes(model.mechanism, chosen, stored), 1e-12)
 
 
 @needs_gcc
