@@ -65,12 +65,12 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                         "headings."
                     )
                 table.extend(
-                    math.nan
-                    if leave_out_text
-                    and (not row[k].strip() or (k in begun_empty and not _is_number(row[k])))
-                    else _number(path, rows.line_num, header[k], row[k])
+                    _number(
+                        path, rows.line_num, header[k], row[k],
+                        empty=leave_out_text, text=k in begun_empty,
+                    )
                     for k in kept
-                )
+                )  # fmt: skip
             return [header[k] for k in kept], table.matrix(len(kept))
     except FileNotFoundError as error:
         raise missing(path) from error
@@ -111,10 +111,13 @@ def _looks_numeric(cell: str) -> bool:
     return _is_number(cell.replace(",", "."))
 
 
-def _number(path: Path, line: int, heading: str, cell: str) -> float:
+def _number(path: Path, line: int, heading: str, cell: str, *, empty: bool, text: bool) -> float:
+    """Read a cell; an empty one, or text, is not a number where it may stand, and an error elsewhere."""
     try:
         return float(cell)
     except ValueError as error:
+        if text or (empty and not cell.strip()):
+            return math.nan
         raise DataError(
             f"{path}, line {line}, column {heading}: {cell!r} is not a number.{_remedy(cell)}"
         ) from error

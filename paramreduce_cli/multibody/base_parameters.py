@@ -64,7 +64,7 @@ def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
         for kind, column in mechanism.drive_columns(drive).items():
             forces = weight if kind in _OF_A_STATE else 1.0
             scale[:, column] = np.sqrt(len(K)) * weight * forces
-    return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0) & (norms.max(axis=0) > 0)
+    return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0)
 
 
 def base_parameters(

@@ -68,7 +68,7 @@ def test_self_tests_pass(name, kind, tmp_path):
     assert done.returncode == 0, done.stdout + done.stderr
 
 
-def test_a_wrong_torque_of_a_weak_joint_is_found_beside_a_strong_one(tmp_path):
+def test_a_wrong_torque_is_found_beside_results_that_cancel(tmp_path):
     model = turntable(tmp_path)
     chosen, _ = chosen_model("full", model, None, None)
     functions = exported_functions(model, chosen, Exported.IDM)
