@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paramreduce_cli.records import (
+    SETS,
+    ErrorRange,
+    FloatArray,
     Identification,
     Model,
     ReducedModel,
@@ -63,7 +66,7 @@ def _(record: Model) -> Iterator[Row]:
 
 @_rows.register
 def _(record: Trajectories) -> Iterator[Row]:
-    for which in ("estimation", "validation"):
+    for which in SETS:
         for k, trajectory in enumerate(getattr(record, which), 1):
             values = {f.name: getattr(trajectory, f.name) for f in fields(trajectory)}
             numbers = {key: v for key, v in values.items() if isinstance(v, int | float | str)}
@@ -84,7 +87,19 @@ def _(record: Validation) -> Iterator[Row]:
     for name, judged in record.heuristics.items():
         columns = {key: value for key, value in vars(judged).items() if np.ndim(value) == 1}
         for k in range(judged.n.size):
-            yield {"heuristic": name} | {key: column[k] for key, column in columns.items()}
+            yield (
+                {"heuristic": name}
+                | {key: column[k] for key, column in columns.items()}
+                | {f"{what}_error_test{end}": value
+                   for what in ("torque", "acceleration")
+                   for end, value in _ends(getattr(judged, f"{what}_error_test")[k])}
+            )  # fmt: skip
+
+
+def _ends(errors: FloatArray) -> Iterator[tuple[str, float]]:
+    """Median and worst error over the motions of the test set, with what their columns' names end with."""
+    found = ErrorRange.of(errors)
+    yield from (("", found.median), ("_worst", found.worst))
 
 
 @_rows.register

@@ -127,10 +127,7 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
     if config is not None and kind is Coefficients:
         files = {"coefficients": config.trajectories.file}
     elif config is not None and kind is Recordings:
-        files = {
-            "estimation": config.sampling.estimation_file,
-            "validation": config.sampling.validation_file,
-        }
+        files = config.sampling.files()
     elif config is not None and kind is RawLogs and config.sampling.log is not None:
         log = config.sampling.log
         files = {f"training {k}": path for k, path in enumerate(log.files)}
@@ -140,7 +137,7 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
 
 _NAMED_BY = {
     Coefficients: "trajectories.file",
-    Recordings: "sampling.estimation_file and validation_file",
+    Recordings: "sampling.estimation_file, validation_file and test_file",
     RawLogs: "sampling.log.files and held_out_files",
 }
 """Keys of files that users bring."""
@@ -159,8 +156,12 @@ def measured_torques(config: Config) -> bool:
     """Whether the torques of both sets were measured on a machine."""
     if config.sampling.log is not None:
         return True
-    both = len(brought_files(config, Recordings)) == 2
-    return both and config.sampling.torques == "measured"
+    return _is_recorded(config) and config.sampling.torques == "measured"
+
+
+def _is_recorded(config: Config) -> bool:
+    """Whether the estimation and the validation set are recordings, so that no trajectories are needed."""
+    return {"estimation", "validation"} <= brought_files(config, Recordings).keys()
 
 
 def check_is_asked_for(stage: Stage, config: Config) -> None:
@@ -180,7 +181,7 @@ def stages_to_run(config: Config) -> list[Stage]:
     """The stages of a full run: without trajectories where both sets are recordings, or simulated."""
     logged = config.sampling.log is not None
     simulated = config.sampling.simulation is not None
-    recorded = logged or simulated or len(brought_files(config, Recordings)) == 2
+    recorded = logged or simulated or _is_recorded(config)
     idle = {
         Trajectories: recorded,
         MeasuredLog: not logged,

@@ -14,6 +14,7 @@ from paramreduce_cli.config.concerns import explained
 from paramreduce_cli.errors import ConcernError, ParamreduceWarning
 from paramreduce_cli.pipeline import Stage, brought_files
 from paramreduce_cli.records import (
+    SETS,
     Coefficients,
     Progress,
     RawLog,
@@ -107,7 +108,7 @@ def _coefficients(inputs: Inputs) -> Coefficients | None:
 
 def _recordings(inputs: Inputs) -> Recordings:
     assert inputs.config is not None
-    found: dict[str, Recording | None] = {"estimation": None, "validation": None}
+    found: dict[str, Recording | None] = dict.fromkeys(SETS)
     for name, path in inputs.files(Recordings).items():
         found[name] = load_recording(path, inputs.config.n_dof)
     return Recordings(**found)

@@ -42,7 +42,10 @@ def _difference(row, n, fits, torque, acceleration, inverse, direct, values):
     if row is None:
         return "not in the summary"
     for text, kind in ((torque, "torque_error"), (acceleration, "acceleration_error")):
-        if not _same(text, [row[kind][s] for s in _SETS]):
+        errors = [row[kind][s] for s in _SETS]
+        if row[kind]["test"] is not None:
+            errors.append(row[kind]["test"]["median"])
+        if not _same(text, errors):
             return f"{kind}: {text}"
     if (inverse, direct) != tuple(str(row["operations"][f]) for f in ("inverse", "direct")):
         return f"operations: {inverse}, {direct}"

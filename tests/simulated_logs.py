@@ -130,7 +130,7 @@ def log_config(folder, extra=""):
     text = TWO_LINK.read_text().replace(
         "selected:\n  heuristic: forward-selection\n  n: 4", "selected:\n  cross_validation: true"
     )
-    text = text.replace("  accept:\n    torque_error_validation: 0.05", "  stability: false")
+    text = text.replace("  accept:\n    torque_error_test: 0.05", "  stability: false")
     path = folder / "arm.yaml"
     path.write_text(text + LOG_CONFIG + extra)
     return path

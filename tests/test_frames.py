@@ -19,13 +19,12 @@ def test_a_model_has_a_row_for_every_parameter(results):
     assert (row["body"], row["kind"], row["unit"]) == ("fore", "mx", "kg m")
 
 
-def test_trajectories_of_both_sets(results):
+def test_trajectories_of_all_sets(results):
     table = pr.frame(results.trajectories)
     found = results.trajectories
-    assert table["set"].tolist() == ["estimation"] * len(found.estimation) + ["validation"] * len(
-        found.validation
-    )
-    assert table["kappa"].tolist() == [t.kappa for t in (*found.estimation, *found.validation)]
+    sets = {name: getattr(found, name) for name in ("estimation", "validation", "test")}
+    assert table["set"].tolist() == [name for name, own in sets.items() for _ in own]
+    assert table["kappa"].tolist() == [t.kappa for own in sets.values() for t in own]
 
 
 def test_every_model_of_a_reduction_and_of_its_validation(results):

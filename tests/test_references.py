@@ -36,9 +36,9 @@ def test_selection_on_the_committed_trajectories(robot):
     wanted = config.trajectories
     trajectories = Trajectories(
         summary["trajectories"]["period"], wanted.points, "", "", wanted.use_full_range, False, "",
-        wanted.limits(config.n_dof), (), series("estimation"), series("validation"),
+        wanted.limits(config.n_dof), (), series("estimation"), series("validation"), (), (),
     )  # fmt: skip
-    samples = sample(config.sampling, model, trajectories, Recordings(None, None))
+    samples = sample(config.sampling, model, trajectories, Recordings(None, None, None))
     counted = config.validation.operations
     reduction = reduce(config.reduction, counted, model, samples, None, Run(jobs=2))
     found = reduction.heuristics

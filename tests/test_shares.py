@@ -69,7 +69,7 @@ def test_more_parts_than_trajectories_make_what_one_job_makes(two_link_results, 
 
 
 def test_parts_of_loops_are_whole_trajectories(tmp_path):
-    few = ["trajectories.count=2", "trajectories.starts=1", "trajectories.polished=1",
+    few = ["trajectories.count=2", "trajectories.test_count=1", "trajectories.starts=1", "trajectories.polished=1",
            "trajectories.points=30"]  # fmt: skip
     runner = Runner(config_of("four_bar", *few), Store(tmp_path))
     for name in ("build-model", "optimize-trajectories", "sample"):
@@ -91,7 +91,8 @@ def test_parts_of_one_recording(two_link_results, tmp_path):
     with h5py.File(recording, "w") as file:
         file["time"] = np.arange(len(z)) / 100
         file["z"], file["dz"], file["ddz"], file["tau"] = z, dz, ddz, tau
-    given = [f"sampling.estimation_file={recording}", f"sampling.validation_file={recording}"]
+    given = [f"sampling.estimation_file={recording}", f"sampling.validation_file={recording}",
+             "validation.accept={}"]  # fmt: skip
     runner = Runner(config_of("two_link", *given), Store(tmp_path / "r"))
     runner.run(STAGES["build-model"])
     runner.run(STAGES["sample"])

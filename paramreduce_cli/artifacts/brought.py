@@ -11,7 +11,7 @@ from paramreduce_cli.artifacts.atomic import missing
 from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import Reader, reading
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import Coefficients, FloatArray, Recording
+from paramreduce_cli.records import SETS, Coefficients, FloatArray, Recording
 
 _HDF5 = (".h5", ".hdf5")
 _FEWEST_SAMPLES = 10
@@ -29,12 +29,20 @@ def load_coefficients(path: Path) -> Coefficients:
     if path.suffix in _HDF5:
         with reading(path) as reader:
             period = reader.attribute("period")
-            sets = {name: reader.array(f"{name}/coefficients", 3) for name in _SETS}
+            sets = {
+                name: reader.array(f"{name}/coefficients", 3)
+                for name in SETS
+                if f"{name}/coefficients" in reader or name != "test"
+            }
     else:
         period, sets = _coefficients_from_json(path)
     if not isinstance(period, int | float) or not 0 < period < math.inf:
         raise DataError(f"{path}: the period must be a positive number of seconds.")
+    if "test" not in sets or not sets["test"].size:
+        sets["test"] = sets["validation"][:0]
     for name, values in sets.items():
+        if name == "test" and not len(values):
+            continue
         if values.ndim != 3 or 0 in values.shape or not np.isfinite(values).all():
             raise DataError(
                 f"{path}: the {name} coefficients must be finite numbers of shape (n_traj, n_dof, "
@@ -45,10 +53,7 @@ def load_coefficients(path: Path) -> Coefficients:
                 f"{path}: the {name} coefficients have {values.shape[2]} numbers per joint; [q0, "
                 "a1, b1, a2, b2, ...] is an odd count."
             )
-    return Coefficients(str(path), float(period), sets["estimation"], sets["validation"])
-
-
-_SETS = ("estimation", "validation")
+    return Coefficients(str(path), float(period), **sets)
 
 
 def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
@@ -57,7 +62,8 @@ def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
         trajectories = data["trajectories"]
         sets = {
             name: np.array([entry["coefficients"] for entry in trajectories[name]], dtype=float)
-            for name in _SETS
+            for name in SETS
+            if name in trajectories or name != "test"
         }
         return trajectories["period"], sets
     except FileNotFoundError as error:

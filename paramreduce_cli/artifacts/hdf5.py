@@ -23,7 +23,7 @@ from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_f
 from paramreduce_cli.artifacts.checked import CheckedRows, RowChecks, write_checks
 from paramreduce_cli.errors import ArtifactError
 
-SCHEMA = 17
+SCHEMA = 18
 """Version of the layout of all artifacts; raised whenever a name, shape or unit changes."""
 
 _CHUNK = 16384

@@ -20,7 +20,7 @@ from paramreduce_cli.artifacts.places import SHARES
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
-from paramreduce_cli.records import LAST, Block, FloatArray, Model, Samples, SampleSet
+from paramreduce_cli.records import LAST, SETS, Block, FloatArray, Model, Samples, SampleSet
 
 if TYPE_CHECKING:
     from paramreduce_cli.multibody.dynamics import Dynamics
@@ -42,9 +42,10 @@ def save_samples(writer: Writer, samples: Samples) -> None:
         value = getattr(samples, name)
         if value is not None:
             writer.dataset("parameters/values" if name == "values" else name, value)
-    save_sample_set(writer, "estimation", samples.estimation)
-    if samples.validation is not None:
-        save_sample_set(writer, "validation", samples.validation)
+    for name in SETS:
+        one = getattr(samples, name)
+        if one is not None:
+            save_sample_set(writer, name, one)
 
 
 _STATES = ("z", "dz", "ddz", "tau")
@@ -275,7 +276,7 @@ def load_samples(reader: Reader) -> Samples:
             return StoredSet(reader.path, name, n, own=own)
         return JoinedSet([]) if own and _is_empty(reader, name) else None
 
-    estimation, validation = stored("estimation"), stored("validation")
+    estimation = stored("estimation")
     assert estimation is not None
     nominal = {
         key: _optional(reader, key, reader.rows("estimation/tau").shape[1])
@@ -290,7 +291,8 @@ def load_samples(reader: Reader) -> Samples:
         nominal_torque=nominal.get("nominal_torque"),
         nominal_acceleration=nominal.get("nominal_acceleration"),
         estimation=estimation,
-        validation=validation,
+        validation=stored("validation"),
+        test=stored("test"),
     )
 
 

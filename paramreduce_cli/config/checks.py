@@ -157,8 +157,8 @@ def _simulation(config: Config) -> Iterator[Problem]:
         if Kind.COULOMB in drive.effects() and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
-    if sampling.estimation_file or sampling.validation_file or sampling.symmetries:
-        yield path, "makes both sets; leave out files and symmetries"
+    if any(sampling.files().values()) or sampling.symmetries:
+        yield path, "makes all sets; leave out files and symmetries"
 
 
 def _massless(config: Config) -> Iterator[Problem]:
@@ -255,6 +255,26 @@ def _limits(config: Config) -> Iterator[Problem]:
         yield ("trajectories", "polished"), f"is {t.polished}, but there are {t.starts} starts"
 
 
+def _acceptance(config: Config) -> Iterator[Problem]:
+    """Limits of errors on a test set where there will be none."""
+    sampling, motions = config.sampling, config.trajectories
+    if sampling.test_file is not None:
+        return
+    if sampling.log is not None or (sampling.estimation_file and sampling.validation_file):
+        instead = "torque_error_validation is on what was held out"
+    elif sampling.simulation is not None and not sampling.simulation.test_runs:
+        instead = "give sampling.simulation.test_runs"
+    elif sampling.simulation is None and not (
+        motions.test_count or motions.test_point_to_point_count
+    ):
+        instead = "give trajectories.test_count"
+    else:
+        return
+    for name in config.validation.accept.model_dump(exclude_none=True):
+        if "_test" in name:
+            yield ("validation", "accept", name), f"is on a test set, but there is none; {instead}"
+
+
 def _unmeasured(config: Config) -> Iterator[Problem]:
     names = config.description.bodies.independent_names()
     for k, name in enumerate(config.unmeasured):
@@ -319,6 +339,7 @@ _CHECKS: tuple[Check, ...] = (
     _parameter_sets,
     _per_joint,
     _limits,
+    _acceptance,
     _unmeasured,
     _parameter_names,
     _numbers_of_parameters,

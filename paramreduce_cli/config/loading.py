@@ -316,7 +316,7 @@ def _with_paths(config: Config, folder: Path) -> Config:
         update = {name: folder / path for name, path in found.items() if path is not None}
         return section.model_copy(update=update)
 
-    sampling = resolved(config.sampling, "estimation_file", "validation_file")
+    sampling = resolved(config.sampling, "estimation_file", "validation_file", "test_file")
     if sampling.log is not None:
         files = {
             key: [folder / path for path in getattr(sampling.log, key)]

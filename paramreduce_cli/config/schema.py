@@ -18,6 +18,7 @@ from paramreduce_cli.fields.names import OneMethod, OneOf
 from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import (
     Count,
+    CountOrNone,
     LimitPerJoint,
     Name,
     Pair,
@@ -32,6 +33,7 @@ from paramreduce_cli.fields.section import (
     per_joint,
 )
 from paramreduce_cli.records import (
+    SETS,
     Constraint,
     CountedDynamics,
     JointLimits,
@@ -65,6 +67,10 @@ class TrajectoriesSection(Section):
     """Trajectories of the estimation set."""
     validation_count: Count = 1
     """Trajectories of the validation set."""
+    test_count: CountOrNone = 10
+    """Trajectories of the test set, which are optimised like the others, and which nothing before `validate` looks at."""
+    test_point_to_point_count: CountOrNone = 10
+    """Motions from rest to rest that the test set holds besides, between positions that its trajectories pass, as fast as the limits allow."""
     harmonics: Annotated[Whole, Field(ge=1, le=100)] = 4
     """Harmonics of the Fourier series."""
     period: Span = 2 * np.pi
@@ -162,6 +168,8 @@ class SimulationSection(Section):
     """Motions of the estimation set."""
     validation_runs: Count = 1
     """Motions of the validation set."""
+    test_runs: CountOrNone = 10
+    """Motions of the test set."""
     start: dict[str, Pair] = {}
     """[lower, upper] of independent coordinates at the start, at rest, rad (m); where the mechanism is assembled, or zero, if left out."""
     seed: Seed = 0
@@ -169,7 +177,7 @@ class SimulationSection(Section):
 
 
 class SamplingSection(Section):
-    """The estimation and validation sets."""
+    """The estimation, validation and test sets."""
 
     points: Annotated[Whole, Field(ge=2, le=10_000_000)] | None = None
     """Samples per estimation trajectory; as many as trajectories.points if left out."""
@@ -179,6 +187,8 @@ class SamplingSection(Section):
     """Recorded states (CSV or HDF5) instead of the estimation trajectories; relative to this file."""
     validation_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the validation trajectories; relative to this file."""
+    test_file: Path | None = None
+    """Recorded states (CSV or HDF5) instead of the trajectories of the test set; relative to this file."""
     simulation: SimulationSection | None = None
     """Simulated motions instead of trajectories, for both sets."""
     log: LogSection | None = None
@@ -189,6 +199,10 @@ class SamplingSection(Section):
     """Symmetries of the mechanism that complete the estimation set: each lists, for every independent coordinate in turn, the one that moves in its place, `-NAME` where it moves the other way."""
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic accelerations, one for all joints or a list, rad/s^2 (m/s^2 if prismatic); or their standard deviation over the estimation set."""
+
+    def files(self) -> dict[str, Path | None]:
+        """Recorded states by the set that they are."""
+        return {name: getattr(self, f"{name}_file") for name in SETS}
 
     @property
     def measured(self) -> bool:
@@ -343,10 +357,18 @@ class Acceptance(Section):
     """Of the torques on the estimation set, a share (0.01 is 1 %)."""
     torque_error_validation: Positive | None = None
     """Of the torques on the validation set, a share."""
+    torque_error_test: Positive | None = None
+    """Of the torques, the median over the motions of the test set, a share."""
+    torque_error_test_worst: Positive | None = None
+    """Of the torques, the worst of the motions of the test set, a share."""
     acceleration_error_estimation: Positive | None = None
     """Of the accelerations on the estimation set, a share."""
     acceleration_error_validation: Positive | None = None
     """Of the accelerations on the validation set, a share."""
+    acceleration_error_test: Positive | None = None
+    """Of the accelerations, the median over the motions of the test set, a share."""
+    acceleration_error_test_worst: Positive | None = None
+    """Of the accelerations, the worst of the motions of the test set, a share."""
     operations_inverse: Positive | None = None
     """Operations of the inverse dynamics."""
     operations_direct: Positive | None = None

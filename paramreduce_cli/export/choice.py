@@ -5,6 +5,7 @@ from dataclasses import replace
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import (
     TERMS,
+    ErrorRange,
     Identification,
     Model,
     ModelChoice,
@@ -15,7 +16,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
-from paramreduce_cli.texts import EXACT, share
+from paramreduce_cli.texts import EXACT, share, share_range
 
 FULL, BASE = "full", "base"
 IDENTIFIED, CONSISTENT = "identified", "consistent"
@@ -71,6 +72,9 @@ def chosen_model(
     if judged and (known_row := judged.row(choice.n)) is not None:
         other = float(judged.torque_error_validation[known_row])
         title += f", {share(other)} on the validation set"
+        test = judged.torque_error_test[known_row]
+        if test.size:
+            title += f", {share_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
     return reduced_model(reduction, choice.heuristic, row, known), title
 
@@ -118,6 +122,9 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
+    if term.torque_error_test.size:
+        test = share_range(*ErrorRange.of(term.torque_error_test))
+        title += f", {test} on {term.torque_error_test.size} motions that no search looked at"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)
     return model, term, title

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray, Mechanism, TermModel
-from paramreduce_cli.texts import share
+from paramreduce_cli.records import ErrorRange, FloatArray, Mechanism, TermModel
+from paramreduce_cli.texts import share, share_range
 
 
 def within(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
@@ -36,6 +36,9 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
     if known := " / ".join(share(error) for error in errors if np.isfinite(error)):
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
+    test = ErrorRange.of(term.acceleration_error_test)
+    if np.isfinite(test.median):
+        lines.append(f"The same on motions that no search looked at: {share_range(*test)}.")
     where = "both sets"
     if term.random_states or term.mass_states:
         lines.append("Random states inside the limits were looked at, with these ranges:")

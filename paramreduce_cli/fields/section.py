@@ -12,6 +12,7 @@ NAME = r"^[A-Za-z0-9][A-Za-z0-9_.-]*$"
 Positive = Annotated[Number, Field(gt=0)]
 Span = Annotated[Number, Field(ge=1e-6, le=1e6)]
 Count = Annotated[Whole, Field(ge=1, le=100_000)]
+CountOrNone = Annotated[Whole, Field(ge=0, le=100_000)]
 Seed = Annotated[Whole, Field(ge=0)]
 _NAME = {"anyOf": [{"type": "string", "pattern": NAME}, {"type": "integer"}]}
 ONE_OR_MORE_NAMES = WithJsonSchema({"anyOf": [*_NAME["anyOf"], {"type": "array", "items": _NAME}]})

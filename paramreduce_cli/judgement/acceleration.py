@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from paramreduce_cli.judgement.torque import joint_errors
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS
 from paramreduce_cli.records import Block, FloatArray
 
@@ -17,15 +18,28 @@ _VALUES_AT_ONCE = 4_000_000
 
 @dataclass(frozen=True)
 class AccelerationErrors:
-    """Of many models; each (n_models,) unless said otherwise."""
+    """Acceleration errors and mass matrices of many models."""
 
-    error: FloatArray
-    joints: FloatArray
-    """Joint by joint, (n_models, n_dof)."""
+    squares: FloatArray
+    """Sums of the squares of what is missed, each joint's divided by its nominal acceleration, (n_models, n_dof)."""
+    total: FloatArray
+    """The same of the accelerations themselves, (n_dof,)."""
     condition: FloatArray
-    """Largest condition number of the mass matrix over the samples."""
+    """Largest condition number of the mass matrix over the samples, (n_models,)."""
     smallest_eigenvalue: FloatArray
-    """Smallest eigenvalue of the mass matrix over the samples."""
+    """Smallest eigenvalue of the mass matrix over the samples, (n_models,)."""
+
+    @property
+    def error(self) -> FloatArray:
+        """Of all joints together, (n_models,)."""
+        total = max(self.total.sum(), np.finfo(float).tiny)
+        result: FloatArray = np.sqrt(self.squares.sum(axis=1) / total)
+        return result
+
+    @property
+    def joints(self) -> FloatArray:
+        """Joint by joint, (n_models, n_dof)."""
+        return joint_errors([self])
 
 
 def acceleration_errors(
@@ -69,10 +83,4 @@ def acceleration_errors(
             ratio = np.where(singular, np.inf, largest / np.where(singular, 1.0, sizes.min(axis=2)))
             condition = np.maximum(condition, ratio.max(axis=0))
             smallest = np.minimum(smallest, values.min(axis=(0, 2)))
-    tiny = np.finfo(float).tiny
-    return AccelerationErrors(
-        error=np.sqrt(squares.sum(axis=1) / max(total.sum(), tiny)),
-        joints=np.sqrt(squares / np.maximum(total, tiny)),
-        condition=condition,
-        smallest_eigenvalue=smallest,
-    )
+    return AccelerationErrors(squares, total, condition, smallest)

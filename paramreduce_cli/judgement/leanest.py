@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from paramreduce_cli.config.schema import SelectedSection
-from paramreduce_cli.records import TERMS, HeuristicValidation, Leanest, TermReduction
+from paramreduce_cli.records import TERMS, ErrorRange, HeuristicValidation, Leanest, TermReduction
 
 _BOTH = ("estimation", "validation")
 
@@ -74,6 +74,7 @@ def _alone(function: str, columns: Tolerances, results: Results) -> Iterator[Lea
                 int(operations[row]),
                 float(result.torque_error_estimation[row]),
                 float(result.torque_error_validation[row]),
+                ErrorRange.of(result.torque_error_test[row]),
             )
 
 
@@ -83,5 +84,9 @@ def _without_terms(
     one = None if terms is None else terms.functions.get(function)
     if one is not None and all(getattr(one, name) <= limit for name, limit in columns.items()):
         yield Leanest(
-            TERMS, one.operations, one.torque_error_estimation, one.torque_error_validation
+            TERMS,
+            one.operations,
+            one.torque_error_estimation,
+            one.torque_error_validation,
+            ErrorRange.of(one.torque_error_test),
         )

@@ -1,26 +1,63 @@
 """Errors of the torques that reduced models predict, in three norms."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
 from paramreduce_cli.records import Block, FloatArray
 
+_TINY = np.finfo(float).tiny
+
 
 @dataclass(frozen=True)
 class NormErrors:
-    """Torque errors of many models in three norms; each (n_models,)."""
+    """Torque errors of many models in three norms."""
 
     one: FloatArray
-    two: FloatArray
+    """(n_models,)"""
     infinity: FloatArray
-    joints: FloatArray
-    """In the 2-norm, joint by joint, (n_models, n_dof); not a number where torques are not measured."""
+    """(n_models,)"""
+    squares: FloatArray
+    """Sums of the squares of what is missed, each joint's divided by its nominal torque, (n_models, n_dof)."""
+    total: FloatArray
+    """The same of the torques themselves, (n_dof,); not a number where they are not measured."""
     lower: FloatArray
     """Smallest positions, speeds and accelerations that were met, (3, n_dof)."""
     upper: FloatArray
     """Largest ones, (3, n_dof)."""
+
+    @property
+    def two(self) -> FloatArray:
+        """In the 2-norm, (n_models,)."""
+        result: FloatArray = np.sqrt(self.squares.sum(axis=1) / max(np.nansum(self.total), _TINY))
+        return result
+
+    @property
+    def joints(self) -> FloatArray:
+        """In the 2-norm, joint by joint, (n_models, n_dof); not a number where torques are not measured."""
+        return joint_errors([self])
+
+
+class Squares(Protocol):
+    """Sums of squares over a part of the samples."""
+
+    @property
+    def squares(self) -> FloatArray:
+        """Of what is missed, (n_models, n_dof)."""
+
+    @property
+    def total(self) -> FloatArray:
+        """Of what is predicted, (n_dof,)."""
+
+
+def joint_errors(parts: Sequence[Squares]) -> FloatArray:
+    """Return relative errors joint by joint over all parts together, (n_models, n_dof)."""
+    squares = np.sum([part.squares for part in parts], axis=0)
+    total = np.sum([part.total for part in parts], axis=0)
+    result: FloatArray = np.sqrt(squares / np.maximum(total, _TINY))
+    return result
 
 
 def torque_errors(
@@ -52,14 +89,12 @@ def torque_errors(
         chi_sum += np.abs(chi).sum(axis=0)
         chi_square += (chi**2).sum(axis=0)
         chi_largest = max(chi_largest, float(np.abs(chi).max()))
-    tiny = np.finfo(float).tiny
-    joints = np.sqrt(squares / np.maximum(chi_square, tiny))
-    joints[:, np.isinf(weights)] = np.nan
+    chi_square[np.isinf(weights)] = np.nan
     return NormErrors(
-        one=sums.sum(axis=1) / max(chi_sum.sum(), tiny),
-        two=np.sqrt(squares.sum(axis=1) / max(chi_square.sum(), tiny)),
-        infinity=largest / max(chi_largest, tiny),
-        joints=joints,
+        one=sums.sum(axis=1) / max(chi_sum.sum(), _TINY),
+        infinity=largest / max(chi_largest, _TINY),
+        squares=squares,
+        total=chi_square,
         lower=lower,
         upper=upper,
     )

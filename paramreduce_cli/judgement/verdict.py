@@ -5,7 +5,14 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from paramreduce_cli.config.schema import Acceptance, ValidationSection
-from paramreduce_cli.records import About, BoolArray, HeuristicValidation, Remark, Selected
+from paramreduce_cli.records import (
+    About,
+    BoolArray,
+    ErrorRange,
+    HeuristicValidation,
+    Remark,
+    Selected,
+)
 from paramreduce_cli.texts import share
 
 _NEGLIGIBLE = 1e-6
@@ -24,7 +31,7 @@ def verdict(
         limit = getattr(limits, key)
         if limit is None:
             continue
-        value = float(getattr(result, key)[result.row(selected.n)])
+        value = _judged_value(result, selected.n, key)
         relative = "error" in key
         text = (
             f"{key.replace('_', ' ')} {_shown(value, relative)} (limit {_shown(limit, relative)})"
@@ -36,6 +43,16 @@ def verdict(
     if met:
         return True, f"{who} is accepted: {', '.join(met)}."
     return None, f"{who} is not judged: validation.accept sets no limits."
+
+
+def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
+    """What a limit of the config is on, of the model of n parameters."""
+    what, test, worst = key.partition("_test")
+    own = getattr(result, what + test)[result.row(n)]
+    if not test:
+        return float(own)
+    errors = ErrorRange.of(own)
+    return errors.worst if worst else errors.median
 
 
 def _shown(value: float, relative: bool) -> str:

@@ -50,6 +50,10 @@ class Span:
     stop: int
 
 
+StatesAt = Callable[[Span], StateBlock]
+"""Gives the states of a span."""
+
+
 def spans(lengths: Iterable[int]) -> list[Span]:
     """All samples of trajectories of some lengths, in order."""
     return [
@@ -65,7 +69,7 @@ class ObservedSet:
 
     spans: list[Span]
     """What it holds, trajectory by trajectory."""
-    at: Callable[[Span], StateBlock]
+    at: StatesAt
     """The states of a span."""
     dynamics: Dynamics
     phi: FloatArray

@@ -60,7 +60,7 @@ from paramreduce_cli.records.reduction import (
     Subsets,
 )
 from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Tell
-from paramreduce_cli.records.samples import Block, Recording, Recordings, Samples, SampleSet
+from paramreduce_cli.records.samples import SETS, Block, Recording, Recordings, Samples, SampleSet
 from paramreduce_cli.records.shares import UNSHARED, WHOLE, Share, Shares
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
@@ -76,14 +76,17 @@ from paramreduce_cli.records.trajectories import (
     Coefficients,
     Constraint,
     JointLimits,
+    PointToPoint,
     Trajectories,
     Trajectory,
 )
 from paramreduce_cli.records.validation import (
+    NO_MOTIONS,
     About,
     CrossValidation,
     DataChange,
     DataVariant,
+    ErrorRange,
     HeuristicValidation,
     Leanest,
     Remark,

@@ -6,6 +6,9 @@ from typing import Protocol
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 
+SETS = ("estimation", "validation", "test")
+"""What a search fits to, what it chooses by, and what none looks at."""
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -21,10 +24,11 @@ class Recording:
 
 @dataclass(frozen=True)
 class Recordings:
-    """What the user brought for either set."""
+    """What the user brought for each set."""
 
     estimation: Recording | None
     validation: Recording | None
+    test: Recording | None
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,7 @@ class SampleSet(Protocol):
 
 @dataclass(frozen=True)
 class Samples:
-    """The estimation and validation sets with the scales their errors are measured in."""
+    """The estimation, validation and test sets with the scales their errors are measured in."""
 
     names: tuple[str, ...]
     """Of the columns of W."""
@@ -84,3 +88,5 @@ class Samples:
     """(n_dof,); without it the standard deviation over the estimation set is meant."""
     estimation: SampleSet
     validation: SampleSet | None
+    test: SampleSet | None
+    """Motions that no search looks at: errors on them are what a model is worth."""

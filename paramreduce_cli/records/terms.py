@@ -35,6 +35,9 @@ class TermFront:
     acceleration_error_estimation: FloatArray
     """Not numbers for the inverse dynamics."""
     acceleration_error_validation: FloatArray
+    torque_error_test: FloatArray
+    """Of every motion of the test set, which no search looks at, (n_models, n_motions)."""
+    acceleration_error_test: FloatArray
 
 
 @dataclass(frozen=True)
@@ -68,6 +71,9 @@ class TermModel:
     acceleration_error_estimation: float
     """Not a number for the inverse dynamics, like all that is of accelerations."""
     acceleration_error_validation: float
+    torque_error_test: FloatArray
+    """Of every motion of the test set, which no search looks at, (n_motions,)."""
+    acceleration_error_test: FloatArray
     random_torque_error: float
     """On random states inside the limits; not a number where the torques are not known there."""
     random_acceleration_error: float

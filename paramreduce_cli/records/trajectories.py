@@ -91,8 +91,20 @@ class Trajectory:
 
 
 @dataclass(frozen=True)
+class PointToPoint:
+    """A motion from rest to rest along a straight line in joint space, with the least jerk."""
+
+    start: FloatArray
+    """Independent coordinates at its beginning, (n_dof,), rad or m."""
+    end: FloatArray
+    """The same at its end."""
+    duration: float
+    """s"""
+
+
+@dataclass(frozen=True)
 class Trajectories:
-    """The trajectories of the estimation and of the validation set."""
+    """The trajectories of the estimation, the validation and the test set."""
 
     period: float
     """s"""
@@ -111,6 +123,9 @@ class Trajectories:
     """What the trajectories had to keep to, besides the limits of the independent coordinates."""
     estimation: tuple[Trajectory, ...]
     validation: tuple[Trajectory, ...]
+    test: tuple[Trajectory, ...]
+    """Motions that no search looks at, like the following."""
+    test_point_to_point: tuple[PointToPoint, ...]
 
 
 @dataclass(frozen=True)
@@ -121,3 +136,5 @@ class Coefficients:
     period: float
     estimation: FloatArray
     validation: FloatArray
+    test: FloatArray
+    """Without trajectories where the file holds none."""

@@ -3,11 +3,30 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray
 from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
+
+
+class ErrorRange(NamedTuple):
+    """Errors over the motions of the test set; not numbers where there are none."""
+
+    median: float
+    least: float
+    worst: float
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> "ErrorRange":
+        """Of one model's errors, (n_motions,)."""
+        if not errors.size:
+            return NO_MOTIONS
+        return cls(float(np.median(errors)), float(errors.min()), float(errors.max()))
+
+
+NO_MOTIONS = ErrorRange(np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True)
@@ -23,6 +42,12 @@ class HeuristicValidation(BySize):
     acceleration_error_validation: FloatArray
     acceleration_error_joint_estimation: FloatArray
     acceleration_error_joint_validation: FloatArray
+    torque_error_test: FloatArray
+    """Of every motion of the test set, (m, n_motions), none where there is no such set."""
+    acceleration_error_test: FloatArray
+    torque_error_joint_test: FloatArray
+    """Over all motions of the test set together, (m, n_dof)."""
+    acceleration_error_joint_test: FloatArray
     mass_matrix_condition: FloatArray
     """Largest over the samples."""
     mass_matrix_smallest_eigenvalue: FloatArray
@@ -59,6 +84,7 @@ class Leanest:
     operations: int
     torque_error_estimation: float
     torque_error_validation: float
+    torque_error_test: ErrorRange
 
 
 class DataChange(StrEnum):
@@ -148,7 +174,7 @@ class Validation:
     base and of the selected model are among them. Empty without a mechanism."""
     nominal_acceleration: FloatArray
     lower: FloatArray
-    """Smallest positions, speeds and accelerations of both sets, (3, n_dof)."""
+    """Smallest positions, speeds and accelerations of all sets, (3, n_dof)."""
     upper: FloatArray
     """Largest ones, (3, n_dof)."""
     selected: Selected

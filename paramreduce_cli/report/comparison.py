@@ -127,11 +127,15 @@ def _row(
         for k, (p, q) in enumerate(zip(one, two, strict=False)):
             if p != q:
                 joint = f", joint {k + 1}" if isinstance(x[key], list) else ""
+                if isinstance(x[key], dict):
+                    joint = f", {list(x[key])[k]}"
                 what = f"{part}.{key}, {where}{joint}"
                 yield Difference(what, _text(p), _text(q), tolerance.holds(p, q))
 
 
 def _listed(value: Any) -> list[Any]:
+    if isinstance(value, dict):
+        return list(value.values())
     return value if isinstance(value, list) else [value]
 
 
@@ -252,9 +256,12 @@ def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
 
 def _kept_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
     """What must hold of a function however its terms were left out, as far as it held at first."""
-    parts = ("estimation",) if x.get("held_out") else ("estimation", "validation")
+    parts = ("estimation",) if x.get("held_out") else ("estimation", "validation", "test")
     for kind, part in product(("torque", "acceleration"), parts):
-        allowed, (before, now) = x["budget"][kind], (one[f"{kind}_error"][part] for one in (x, y))
+        allowed = x["budget"][kind]
+        before, now = (one[f"{kind}_error"].get(part) for one in (x, y))
+        if part == "test":
+            before, now = (one and one["median"] for one in (before, now))
         if before is None or allowed is None or before > allowed:
             continue
         if now is None or now > allowed:

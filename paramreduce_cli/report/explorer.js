@@ -63,7 +63,8 @@
   root.hidden = document.querySelector("nav .live").hidden = false;
   const nSamples = motion.time.length;
   const nDof = motion.tau.length / nSamples;
-  const SETS = ["estimation", "validation"].filter((s) => curves.some((c) => c.torque[s].some(Number.isFinite)));
+  const DASHED = { estimation: "— estimation", validation: "- - validation", test: "··· test, median" };
+  const SETS = ["estimation", "validation", "test"].filter((s) => curves.some((c) => c.torque[s].some(Number.isFinite)));
 
   function modelOf(curve, row) {
     const k = curve.model[row];
@@ -88,7 +89,7 @@
     if (value >= 10) return "> 1000 %";
     return value < 1e-10 ? "0 %" : `${shortest(100 * value)} %`;
   }
-  const pair = (errors, row) => SETS.map((s) => percent(errors[s][row])).join(" / ").replace(/ %(?= \/ [\d.]+ %$)/, "");
+  const pair = (errors, row) => SETS.map((s) => percent(errors[s][row])).map((text, k, all) => (k < all.length - 1 && !text.startsWith(">") ? text.replace(/ %$/, "") : text)).join(" / ");
   const shortest = (value) => `${Number(value.toPrecision(3))}`;
 
   // ---- state
@@ -132,7 +133,7 @@
     if (tolerance.value === "") return;
     const limit = Math.max(+tolerance.value / 100, 1e-10);
     const rows = curves[state.curve].n.map((_, k) => k);
-    const kept = rows.find((k) => SETS.every((s) => curves[state.curve].torque[s][k] <= limit));
+    const kept = rows.find((k) => SETS.every((s) => s === "test" ||  curves[state.curve].torque[s][k] <= limit));
     if (kept !== undefined) go(state.curve, kept);
     else part("no-such").hidden = false;
   });
@@ -298,7 +299,7 @@
     scales: { x: { time: false, range: [0, largest + 1] }, y: errorScale },
     axes: [axis("number of parameters n", { incrs: [1, 2, 5, 10, 20, 50, 100] }), errorAxis("torque error")],
     series: [{}, ...lines.map(({ curve, set }) => ({
-      stroke: () => shade(curves[curve].colour), width: 1.6, dash: set === "validation" ? [5, 4] : undefined, spanGaps: false, points: { show: set === "estimation", size: 4 },
+      stroke: () => shade(curves[curve].colour), width: 1.6, dash: { validation: [5, 4], test: [1, 3] }[set], spanGaps: false, points: { show: set === "estimation", size: 4 },
     }))],
     hooks: { draw: [(u) => {
       const own = curves[state.curve];
@@ -339,7 +340,7 @@
     legend.append(button);
   });
   SETS.forEach((set) => {
-    const button = element("button", { type: "button", className: "set" }, set === "estimation" ? "— estimation" : "- - validation");
+    const button = element("button", { type: "button", className: "set" }, DASHED[set]);
     toggled(button, true);
     button.addEventListener("click", () => {
       const on = state.sets.has(set);

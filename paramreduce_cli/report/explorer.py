@@ -6,14 +6,20 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray, HeuristicValidation, IntArray, ModelChoice
+from paramreduce_cli.records import (
+    SETS,
+    ErrorRange,
+    FloatArray,
+    HeuristicValidation,
+    IntArray,
+    ModelChoice,
+)
 from paramreduce_cli.report.curves import EQUAL, curves
 from paramreduce_cli.report.data import ReportData
 
 _NUMBERS = 600_000
 """Most entries of the observation matrix that the page carries; an arm of six joints has 300 per sample."""
 _FINEST = np.iinfo(np.uint16).max
-_SETS = ("estimation", "validation")
 _FUNCTIONS = ("inverse", "direct")
 
 
@@ -103,16 +109,24 @@ def _curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
 def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
     counted = data.known_model is not None
     return {
-        "torque": {s: packed(getattr(result, f"torque_error_{s}")) for s in _SETS},
+        "torque": {s: packed(_drawn(result, "torque", s)) for s in SETS},
         "joints": {
             s: packed((getattr(result, f"torque_error_joint_{s}") * rms).astype(np.float32))
             for s, rms in data.rms_torque.items()
         },
-        "acceleration": {s: packed(getattr(result, f"acceleration_error_{s}")) for s in _SETS},
+        "acceleration": {s: packed(_drawn(result, "acceleration", s)) for s in SETS},
         "operations": {
             f: _counted(getattr(result, f"operations_{f}")) if counted else None for f in _FUNCTIONS
         },
     }
+
+
+def _drawn(result: HeuristicValidation, what: str, which: str) -> FloatArray:
+    """Errors on a set, (m,); medians of the motions of the test set."""
+    errors: FloatArray = getattr(result, f"{what}_error_{which}")
+    if which != "test":
+        return errors
+    return np.array([ErrorRange.of(row).median for row in errors])
 
 
 def _counted(operations: FloatArray) -> list[int | None]:

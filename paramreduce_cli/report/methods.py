@@ -7,6 +7,7 @@ import numpy as np
 
 from paramreduce_cli import __version__
 from paramreduce_cli.records import (
+    ErrorRange,
     Identification,
     MeasuredLog,
     ProofStatus,
@@ -15,7 +16,7 @@ from paramreduce_cli.records import (
     Trajectories,
 )
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import share, share_range
 
 _BIBTEX = {
     "Atkeson1986": ("article", "C. G. Atkeson and C. H. An and J. M. Hollerbach",
@@ -121,9 +122,7 @@ def _measured(log: MeasuredLog) -> str:
 
 
 def _trajectories(found: Trajectories) -> str:
-    count = (
-        f"{len(found.estimation)} estimation and {len(found.validation)} validation trajectories"
-    )
+    count = f"{len(found.estimation)} estimation, {len(found.validation)} validation and {len(found.test)} test trajectories"
     if found.source:
         return (
             f"Finite Fourier series [Swevers1996] were given for {count} of {found.period:.4g} s."
@@ -179,7 +178,12 @@ def _result(data: ReportData) -> Iterator[str]:
     errors = [f"{share(float(result.torque_error_estimation[row]))} on the estimation set"]
     if "validation" in data.rms_torque:
         errors.append(f"{share(float(result.torque_error_validation[row]))} on the validation set")
-    yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {' and '.join(errors)}."
+    test = result.torque_error_test[row]
+    if test.size:
+        errors.append(
+            f"{share_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
+        )
+    yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
     if data.known_model is not None:
         full = data.validation.full["operations_inverse"]
         reduced = int(result.operations_inverse[row])

@@ -3,14 +3,15 @@
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from paramreduce_cli.texts import share
+from paramreduce_cli.records import NO_MOTIONS, ErrorRange
+from paramreduce_cli.texts import share, share_range
 from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
 
 HEADER = (
-    "heuristic", "n_φ", "r", "n", "d", "d, n", "saved", "ε_τ E", "ε_τ V",
-    "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V",
+    "heuristic", "n_φ", "r", "n", "d", "d, n", "saved", "ε_τ E", "ε_τ V", "ε_τ T",
+    "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T",
 )  # fmt: skip
 
 
@@ -44,7 +45,8 @@ def overview_row(summary: Summary, name: str = "") -> tuple[str, ...]:
 def _function(summary: Summary, name: str, error: str) -> tuple[str, ...]:
     errors, reduced = summary["selected"][error], summary["selected"]["operations"][name]
     full = summary["full"].get(f"operations_{name}")
-    return function_cells(name, full, reduced, errors["estimation"], errors["validation"])
+    test = ErrorRange(**errors["test"]) if errors.get("test") else NO_MOTIONS
+    return function_cells(name, full, reduced, errors["estimation"], errors["validation"], test)
 
 
 def function_cells(
@@ -53,13 +55,14 @@ def function_cells(
     reduced: float | None,
     estimation: float | None,
     validation: float | None,
+    test: ErrorRange,
 ) -> tuple[str, ...]:
-    """What one function costs and how wrong it is: operations of both models, both errors.
+    """What one function costs and how wrong it is: operations of both models, errors on all sets.
 
     Without a mechanism nothing is counted, and accelerations are not known.
     """
-    errors = share(estimation), share(validation)
+    errors = share(estimation), share(validation), share_range(*test)
     if full is None or reduced is None:
-        return "-", "-", "-", *(errors if name == "inverse" else ("-", "-"))
+        return "-", "-", "-", *(errors if name == "inverse" else ("-", "-", "-"))
     saved = f"{100 * (1 - reduced / full):.0f} %" if full else "-"
     return f"{full:.0f}", f"{reduced:.0f}", saved, *errors

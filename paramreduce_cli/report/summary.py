@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.records import (
+    SETS,
     About,
+    ErrorRange,
     HeuristicValidation,
     Identification,
     IntArray,
@@ -83,6 +85,7 @@ def _leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
             "torque_error": {
                 "estimation": one.torque_error_estimation,
                 "validation": one.torque_error_validation,
+                "test": _range(one.torque_error_test),
             },
         }
         for name, one in found.items()
@@ -235,14 +238,20 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
 
 
 def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]:
+    def errors_on(part: str, what: str) -> Any:
+        value = getattr(of, f"{what}_error_{part}")
+        own = value if row is None else value[row]
+        return _range(ErrorRange.of(own)) if part == "test" else own
+
     return {
-        f"{what}_error": {
-            part: value if row is None else value[row]
-            for part in ("estimation", "validation")
-            for value in [getattr(of, f"{what}_error_{part}")]
-        }
+        f"{what}_error": {part: errors_on(part, what) for part in SETS}
         for what in ("torque", "acceleration")
     }
+
+
+def _range(errors: ErrorRange) -> dict[str, float] | None:
+    """Return errors over the motions of the test set; None where it holds none, or where they are not known."""
+    return None if np.isnan(errors.median) else errors._asdict()
 
 
 def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
@@ -253,8 +262,8 @@ def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
         "scaling": trajectories.scaling,
         "constraints": [c.name for c in trajectories.constraints],
         "period": trajectories.period,
-        "estimation": [_trajectory(t) for t in trajectories.estimation],
-        "validation": [_trajectory(t) for t in trajectories.validation],
+        **{name: [_trajectory(t) for t in getattr(trajectories, name)] for name in SETS},
+        "test_point_to_point": [vars(motion) for motion in trajectories.test_point_to_point],
     }
 
 
@@ -270,25 +279,25 @@ def _first(found: Subsets) -> int | None:
 
 def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     counts = [f.name for f in fields(found) if f.name.startswith("operations_")]
-    sets = ("estimation", "validation")
     errors = {
-        f"{of}_error": {s: f"{of}_error_{s}" for s in sets}
-        | {f"joints_{s}": f"{of}_error_joint_{s}" for s in sets}
+        f"{of}_error": {s: f"{of}_error_{s}" for s in SETS}
+        | {f"joints_{s}": f"{of}_error_joint_{s}" for s in SETS}
         for of in ("torque", "acceleration")
     }
     names = errors | {
         "operations": {name.removeprefix("operations_"): name for name in counts},
         "mass_matrix": {key: f"mass_matrix_{key}" for key in ("condition", "smallest_eigenvalue")},
     }
+
+    def entry(part: str, key: str, own: Any) -> Any:
+        if part == "operations":
+            return _whole(own)
+        return _range(ErrorRange.of(own)) if key == "test" else own
+
     return [
         {"n": n}
         | {
-            part: {
-                key: getattr(found, name)[k]
-                if part != "operations"
-                else _whole(getattr(found, name)[k])
-                for key, name in of.items()
-            }
+            part: {key: entry(part, key, getattr(found, name)[k]) for key, name in of.items()}
             for part, of in names.items()
         }
         for k, n in enumerate(found.n)

@@ -1,28 +1,32 @@
-"""optimize-trajectories: exciting trajectories for both sets."""
+"""optimize-trajectories: exciting trajectories, and point-to-point motions to test models on."""
 
 import warnings
+import zlib
 
 import numpy as np
 
 from paramreduce_cli.config.schema import TrajectoriesSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
 from paramreduce_cli.excitation.optimiser import Settings, describe
+from paramreduce_cli.excitation.point_to_point import find_point_to_point
 from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import (
+    SETS,
     WHOLE,
     Coefficients,
     Constraint,
     FloatArray,
     JointLimits,
     Model,
+    PointToPoint,
     Run,
     Share,
     Trajectories,
     Trajectory,
 )
 
-_SETS = ("estimation", "validation")
 _LIMIT_ROUNDING = 1e-9
 """Share by which a limit may be missed: round-off of the series."""
 
@@ -45,6 +49,7 @@ def optimize_trajectories(
         sets = _optimised(wanted, task, share, run)
     else:
         sets = _measured(wanted, model, task, coefficients)
+    motions = _find_point_to_point(wanted, task, model, period, sets) if share.whole else ()
     return Trajectories(
         period=period,
         points=wanted.points,
@@ -55,6 +60,7 @@ def optimize_trajectories(
         source="" if wanted.file is None else wanted.file.name,
         limits=task.settings.limits,
         constraints=task.constraints,
+        test_point_to_point=motions,
         **sets,
     )
 
@@ -107,11 +113,47 @@ def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonic
 def _optimised(
     wanted: TrajectoriesSection, task: ExcitationTask, share: Share, run: Run
 ) -> dict[str, tuple[Trajectory, ...]]:
-    counts = {"estimation": wanted.count, "validation": wanted.validation_count}
-    keys = {name: [f"{name}-{k:04d}" for k in range(counts[name])] for name in _SETS}
+    counts = (wanted.count, wanted.validation_count, wanted.test_count)
+    keys = {
+        name: [f"{name}-{k:04d}" for k in range(count)]
+        for name, count in zip(SETS, counts, strict=True)
+    }
     own = share.dealt([key for some in keys.values() for key in some])
     found = optimise_all(task, own, run)
-    return {name: tuple(found[key] for key in keys[name] if key in found) for name in _SETS}
+    return {name: tuple(found[key] for key in keys[name] if key in found) for name in SETS}
+
+
+def _find_point_to_point(
+    wanted: TrajectoriesSection,
+    task: ExcitationTask,
+    model: Model,
+    period: float,
+    sets: dict[str, tuple[Trajectory, ...]],
+) -> tuple[PointToPoint, ...]:
+    """Find motions between positions that trajectories of the test set pass, or of another one where it has none."""
+    passed = sets["test"] or sets["validation"] or sets["estimation"]
+    times = sample_times(period, wanted.points)
+    positions = [
+        fourier_basis(period, (t.coefficients.shape[1] - 1) // 2, times).states(t.coefficients)[0]
+        for t in passed
+    ]
+    found = find_point_to_point(
+        model,
+        task.settings.limits,
+        task.constraints,
+        np.concatenate(positions),
+        wanted.test_point_to_point_count,
+        FINER * wanted.points,
+        np.random.default_rng([wanted.seed, zlib.crc32(b"point-to-point")]),
+    )
+    if len(found) < wanted.test_point_to_point_count:
+        warnings.warn(
+            f"{len(found)} of {wanted.test_point_to_point_count} point-to-point motions of the test set were found: "
+            "straight lines between positions leave the constraints, or need more torque than there is",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
+    return found
 
 
 def _measured(
@@ -133,7 +175,7 @@ def _measured(
         )
 
     sets = {}
-    for name in _SETS:
+    for name in SETS:
         values, n_dof = getattr(brought, name), model.mechanism.n_dof
         if values.shape[1] != n_dof:
             raise DataError(
@@ -141,6 +183,8 @@ def _measured(
                 f"{model.mechanism.robot} has {n_dof}."
             )
         sets[name] = tuple(measure(entry) for entry in values)
+        if not sets[name]:
+            continue
         _check_motion(brought.source, name, sets[name], task.settings.limits)
         _check_bounds(brought.source, name, sets[name], task.constraints)
     return sets

@@ -21,6 +21,7 @@ from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
+    SETS,
     CountedDynamics,
     FloatArray,
     Identification,
@@ -211,9 +212,9 @@ def _code(
 
 def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
     """By set and joint, N m or N; zero is as small as relative errors of joints take it to be."""
-    sets = {"estimation": samples.estimation, "validation": samples.validation}
     found = {}
-    for name, one in sets.items():
+    for name in SETS:
+        one = getattr(samples, name)
         if one is not None:
             squares = (one.factors()[..., -1] ** 2).sum(axis=(0, 2)) / nominal**2
             least = np.maximum(squares, np.finfo(float).tiny)

@@ -1,9 +1,9 @@
-"""sample: states, torques and observation matrices of both sets."""
+"""sample: states, torques and observation matrices of all sets."""
 
 import itertools
 import warnings
 import zlib
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
 
@@ -18,6 +18,7 @@ from paramreduce_cli.excitation.fourier import (
     fourier_basis,
     sample_times,
 )
+from paramreduce_cli.excitation.point_to_point import states_along
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
@@ -29,16 +30,19 @@ from paramreduce_cli.multibody.observation import (
     ObservedSet,
     Span,
     StateBlock,
+    StatesAt,
     spans,
     standard_deviation,
 )
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.told import ToldSet
 from paramreduce_cli.records import (
+    SETS,
     UNSHARED,
     WHOLE,
     Block,
     FloatArray,
+    IntArray,
     MeasuredLog,
     Model,
     Progress,
@@ -53,7 +57,6 @@ from paramreduce_cli.records import (
 )
 
 ComputedSet = ObservedSet | LoggedSet
-StatesAt = Callable[[Span], StateBlock]
 
 _IMAGE_ROUNDING = 1e-6
 """By which the image of a motion may miss its limits: round-off of the optimiser's."""
@@ -69,7 +72,7 @@ def sample(
     share: Share = WHOLE,
     shares: Shares = UNSHARED,
 ) -> Samples:
-    """Sample both sets: states, torques and observation matrices.
+    """Sample the estimation, the validation and the test set: states, torques and observation matrices.
 
     From the optimised trajectories, or from a log or recorded states where the config names them. A
     share of the work are some trajectories, or a part of a recording.
@@ -83,7 +86,8 @@ def sample(
         )
     dynamics = Dynamics(model.mechanism)
 
-    def observed(name: str, recording: Recording | None, points: int | None) -> ComputedSet:
+    def observed(name: str, points: int | None) -> ComputedSet:
+        recording: Recording | None = getattr(recordings, name)
         if sampling.log is not None:
             return _logged(model, dynamics, log, name)
         if sampling.simulation is not None:
@@ -97,28 +101,39 @@ def sample(
             series = _completed(sampling, model, trajectories, series)
         return _generated(model, dynamics, trajectories, name, series, points)
 
-    estimation = observed("estimation", recordings.estimation, sampling.points)
-    validation = observed("validation", recordings.validation, sampling.validation_points)
-    if isinstance(estimation, ObservedSet) and isinstance(validation, ObservedSet):
-        estimation, validation = estimation.restricted(share), validation.restricted(share)
+    points = {"estimation": sampling.points, "validation": sampling.validation_points}
+    tested = _is_tested(sampling, trajectories, recordings)
+    names = SETS if tested else SETS[:2]
+    sets = {name: observed(name, points.get(name)) for name in names}
+    for name, computed in sets.items():
+        if isinstance(computed, ObservedSet):
+            sets[name] = computed.restricted(share)
     scales: tuple[FloatArray | None, FloatArray | None] = (None, None)
     if share.whole:
-        torque = _nominal_torque(model, estimation)
-        scales = torque, _nominal_acceleration(sampling, model, estimation)
-    return _samples(
-        model,
-        *scales,
-        ToldSet(estimation, "estimation set", tell),
-        ToldSet(validation, "validation set", tell),
-    )
+        torque = _nominal_torque(model, sets["estimation"])
+        scales = torque, _nominal_acceleration(sampling, model, sets["estimation"])
+    said = {name: ToldSet(computed, f"{name} set", tell) for name, computed in sets.items()}
+    return _samples(model, *scales, said)
+
+
+def _is_tested(
+    sampling: SamplingSection, trajectories: Trajectories | None, recordings: Recordings
+) -> bool:
+    """Whether there are motions for a test set."""
+    if sampling.log is not None:
+        return False
+    if sampling.simulation is not None:
+        return sampling.simulation.test_runs > 0
+    if recordings.test is not None:
+        return True
+    return trajectories is not None and bool(trajectories.test or trajectories.test_point_to_point)
 
 
 def _samples(
     model: Model,
     nominal_torque: FloatArray | None,
     nominal_acceleration: FloatArray | None,
-    estimation: SampleSet,
-    validation: SampleSet,
+    sets: Mapping[str, SampleSet],
 ) -> Samples:
     parameters = model.mechanism.parameters
     return Samples(
@@ -127,19 +142,19 @@ def _samples(
         values=model.values,
         nominal_torque=nominal_torque,
         nominal_acceleration=nominal_acceleration,
-        estimation=estimation,
-        validation=validation,
+        estimation=sets["estimation"],
+        validation=sets.get("validation"),
+        test=sets.get("test"),
     )
 
 
 def _put_together(sampling: SamplingSection, model: Model, shares: Shares) -> Samples:
     """The samples that several jobs have made; scales are those of all of them."""
-    estimation, validation = (
-        JoinedSet([getattr(found, name) for found in shares.found])
-        for name in ("estimation", "validation")
-    )
+    parts = {name: [getattr(found, name) for found in shares.found] for name in SETS}
+    sets = {name: JoinedSet(some) for name, some in parts.items() if None not in some}
+    estimation = sets["estimation"]
     scales = _nominal_torque(model, estimation), _nominal_acceleration(sampling, model, estimation)
-    return _samples(model, *scales, estimation, validation)
+    return _samples(model, *scales, sets)
 
 
 def _completed(
@@ -181,10 +196,15 @@ def _generated(
 ) -> ObservedSet:
     """Samples of Fourier series, as many as these were optimised on if nothing else is asked for."""
     points = points or trajectories.points
+    motions = trajectories.test_point_to_point if name == "test" else ()
     finer = 1 if model.mechanism.loops is None else -(-FINER * trajectories.points // points)
     return ObservedSet(
-        spans([points] * len(series)),
-        _series_states(series, trajectories.period, points, finer),
+        spans([points] * (len(series) + len(motions))),
+        _motions_states(
+            len(series),
+            _series_states(series, trajectories.period, points, finer),
+            states_along(motions, points, finer),
+        ),
         dynamics,
         model.values,
         f"{name} set",
@@ -205,9 +225,11 @@ def _recorded(
         )
     if recording.tau is not None:
         recording = replace(recording, tau=_measured(model, recording.source, recording.tau))
+    begun = np.flatnonzero(np.diff(recording.time) < 0) + 1
+    starts = np.concatenate([[0], begun, [recording.time.size]])
     return ObservedSet(
-        spans([recording.time.size]),
-        _recorded_states(recording),
+        spans(np.diff(starts)),
+        _recorded_states(recording, starts),
         dynamics,
         model.values,
         recording.source,
@@ -241,7 +263,8 @@ def _simulated(
     if mechanism.loops is not None:
         z = mechanism.loops.assembly[list(mechanism.independent)]
     motions: list[SimulatedMotion] = []
-    runs = wanted.runs if name == "estimation" else wanted.validation_runs
+    counts = (wanted.runs, wanted.validation_runs, wanted.test_runs)
+    runs = dict(zip(SETS, counts, strict=True))[name]
     for done in range(runs):
         inputs = [_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
         start = z.copy()
@@ -318,11 +341,26 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
     return at
 
 
-def _recorded_states(r: Recording) -> StatesAt:
+def _motions_states(count: int, first: StatesAt, second: StatesAt) -> StatesAt:
+    """States of so many motions of one kind, and of those of another kind that come after them."""
+
     def at(span: Span) -> StateBlock:
-        part = slice(span.start, span.stop)
+        if span.trajectory < count:
+            return first(span)
+        own = second(replace(span, trajectory=span.trajectory - count))
+        return replace(own, trajectory=span.trajectory)
+
+    return at
+
+
+def _recorded_states(r: Recording, starts: IntArray) -> StatesAt:
+    """States of a recording whose motions begin at some rows, with the end as the last of them."""
+
+    def at(span: Span) -> StateBlock:
+        first = starts[span.trajectory]
+        part = slice(first + span.start, first + span.stop)
         tau = None if r.tau is None else r.tau[part]
-        return StateBlock(0, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
+        return StateBlock(span.trajectory, r.time[part], r.z[part], r.dz[part], r.ddz[part], tau)
 
     return at
 

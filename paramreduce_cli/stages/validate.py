@@ -1,7 +1,8 @@
 """validate: what every reduced model is worth, and whether the selected one is accepted."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import groupby
 
 import numpy as np
 
@@ -13,13 +14,14 @@ from paramreduce_cli.judgement.operation_counts import OperationCounts
 from paramreduce_cli.judgement.picking import every_model, pareto_front, shown_models
 from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
-from paramreduce_cli.judgement.torque import NormErrors, torque_errors
+from paramreduce_cli.judgement.torque import NormErrors, joint_errors, torque_errors
 from paramreduce_cli.judgement.verdict import remarks, verdict
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
 from paramreduce_cli.multibody.told import told
 from paramreduce_cli.records import (
+    Block,
     CountedDynamics,
     CrossValidation,
     DataChange,
@@ -47,6 +49,8 @@ from paramreduce_cli.reduction.setup import effort, selection_columns, selection
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
+_Errors = tuple[NormErrors, AccelerationErrors]
+"""Of all models, on one set or motion."""
 _MEASURED_ON = frozenset(
     {"model.h5", "samples.h5", "reduction.h5", "reduction", "validation.operations"}
 )
@@ -73,7 +77,7 @@ def validate(
     previous: Validation | None,
     run: Run,
 ) -> Validation:
-    """Judge the reduced models on both sets.
+    """Judge the reduced models on all sets.
 
     Without a model, on samples that a user brings, torques alone are judged.
 
@@ -83,6 +87,8 @@ def validate(
     """
     if model is None:
         _refuse_what_needs_a_model(judging, wanted)
+    if samples.test is None:
+        _refuse_what_needs_a_test_set(judging)
     known = previous if run.unchanged >= _MEASURED_ON else None
     if known:
         measured = _Measured(
@@ -162,6 +168,21 @@ def _refuse_what_needs_a_model(judging: ValidationSection, wanted: SelectedSecti
             )
 
 
+def _refuse_what_needs_a_test_set(judging: ValidationSection) -> None:
+    """Refuse limits of errors on a set that is not there.
+
+    Raises:
+        ConfigError: There is such a limit.
+    """
+    for name in judging.accept.model_dump(exclude_none=True):
+        if "_test" in name:
+            raise ConfigError(
+                "needs a test set, which samples.h5 does not hold: give trajectories.test_count, or sampling.test_file "
+                "beside recordings; a log has its held-out part, the validation set, instead.",
+                ("validation", "accept", name),
+            )
+
+
 def _measured(
     model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, run: Run
 ) -> _Measured:
@@ -174,29 +195,45 @@ def _measured(
     models = _Models(reduction, model.values)
     _check_coordinates(model, samples)
 
-    def errors_on(sample_set: SampleSet, name: str) -> tuple[NormErrors, AccelerationErrors]:
+    def measure(sample_set: SampleSet, name: str, *, by_motion: bool = False) -> list[_Errors]:
+        """Errors on a set as a whole, or on each of its motions."""
         n = sample_set.n_samples
-        blocks = told(sample_set.blocks(), n, f"torques of the {name} set", run.progress)
-        torque = torque_errors(blocks, models.values, reduction.nominal_torque)
-        blocks = told(sample_set.blocks(), n, f"accelerations of the {name} set", run.progress)
-        spread = thinned_blocks(blocks, -(-n // _MOST_ACCELERATIONS))
-        acceleration = acceleration_errors(spread, dynamics.direct, models.values, nominal)
-        return torque, acceleration
 
-    estimation = errors_on(samples.estimation, "estimation")
-    validation = errors_on(samples.validation, "validation")
+        def told_of(what: str) -> Iterator[Block]:
+            return told(sample_set.blocks(), n, f"{what} of the {name} set", run.progress)
+
+        def parts(blocks: Iterable[Block]) -> Iterator[Iterable[Block]]:
+            if not by_motion:
+                return iter([blocks])
+            return (own for _, own in groupby(blocks, lambda block: block.trajectory))
+
+        spread = thinned_blocks(told_of("accelerations"), -(-n // _MOST_ACCELERATIONS))
+        torques = [
+            torque_errors(part, models.values, reduction.nominal_torque)
+            for part in parts(told_of("torques"))
+        ]
+        accelerations = [
+            acceleration_errors(part, dynamics.direct, models.values, nominal)
+            for part in parts(spread)
+        ]
+        return list(zip(torques, accelerations, strict=True))
+
+    (estimation,) = measure(samples.estimation, "estimation")
+    (validation,) = measure(samples.validation, "validation")
+    test = [] if samples.test is None else measure(samples.test, "test", by_motion=True)
+    every = [estimation, validation, *test]
     heuristics = {
-        name: _judged(found.n, estimation, validation, models.rows[name])
+        name: _judged(found.n, estimation, validation, test, models.rows[name])
         for name, found in reduction.heuristics.items()
     }
-    full = _full_model(model, counted, estimation[1], validation[1])
-    return _Measured(heuristics, full, nominal, *_ranges(estimation[0], validation[0]))
+    full = _full_model(model, counted, [acceleration for _, acceleration in every])
+    return _Measured(heuristics, full, nominal, *_ranges([torque for torque, _ in every]))
 
 
-def _ranges(estimation: NormErrors, validation: NormErrors) -> tuple[FloatArray, FloatArray]:
-    """Of the states of both sets, each (3, n_dof)."""
-    lower: FloatArray = np.minimum(estimation.lower, validation.lower)
-    upper: FloatArray = np.maximum(estimation.upper, validation.upper)
+def _ranges(sets: Sequence[NormErrors]) -> tuple[FloatArray, FloatArray]:
+    """Of the states of all sets, each (3, n_dof)."""
+    lower: FloatArray = np.min([one.lower for one in sets], axis=0)
+    upper: FloatArray = np.max([one.upper for one in sets], axis=0)
     return lower, upper
 
 
@@ -207,23 +244,30 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
             "the samples hold no validation set: /validation/W and /validation/tau are missing."
         )
     models = _Models(reduction, samples.values)
-    estimation, validation = (
-        torque_errors(part.blocks(), models.values, reduction.nominal_torque)
-        for part in (samples.estimation, samples.validation)
-    )
     n_dof = reduction.nominal_torque.size
     unknown = np.full(models.values.shape[1], np.nan)
-    nothing = AccelerationErrors(unknown, np.tile(unknown[:, None], n_dof), unknown, unknown)
+    no_joint = np.full(n_dof, np.nan)
+    nothing = AccelerationErrors(np.tile(unknown[:, None], n_dof), no_joint, unknown, unknown)
+
+    def measure(blocks: Iterable[Block]) -> _Errors:
+        return torque_errors(blocks, models.values, reduction.nominal_torque), nothing
+
+    estimation, validation = (
+        measure(part.blocks()) for part in (samples.estimation, samples.validation)
+    )
+    blocks = samples.test.blocks() if samples.test is not None else ()
+    test = [measure(own) for _, own in groupby(blocks, lambda block: block.trajectory)]
     heuristics = {
-        name: _judged(found.n, (estimation, nothing), (validation, nothing), models.rows[name])
+        name: _judged(found.n, estimation, validation, test, models.rows[name])
         for name, found in reduction.heuristics.items()
     }
-    return _Measured(heuristics, {}, np.full(n_dof, np.nan), *_ranges(estimation, validation))
+    sets = [torque for torque, _ in (estimation, validation, *test)]
+    return _Measured(heuristics, {}, no_joint, *_ranges(sets))
 
 
 def _check_coordinates(model: Model, samples: Samples) -> None:
     n_q = model.mechanism.n_q
-    for part in (samples.estimation, samples.validation):
+    for part in (samples.estimation, samples.validation, samples.test):
         if part is not None and next(iter(part.blocks())).q.shape[1] != n_q:
             raise DataError(
                 f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need; make "
@@ -260,11 +304,12 @@ class _Models:
 
 
 def _judged(
-    n: IntArray,
-    estimation: tuple[NormErrors, AccelerationErrors],
-    validation: tuple[NormErrors, AccelerationErrors],
-    rows: IntArray,
+    n: IntArray, estimation: _Errors, validation: _Errors, test: Sequence[_Errors], rows: IntArray
 ) -> HeuristicValidation:
+    every = [acceleration for _, acceleration in (estimation, validation, *test)]
+    no_motion = np.zeros((n.size, 0))
+    no_joint = np.full(estimation[0].squares.shape, np.nan)
+    torques, accelerations = [one for one, _ in test], [one for _, one in test]
     return HeuristicValidation(
         n=n,
         torque_error_estimation=estimation[0].two[rows],
@@ -275,29 +320,29 @@ def _judged(
         acceleration_error_validation=validation[1].error[rows],
         acceleration_error_joint_estimation=estimation[1].joints[rows],
         acceleration_error_joint_validation=validation[1].joints[rows],
-        mass_matrix_condition=np.maximum(
-            estimation[1].condition[rows], validation[1].condition[rows]
+        torque_error_test=np.column_stack([no_motion, *(one.two[rows] for one in torques)]),
+        acceleration_error_test=np.column_stack(
+            [no_motion, *(one.error[rows] for one in accelerations)]
         ),
-        mass_matrix_smallest_eigenvalue=np.minimum(
-            estimation[1].smallest_eigenvalue[rows], validation[1].smallest_eigenvalue[rows]
+        torque_error_joint_test=(joint_errors(torques) if test else no_joint)[rows],
+        acceleration_error_joint_test=(joint_errors(accelerations) if test else no_joint)[rows],
+        mass_matrix_condition=np.max([one.condition[rows] for one in every], axis=0),
+        mass_matrix_smallest_eigenvalue=np.min(
+            [one.smallest_eigenvalue[rows] for one in every], axis=0
         ),
         **dict.fromkeys(COUNTS, np.full(n.size, np.nan)),
     )
 
 
 def _full_model(
-    model: Model,
-    counted: CountedDynamics,
-    estimation: AccelerationErrors,
-    validation: AccelerationErrors,
+    model: Model, counted: CountedDynamics, sets: Sequence[AccelerationErrors]
 ) -> dict[str, float]:
     counts = Counts(model, counted)
     result = _counts_by_name(counts, "", full_model(model))
     result |= _counts_by_name(counts, "base_", base_model(model))
-    result["mass_matrix_condition"] = float(max(estimation.condition[-1], validation.condition[-1]))
-    result["mass_matrix_smallest_eigenvalue"] = float(
-        min(estimation.smallest_eigenvalue[-1], validation.smallest_eigenvalue[-1])
-    )
+    result["mass_matrix_condition"] = float(max(one.condition[-1] for one in sets))
+    smallest = min(one.smallest_eigenvalue[-1] for one in sets)
+    result["mass_matrix_smallest_eigenvalue"] = float(smallest)
     return result
 
 

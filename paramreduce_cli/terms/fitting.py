@@ -29,6 +29,10 @@ class Budget:
     acceleration: float
     """Infinite where accelerations do not matter; mass matrices must be positive definite even so."""
 
+    def scaled(self, factor: float) -> Budget:
+        """Return a share of it."""
+        return Budget(factor * self.torque, factor * self.acceleration)
+
 
 @dataclass(frozen=True)
 class Costs:

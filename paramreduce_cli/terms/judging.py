@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import chain
+from itertools import chain, groupby
 
 import numpy as np
 
@@ -146,6 +146,22 @@ class Judge:
             for parts in self._sets
         )
         return estimation, validation
+
+    def test_errors(self, program: Simplified) -> tuple[FloatArray, FloatArray]:
+        """Errors of torques and of accelerations on every motion of the test set, (n_motions,) each."""
+        errors = [one.errors(program.outputs(one.states)) for one in self._test_motions]
+        torque, acceleration = np.array(errors).reshape(-1, 2).T
+        return torque, acceleration
+
+    @cached_property
+    def _test_motions(self) -> list[TermSamples]:
+        """Samples of every motion of the test set."""
+        part = self._samples.test
+        if part is None:
+            return []
+        blocks = thinned_blocks(part.blocks(), -(-part.n_samples // _JUDGED))
+        motions = groupby(blocks, lambda block: block.trajectory)
+        return [self._made(own) for _, own in motions]
 
     def strain(self, errors: tuple[Errors, Errors], budget: Budget) -> float:
         """The largest error as a share of what is allowed; infinite if one is not a number.

@@ -22,6 +22,13 @@ def share(value: float | None) -> str:
     return f"{100 * value:.3g} %" if value >= EXACT else "0 %"
 
 
+def share_range(median: float, least: float, worst: float) -> str:
+    """Median, smallest and largest of errors over motions; a dash where there are no motions."""
+    if math.isnan(median):
+        return "-"
+    return f"{share(median)} ({share(least).removesuffix(' %')} to {share(worst)})"
+
+
 def latex(text: str, symbols: Mapping[str, str]) -> str:
     """Text for LaTeX, numbers and symbols as formulas.
 

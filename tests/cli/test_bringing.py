@@ -227,12 +227,16 @@ def test_brought_coefficients_of_another_robot(invoke, two_link_results, tmp_pat
 
 def test_brought_states_and_torques(invoke, two_link_results, tmp_path, write_config):
     with h5py.File(two_link_results / "samples.h5") as file:
-        for which in ("estimation", "validation"):
+        for which in ("estimation", "validation", "test"):
             keys = ("time", "z", "dz", "ddz", "tau")
             table = np.column_stack([file[f"{which}/{key}"][:] for key in keys])
             header = ",".join(["t", *(f"{key}{j}" for key in keys[1:] for j in (1, 2))])
             np.savetxt(tmp_path / f"{which}.csv", table, delimiter=",", header=header, comments="")
     sampling = "sampling:\n  estimation_file: estimation.csv\n  validation_file: validation.csv\n\nselected:"
+    untested = write_config(("selected:", sampling))
+    refused = invoke("run", untested, "--results", tmp_path / "r", code=2).err
+    assert "torque_error_test is on a test set, but there is none" in refused
+    sampling = sampling.replace("\n\n", "\n  test_file: test.csv\n\n")
     path = write_config(("selected:", sampling))
     run = invoke("run", path, "--results", tmp_path / "r", settings=[ONE_FORMAT])
     assert "optimize-trajectories" not in run.out
@@ -248,3 +252,12 @@ def test_brought_states_and_torques(invoke, two_link_results, tmp_path, write_co
     invoke("sample", path, "--results", tmp_path / "r", settings=["sampling.torques=model"])
     for which in ("estimation", "validation"):
         assert found[which] == pytest.approx(expected[which], rel=1e-6)
+    with h5py.File(tmp_path / "r" / "validation.h5") as file:
+        joint = file["forward-selection/torque_error_joint_test"][:]
+        assert file["forward-selection/torque_error_test"].shape[1] == 14, (
+            "it begins anew where another motion does"
+        )
+    with h5py.File(two_link_results / "validation.h5") as file:
+        np.testing.assert_allclose(
+            joint, file["forward-selection/torque_error_joint_test"][:], rtol=1e-6, atol=1e-9
+        )

@@ -52,8 +52,8 @@ def test_stages_one_by_one_and_again(invoke, tmp_path):
 
 
 def test_not_accepted_is_exit_code_1_with_the_sentence(invoke, two_link_copy, write_config):
-    path = write_config(("torque_error_validation: 0.05", "torque_error_validation: 1e-4"))
-    sentence = "forward-selection with 4 parameters is not accepted: torque error validation"
+    path = write_config(("torque_error_test: 0.05", "torque_error_test: 1e-4"))
+    sentence = "forward-selection with 4 parameters is not accepted: torque error test"
     refused = invoke("validate", path, "--results", two_link_copy, code=1)
     assert f"Not accepted: {sentence}" in refused.err
     invoke("run", path, "--results", two_link_copy, settings=[ONE_FORMAT], code=1)
@@ -230,7 +230,7 @@ def test_init_writes_a_config_that_runs(invoke, tmp_path):
     invoke("init", "--dh", "my_arm", "--joints", 3, "--output", path)
     assert "exists already" in invoke("init", "--dh", "my_arm", "--output", path, code=2).err
     small = (
-        "trajectories.count=1", "trajectories.starts=1", "trajectories.polished=1",
+        "trajectories.count=1", "trajectories.test_count=1", "trajectories.starts=1", "trajectories.polished=1",
         "reduction.best_subset.time_limit=1", ONE_FORMAT,
     )  # fmt: skip
     invoke("run", path, "--results", tmp_path / "r", "--quiet", settings=small)

@@ -319,7 +319,7 @@ def test_a_report_older_than_what_it_is_of_is_said(invoke, folder):
 def test_a_template_that_is_not_filled_in_is_said(invoke, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     invoke("init", "--dh", "my_arm", "--joints", "2")
-    quick = ["report.formats=[svg]", "trajectories.count=1"]
+    quick = ["report.formats=[svg]", "trajectories.count=1", "trajectories.test_count=1"]
     said = " ".join(invoke("run", "configs/my_arm.yaml", "--quiet", settings=quick).err.split())
     lines = (tmp_path / "configs/my_arm.yaml").read_text().splitlines()
     first = next(k for k, line in enumerate(lines, start=1) if "TODO" in line and k > 1)

@@ -41,16 +41,16 @@ def test_misprint_of_the_papers_table_stays_in_its_own_set():
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [
-        ("harmonics: 2", "harmonic: 2", 22, ["trajectories.harmonic", "did you mean harmonics?"]),
+        ("harmonics: 2", "harmonic: 2", 23, ["trajectories.harmonic", "did you mean harmonics?"]),
         ("count: 2", "count: -2", 20, ["trajectories.count", "greater than or equal to 1", "-2"]),
         ("count: 2", "count: many", 20, ["trajectories.count", "many"]),
-        ("velocity_limits: 3", "velocity_limits: [1, 2, 3]", 25,
+        ("velocity_limits: 3", "velocity_limits: [1, 2, 3]", 26,
          ["trajectories.velocity_limits has 3 values, but two_link has 2 joints", "rad/s"]),
-        ("velocity_limits: 3", "velocity_limits: fast", 25, ["velocity_limits", "'fast' is not a number"]),
-        ("velocity_limits: 3", "velocity_limits: -3", 25, ["velocity_limits", "greater than"]),
-        ("[-pi/2, pi/2]", "[pi/2, -pi/2]", 24, ["position_limits", "the limits cross"]),
-        ("[-pi/2, pi/2]", "[1, 1]", 24, ["position_limits", "never moves"]),
-        ("points: 40", "points: 4", 23, ["trajectories.points", "4 points cannot hold 2 harmonics"]),
+        ("velocity_limits: 3", "velocity_limits: fast", 26, ["velocity_limits", "'fast' is not a number"]),
+        ("velocity_limits: 3", "velocity_limits: -3", 26, ["velocity_limits", "greater than"]),
+        ("[-pi/2, pi/2]", "[pi/2, -pi/2]", 25, ["position_limits", "the limits cross"]),
+        ("[-pi/2, pi/2]", "[1, 1]", 25, ["position_limits", "never moves"]),
+        ("points: 40", "points: 4", 24, ["trajectories.points", "4 points cannot hold 2 harmonics"]),
         ("convention: modified", "convention: moddified", 7, ["convention", "'modified' or 'standard'"]),
         ("a: 0.5", "a: 0.5m", 10, ["joints.1.a", "'0.5m' is not a number"]),
         ("name: fore", "name: upper", 10, ["joints.1.name", "taken"]),
@@ -59,12 +59,12 @@ def test_misprint_of_the_papers_table_stays_in_its_own_set():
         ("com: [0.2, 0.01, 0]", "com: [0.2, 0.01]", 15, ["fore.com", "3 items"]),
         ("com: [0.2, 0.01, 0]", "mx: 1", 15, ["inertia_com needs com"]),
         ("nominal_torque: [20, 5]", "nominal_torque: [20, 0]", 17, ["nominal_torque", "greater than 0"]),
-        ("heuristic: forward-selection", "heuristic: forward_selction", 30,
+        ("heuristic: forward-selection", "heuristic: forward_selction", 31,
          ["heuristic", "did you mean forward-selection?"]),
-        ("  n: 4", "  n: 40", 31, ["selected.n is 40, but two_link has 20 parameters"]),
-        ("  n: 4", "  n: 4\n  torque_error: 0.1", 29, ["give n or torque_error, not both"]),
+        ("  n: 4", "  n: 40", 32, ["selected.n is 40, but two_link has 20 parameters"]),
+        ("  n: 4", "  n: 4\n  torque_error: 0.1", 30, ["give n or torque_error, not both"]),
         ("robot: two_link", "robot: two/link", 2, ["robot"]),
-        ("starts: 3\n  polished: 1", "starts: 1\n  polished: 2", 27, ["polished"]),
+        ("starts: 3\n  polished: 1", "starts: 1\n  polished: 2", 28, ["polished"]),
         ("gravity: [0, -9.81, 0]", "gravity: 9.81", 5, ["gravity"]),
     ],
 )  # fmt: skip
@@ -86,7 +86,7 @@ def test_all_errors_of_a_file_come_at_once(write_config):
     )
     messages = errors_of(path)
     assert len(messages) == 5
-    assert sorted(int(re.search(r"line (\d+)", m)[1]) for m in messages) == [15, 20, 22, 24, 25]
+    assert sorted(int(re.search(r"line (\d+)", m)[1]) for m in messages) == [15, 20, 23, 25, 26]
 
 
 def test_a_missing_key_says_what_it_would_hold(write_config):

@@ -12,7 +12,13 @@ import yaml
 ROOT = Path(__file__).resolve().parents[2]
 _LOGS = ROOT / "configs" / "logs"
 _SHORT = {
-    "trajectories": {"count": 3, "validation_count": 1, "starts": 1, "polished": 1},
+    "trajectories": {
+        "count": 3,
+        "validation_count": 1,
+        "test_count": 2,
+        "starts": 1,
+        "polished": 1,
+    },
     "reduction": {
         "heuristics": ["forward-selection", "swap", "best-subset"],
         "stop": {"parameters": 20},

@@ -18,17 +18,23 @@ SHORT = ["sampling.simulation.runs=2", "sampling.simulation.duration=1"]
 @pytest.fixture(scope="module", params=["cart_pole", "quarter_car"])
 def simulated(request):
     config, model = config_and_model(request.param, *SHORT)
-    return model, sample(config.sampling, model, None, Recordings(None, None))
+    return model, sample(config.sampling, model, None, Recordings(None, None, None))
 
 
 def test_how_many_motions_are_simulated_is_told():
-    config, model = config_and_model("cart_pole", *SHORT, "sampling.simulation.validation_runs=1")
+    config, model = config_and_model(
+        "cart_pole",
+        *SHORT,
+        "sampling.simulation.validation_runs=1",
+        "sampling.simulation.test_runs=1",
+    )
     told = []
-    sample(config.sampling, model, None, Recordings(None, None), tell=told.append)
+    sample(config.sampling, model, None, Recordings(None, None, None), tell=told.append)
     assert [(one.task, one.done, one.total) for one in told] == [
         ("simulate motions of the estimation set", 1, 2),
         ("simulate motions of the estimation set", 2, 2),
         ("simulate motions of the validation set", 1, 1),
+        ("simulate motions of the test set", 1, 1),
     ]
 
 

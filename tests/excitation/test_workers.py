@@ -16,7 +16,11 @@ def optimise():
 
 def test_results_do_not_depend_on_the_number_of_processes(optimise):
     one, two = (optimise(Run(jobs)) for jobs in (1, 2))
-    for a, b in zip(one.estimation + one.validation, two.estimation + two.validation, strict=True):
+    for a, b in zip(
+        one.estimation + one.validation + one.test,
+        two.estimation + two.validation + two.test,
+        strict=True,
+    ):
         assert np.array_equal(a.coefficients, b.coefficients)
 
 
@@ -29,7 +33,7 @@ def test_finished_parts_are_not_made_again(optimise):
     again = optimise(Run(2, first.parts, progress=lambda p: seen.append((p.task, p.remark))))
     assert again.estimation[0] is kept
     assert np.array_equal(again.estimation[1].coefficients, made.estimation[1].coefficients)
-    others = len(made.estimation) + len(made.validation) - 1
+    others = len(made.estimation) + len(made.validation) + len(made.test) - 1
     assert ("trajectories", f"{others} kept from before") in seen
 
 

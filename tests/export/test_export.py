@@ -253,6 +253,7 @@ def function_without_terms(chosen, graph, outputs, n, **more):
         "random_acceleration_error": np.nan, "random_states": 1, "largest_difference": np.zeros(n),
         "worst_joint": 0, "worst_state": np.zeros((3, n)), "smallest_eigenvalue": np.nan, "mass_states": 0,
         "lower": -np.ones((3, n)), "upper": np.ones((3, n)), "drawn": np.zeros((2, 3, n)), "projected": False,
+        "torque_error_test": np.zeros(0), "acceleration_error_test": np.zeros(0),
     }  # fmt: skip
     program = Program.of_graph(graph, outputs)
     return TermModel(

@@ -15,7 +15,13 @@ from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.random_states import random_states
 
 ROOT = Path(__file__).parents[2]
-QUICK = ["trajectories.count=2", "trajectories.starts=2", "trajectories.polished=1", ONE_FORMAT]
+QUICK = [
+    "trajectories.count=2",
+    "trajectories.test_count=1",
+    "trajectories.starts=2",
+    "trajectories.polished=1",
+    ONE_FORMAT,
+]
 
 WELD = """\
     closures:

@@ -328,7 +328,7 @@ def test_parameters_go_back_into_the_file(tmp_path, invoke):
     path = written(tmp_path, "<?xml version='1.0'?>\n<!-- kept -->\n" + ARM)
     output = tmp_path / "arm.yaml"
     invoke("init", path, "--output", output)
-    settings = ["trajectories.count=2", "trajectories.starts=2", "trajectories.polished=1", "selected.torque_error=0.1",
+    settings = ["trajectories.count=2", "trajectories.test_count=1", "trajectories.starts=2", "trajectories.polished=1", "selected.torque_error=0.1",
                 "validation.accept={}", "validation.stability=false", "reduction.heuristics=[forward-selection]", "report.formats=[svg]", "drives.grip.inertia=0.1"]  # fmt: skip
     given = (output, "--results", tmp_path / "r")
     invoke("run", *given, settings=settings)

@@ -13,6 +13,7 @@ RESULTS = {
         n=np.array([1, 3, 5]),
         torque_error_estimation=np.array([0.9, 0.02, 0.004]),
         torque_error_validation=np.array([0.9, 0.03, 0.005]),
+        torque_error_test=np.array([[0.9, 0.8], [0.03, 0.01], [0.006, 0.002]]),
         acceleration_error_estimation=np.array([np.inf, 0.05, 0.01]),
         acceleration_error_validation=np.array([np.inf, 0.05, 0.02]),
         operations_inverse=np.array([2, 100, 200]),
@@ -23,6 +24,7 @@ RESULTS = {
         n=np.array([6, 4]),
         torque_error_estimation=np.array([0.0085, 0.008]),
         torque_error_validation=np.array([0.009, 0.009]),
+        torque_error_test=np.array([[0.01, 0.02], [0.01, 0.03]]),
         acceleration_error_estimation=np.array([0.03, 0.03]),
         acceleration_error_validation=np.array([0.04, 0.04]),
         operations_inverse=np.array([140, 140]),
@@ -38,6 +40,7 @@ def terms(torque, acceleration, operations=50, held_out=None, budget=0.1):
         operations=operations,
         torque_error_estimation=torque,
         torque_error_validation=torque if held_out is None else held_out,
+        torque_error_test=np.zeros(0),
         acceleration_error_estimation=acceleration,
         acceleration_error_validation=acceleration,
     )
@@ -83,3 +86,5 @@ def test_the_fewest_operations_within_what_is_asked_for(wanted, found, inverse, 
             row = RESULTS[heuristic].n.tolist().index(int(n))
             assert one.operations == getattr(RESULTS[heuristic], f"operations_{function}")[row]
             assert one.torque_error_validation == RESULTS[heuristic].torque_error_validation[row]
+            test = RESULTS[heuristic].torque_error_test[row]
+            assert one.torque_error_test == (np.median(test), test.min(), test.max())

@@ -26,7 +26,7 @@ def paragraph(results):
 def test_methods_tell_of_trajectories(two_link_results, summary):
     text = paragraph(two_link_results)
     assert "(2 degrees of freedom) is linear in its 20 standard dynamic parameters" in text
-    assert "2 estimation and 1 validation trajectories" in text
+    assert "2 estimation, 1 validation and 4 test trajectories" in text
     assert "within limits of position, velocity, were" in text  # and of no acceleration
     assert "over its nominal torque" in text
     assert "swap, best-subset" in text
@@ -69,7 +69,7 @@ def test_a_joint_without_torque_has_an_error_all_the_same(simulated):
     selected = json.loads((simulated / "report" / "summary.json").read_text())["selected"]
     with h5py.File(simulated / "samples.h5") as file:
         names = [name.decode() for name in file["parameters/names"]]
-        W, tau = file["validation/W"][:], file["validation/tau"][:]
+        W, tau = file["test/W"][:], file["test/tau"][:]
         nominal = file["nominal_torque"][:]
     phi = np.array([selected["parameters"].get(name, 0.0) for name in names])
     errors = np.sqrt((((W @ phi).reshape(tau.shape) - tau) ** 2).mean(axis=0))

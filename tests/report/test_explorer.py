@@ -153,9 +153,10 @@ def test_every_step_of_the_slider_shows_its_model(page, summary):
             error = rows[n]["torque_error"]
             assert text("count") == str(n)
             sets = ("estimation", "validation")
-            for which, shown in zip(sets, text("torque").split(" / "), strict=True):
+            expected = [*(error[which] for which in sets), error["test"]["median"]]
+            for one, shown in zip(expected, text("torque").split(" / "), strict=True):
                 digits = float(shown.removesuffix(" %")) / 100
-                assert digits == pytest.approx(error[which], rel=5e-3, abs=1e-10)
+                assert digits == pytest.approx(one, rel=5e-3, abs=1e-10)
             assert text("inverse") == str(rows[n]["operations"]["inverse"])
             assert text("command").endswith(f"--model qr:{n}")
             assert len(driver.find_elements("css selector", ".chip.kept")) == n

@@ -16,8 +16,8 @@ def test_one_row_per_robot_with_the_selected_model(summary):
     assert int(row["d"]) == summary["full"]["operations_inverse"]
     assert int(row["d, n"]) == selected["operations"]["inverse"]
     rows = list(csv.reader(io.StringIO(table.to_csv())))
-    assert {len(row) for row in rows} == {15}
-    assert latex_table(table).count("&") == 3 * 14
+    assert {len(row) for row in rows} == {17}
+    assert latex_table(table).count("&") == 3 * 16
     assert "two_link" in table.to_text()
 
 

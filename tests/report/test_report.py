@@ -148,11 +148,12 @@ def test_summary_agrees_with_the_samples(summary, two_link_results):
 def test_errors_joint_by_joint_are_those_of_the_samples(summary, two_link_results):
     path = two_link_results / "report" / "tables" / "joint-errors.csv"
     header, *rows = csv.reader(io.StringIO(path.read_text()))
-    assert header == ["joint", "estimation", "estimation, share", "validation", "validation, share"]
+    assert header == ["joint", "estimation", "estimation, share", "validation", "validation, share",
+                      "test", "test, share"]  # fmt: skip
     with h5py.File(two_link_results / "samples.h5") as file:
         names = [name.decode() for name in file["parameters/names"]]
         phi = np.array([summary["selected"]["parameters"].get(name, 0.0) for name in names])
-        for k, which in enumerate(("estimation", "validation")):
+        for k, which in enumerate(("estimation", "validation", "test")):
             tau = file[f"{which}/tau"][:]
             left = tau - (file[f"{which}/W"][:] @ phi).reshape(tau.shape)
             rms = np.sqrt(np.mean(left**2, axis=0))

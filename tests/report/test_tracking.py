@@ -100,7 +100,7 @@ def test_every_arms_page_says_how_long_its_model_takes(two_link_results):
 
 
 def test_pages_of_loops_say_what_is_timed(invoke, tmp_path):
-    few = ["trajectories.count=1", "trajectories.max_iterations=20", "report.formats=[svg]",
+    few = ["trajectories.count=1", "trajectories.test_count=1", "trajectories.max_iterations=20", "report.formats=[svg]",
            "reduction.heuristics=[forward-selection]", "validation.accept={}",
            "validation.stability=false"]  # fmt: skip
     invoke("run", CONFIGS / "four_bar.yaml", "--results", tmp_path, settings=few)
@@ -123,7 +123,12 @@ def test_a_model_in_doubt_is_not_timed(invoke, two_link_copy, monkeypatch):
 
 
 def test_loops_are_refused(invoke, tmp_path):
-    settings = ["report.tracking={}", "trajectories.count=1", "trajectories.max_iterations=20"]
+    settings = [
+        "report.tracking={}",
+        "trajectories.count=1",
+        "trajectories.test_count=1",
+        "trajectories.max_iterations=20",
+    ]
     run = ("run", CONFIGS / "four_bar.yaml", "--results", tmp_path)
     refused = invoke(*run, settings=settings, code=2)
     assert "report.tracking is for open trees" in refused.err.replace("\n", " ")

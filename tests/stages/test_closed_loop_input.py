@@ -146,6 +146,7 @@ def test_recordings_beyond_the_reach_of_the_loops(run, tmp_path):
         "sampling.torques=model",
         f"sampling.estimation_file={table}",
         f"sampling.validation_file={table}",
+        "validation.accept={}",
     ]
     run(*settings, code=0)
     assert "the loops cannot be closed at q_rocker = " in run(*settings, stage="sample")
@@ -153,7 +154,12 @@ def test_recordings_beyond_the_reach_of_the_loops(run, tmp_path):
 
 
 def test_images_that_leave_the_limits_are_no_symmetry(run, tmp_path):
-    small = ["trajectories.count=1", "trajectories.starts=1", "trajectories.max_iterations=5"]
+    small = [
+        "trajectories.count=1",
+        "trajectories.test_count=1",
+        "trajectories.starts=1",
+        "trajectories.max_iterations=5",
+    ]
     five_bar = CONFIGS / "five_bar.yaml"
     run(path=five_bar, code=0)
     run(*small, stage="optimize-trajectories", path=five_bar, code=0)
@@ -174,7 +180,7 @@ def test_groups_and_the_sizes_they_leave(run, tmp_path):
         "{name: b, parameters: [my_crank, Izz_coupler, mx_coupler]}, "
         "{name: c, parameters: [my_coupler, Izz_rocker, mx_rocker, my_rocker]}]"
     )
-    settings = [groups, "trajectories.count=1", "trajectories.starts=1",
+    settings = [groups, "trajectories.count=1", "trajectories.test_count=1", "trajectories.starts=1",
                 "selected.torque_error=null", "report.formats=[svg]"]  # fmt: skip
     err = run(*settings, "selected.n=2", stage="run")
     assert "selected.n is 2, but with groups forward-selection has subsets of" in err
@@ -188,7 +194,7 @@ def test_groups_and_the_sizes_they_leave(run, tmp_path):
 def test_a_tied_group_has_the_value_that_fits_all_its_members(run, tmp_path):
     settings = [
         "reduction.groups=[{name: rods, bodies: [coupler, rocker], kinds: [Izz], tied: true}]",
-        "trajectories.count=1", "trajectories.starts=1", "report.formats=[svg]", "selected.n=9",
+        "trajectories.count=1", "trajectories.test_count=1", "trajectories.starts=1", "report.formats=[svg]", "selected.n=9",
         "selected.torque_error=null", "validation.accept.torque_error_validation=10",
     ]  # fmt: skip
     assert run(*settings, stage="run", code=0) == ""

@@ -17,7 +17,7 @@ from paramreduce_cli.export.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
 from paramreduce_cli.export.ways import Ways
 from paramreduce_cli.fields.section import per_joint
-from paramreduce_cli.records import Model, Trajectories, Trajectory
+from paramreduce_cli.records import SETS, Model, Trajectories, Trajectory
 
 _RUN = ("ros", "urscript")
 """Formats that a controller runs as they are."""
@@ -108,7 +108,7 @@ def _first(
 
 def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
     name, _, number = which.partition(":")
-    sets = {"estimation": trajectories.estimation, "validation": trajectories.validation}
+    sets = {name: getattr(trajectories, name) for name in SETS}
     found = sets.get(name, ())
     if not number.isdecimal() or not 1 <= int(number) <= len(found):
         there = ", ".join(f"{key}:1...{len(own)}" for key, own in sets.items())

@@ -36,7 +36,7 @@ from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import absent_files, stages_to_run
 from paramreduce_cli.records import Report
 from paramreduce_cli.runner import Runner, asked
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import share, share_range
 
 _TABLE_WIDTH = 110
 _MOST_PLACES = 8
@@ -156,25 +156,36 @@ def _say_summary(summary: dict[str, Any]) -> None:
             f"{len(kappas)} trajectories, {trajectories['scaling']} kappa: best {min(kappas):.4g}, "
             f"median {statistics.median(kappas):.4g}, worst {max(kappas):.4g}"
         )
+    tested = summary["selected"]["torque_error"]["test"] is not None
     table = rich.table.Table(title=f"Reduced models with {n} parameters", box=rich.box.SIMPLE)
-    headings = ("heuristic", "ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V", "d", "M|δ")
-    for k, heading in enumerate(headings):
+    errors = (
+        ("ε_τ T", "worst", "ε_z̈ T", "worst") if tested else ("ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V")
+    )
+    for k, heading in enumerate(("heuristic", *errors, "d", "M|δ")):
         table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
     for name, rows in summary["validation"].items():
         for row in rows:
             if row["n"] == n:
-                table.add_row(name, *_summary_cells(row))
+                table.add_row(name, *_summary_cells(row, tested=tested))
     full = summary["full"]
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
     found = summary["identification"]
     table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
     say_table(table, _TABLE_WIDTH)
+    if tested:
+        count = (
+            len(trajectories["test"]) + len(trajectories["test_point_to_point"])
+            if trajectories
+            else 0
+        )
+        of = f"{count} motions" if count else "its motions"
+        say(f"T: the test set, which no search looks at; the median and the worst of {of}.")
     for one in summary["terms"]:
         name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
         said = "".join(
-            f", {symbol} {' / '.join(share(error) for error in known)}"
+            f", {symbol} {known}"
             for symbol, kind in (("ε_τ", "torque_error"), ("ε_z̈", "acceleration_error"))
-            if (known := [error for error in one[kind].values() if error is not None])
+            if (known := _said(one[kind]))
         )
         say(f"Without small terms: {name} in {one['operations']} operations{said}")
     if found is not None:
@@ -185,10 +196,21 @@ def _say_summary(summary: dict[str, Any]) -> None:
             )
 
 
-def _summary_cells(row: dict[str, Any]) -> list[str]:
+def _summary_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
+    """Errors and operations of a model; on the test set, if there is one, else on both others."""
     cells = []
-    for part in ("torque_error", "acceleration_error"):
-        for which in ("estimation", "validation"):
-            value = row[part][which]
-            cells.append(share(value))
+    for what in ("torque_error", "acceleration_error"):
+        error = row[what]
+        if tested:
+            error, keys = error["test"] or {}, ("median", "worst")
+        else:
+            keys = ("estimation", "validation")
+        cells += [share(error.get(key)) for key in keys]
     return [*cells, str(row["operations"]["inverse"]), str(row["operations"]["direct"])]
+
+
+def _said(error: dict[str, Any]) -> str:
+    """Return the errors of a function on the test set, or on the sets that there are; empty where none are known."""
+    if error["test"] is not None:
+        return share_range(**error["test"])
+    return " / ".join(share(one) for one in error.values() if one is not None)

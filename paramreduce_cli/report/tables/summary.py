@@ -1,5 +1,6 @@
 """What each heuristic reaches at the selected number of parameters."""
 
+from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.overview import HEADER, function_cells
 from paramreduce_cli.report.sections import PageSection, placed
@@ -8,7 +9,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.HEURISTICS, 1)
 def summary(data: ReportData) -> Table:
-    """Every heuristic at the selected number of parameters, both functions."""
+    """Every heuristic at the selected number of parameters, both functions: errors on the estimation (E), the validation (V) and the test set (T), which no search looks at, there the median of all motions and between the smallest and the largest."""
     n = data.validation.selected.n
     full = data.validation.full
     model = (str(data.n_affecting), str(data.reduction.rank), str(n))
@@ -23,6 +24,7 @@ def summary(data: ReportData) -> Table:
                     getattr(r, f"operations_{key}")[k],
                     getattr(r, f"{error}_error_estimation")[k],
                     getattr(r, f"{error}_error_validation")[k],
+                    ErrorRange.of(getattr(r, f"{error}_error_test")[k]),
                 )
                 for key, error in (("inverse", "torque"), ("direct", "acceleration"))
             )

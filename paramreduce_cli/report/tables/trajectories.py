@@ -1,8 +1,8 @@
-"""How every trajectory of both sets excites the parameters, and what it took to find."""
+"""How every trajectory of all sets excites the parameters, and what it took to find."""
 
 import numpy as np
 
-from paramreduce_cli.records import Trajectory
+from paramreduce_cli.records import SETS, Trajectory
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
@@ -22,7 +22,7 @@ def trajectories(data: ReportData) -> Table:
     )  # fmt: skip
     rows = [
         _trajectory_row(f"{name} {k + 1}", t)
-        for name in ("estimation", "validation")
+        for name in SETS
         for k, t in enumerate(getattr(found, name))
     ]
     return Table("Trajectories", header, tuple(rows))

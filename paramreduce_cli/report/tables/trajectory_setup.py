@@ -28,6 +28,8 @@ def trajectory_setup(data: ReportData) -> Table:
         ("velocity limits, rad/s or m/s", _each(limits.velocity[:, None])),
         ("estimation trajectories", str(len(t.estimation))),
         ("validation trajectories", str(len(t.validation))),
+        ("test trajectories", str(len(t.test))),
+        ("point-to-point motions of the test set", str(len(t.test_point_to_point))),
         ("every joint uses its range", "yes" if t.use_full_range else "no"),
     ]
     if np.isfinite(limits.acceleration).any():

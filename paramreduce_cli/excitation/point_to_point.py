@@ -1,0 +1,158 @@
+"""Point-to-point motions: from rest to rest along a straight line in joint space, with the least jerk [Flash1985]."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from paramreduce_cli.errors import DataError
+from paramreduce_cli.multibody.dynamics import Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.observation import Span, StateBlock, StatesAt
+from paramreduce_cli.multibody.quantities import Quantities
+from paramreduce_cli.records import Constraint, FloatArray, JointLimits, Model, PointToPoint
+
+_PEAK_SPEED = 1.875
+"""Of a motion over a unit in unit time."""
+_PEAK_ACCELERATION = 10 / np.sqrt(3)
+_TRIES = 30
+"""Pairs of positions that are tried for each motion that is asked for."""
+_SLOWER = 1.25
+"""Factor by which a motion is made slower while it takes more torque or power than there is."""
+_SLOWDOWNS = 12
+
+
+def point_to_point_states(
+    motion: PointToPoint, time: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Evaluate a motion.
+
+    Args:
+        motion: The motion.
+        time: Since its beginning, (n_points,), s.
+
+    Returns:
+        z, dz and ddz, each (n_points, n_dof).
+    """
+    x = (time / motion.duration)[:, None]
+    way = motion.end - motion.start
+    z = motion.start + way * x**3 * (10 + x * (6 * x - 15))
+    dz = way / motion.duration * 30 * (x * (1 - x)) ** 2
+    ddz = way / motion.duration**2 * 60 * x * (1 - x) * (1 - 2 * x)
+    return z, dz, ddz
+
+
+def point_to_point_times(motion: PointToPoint, points: int) -> FloatArray:
+    """Return equidistant times from the beginning of a motion to its end, (points,), s."""
+    return np.linspace(0.0, motion.duration, points)
+
+
+def states_along(motions: Sequence[PointToPoint], points: int, finer: int) -> StatesAt:
+    """Return what gives the states of a span of the motions.
+
+    Args:
+        motions: The motions.
+        points: Samples of each, from its beginning to its end.
+        finer: How many times finer the grid is on which loops are followed; 1 where there are none.
+    """
+
+    def at(span: Span) -> StateBlock:
+        motion = motions[span.trajectory]
+        times = point_to_point_times(motion, points)[span.start : span.stop]
+        step = motion.duration / (points - 1) / finer
+        between = times[0] + step * np.arange(finer * times.size)
+        way = point_to_point_states(motion, np.minimum(between, motion.duration))[0]
+        states = point_to_point_states(motion, times)
+        return StateBlock(span.trajectory, times, *states, way=way if finer > 1 else None)
+
+    return at
+
+
+def find_point_to_point(
+    model: Model,
+    limits: JointLimits,
+    constraints: tuple[Constraint, ...],
+    positions: FloatArray,
+    count: int,
+    points: int,
+    rng: np.random.Generator,
+) -> tuple[PointToPoint, ...]:
+    """Find motions between random pairs of positions, each as fast as the limits allow.
+
+    Args:
+        model: Model of the robot, whose torques keep to the limits.
+        limits: Limits of the independent coordinates.
+        constraints: Bounds on other quantities along the way.
+        positions: Positions that keep to all of these, (n_positions, n_dof), rad or m.
+        count: Number of motions.
+        points: Points along each motion at which it is checked.
+        rng: Source of the pairs.
+
+    Returns:
+        The motions; fewer than asked for where most straight lines leave the constraints.
+    """
+    check = _Check(model, limits, constraints, points)
+    found: list[PointToPoint] = []
+    for _ in range(_TRIES * count):
+        if len(found) == count:
+            break
+        start, end = positions[rng.integers(len(positions), size=2)]
+        motion = check.fastest(start, end)
+        if motion is not None:
+            found.append(motion)
+    return tuple(found)
+
+
+class _Check:
+    """What every motion keeps to.
+
+    Args:
+        model: Model of the robot.
+        limits: Limits of the independent coordinates.
+        constraints: Bounds on other quantities.
+        points: Points along each motion at which they are evaluated.
+    """
+
+    def __init__(
+        self, model: Model, limits: JointLimits, constraints: tuple[Constraint, ...], points: int
+    ) -> None:
+        self._values, self._limits, self._points = model.values, limits, points
+        self._coordinates = Coordinates(model.mechanism, once=True)
+        self._quantities = Quantities(model.mechanism, constraints)
+        self._dynamics = Dynamics(model.mechanism)
+
+    def fastest(self, start: FloatArray, end: FloatArray) -> PointToPoint | None:
+        """Return the fastest motion between two positions; None where there is none."""
+        way = np.abs(end - start)
+        duration = max(
+            float(np.max(_PEAK_SPEED * way / self._limits.velocity)),
+            float(np.sqrt(np.max(_PEAK_ACCELERATION * way / self._limits.acceleration))),
+        )
+        motion = PointToPoint(start, end, duration)
+        if duration == 0 or not self._is_free(motion):
+            return None
+        for _ in range(_SLOWDOWNS):
+            if self._is_strong_enough(motion):
+                return motion
+            motion = PointToPoint(start, end, motion.duration * _SLOWER)
+        return None
+
+    def _is_free(self, motion: PointToPoint) -> bool:
+        """Whether the loops close along the way, and all constraints are kept to."""
+        time = point_to_point_times(motion, self._points)
+        z, _, _ = point_to_point_states(motion, time)
+        try:
+            q = self._coordinates.positions(z, None)
+            self._coordinates.check_motion(time, q)
+        except DataError:
+            return False
+        return bool((self._quantities.rows(q) <= 0).all())
+
+    def _is_strong_enough(self, motion: PointToPoint) -> bool:
+        """Whether the torques and powers of the model are within their limits."""
+        torque, power = self._limits.torque, self._limits.power
+        if not (np.isfinite(torque).any() or np.isfinite(power).any()):
+            return True
+        z, dz, ddz = point_to_point_states(motion, point_to_point_times(motion, self._points))
+        states = self._coordinates.states(z, dz, ddz)
+        tau = np.abs(self._dynamics.inverse(*states, self._values))
+        return bool(((tau <= torque) & (tau * np.abs(dz) <= power)).all())
