@@ -132,7 +132,8 @@ optimiser-%: $(VENV)/.installed
 	rm -rf results/regression/$*-optimised
 	$(PARAMREDUCE) run configs/$*.yaml --results results/regression/$*-optimised --quiet \
 	  --jobs $(JOBS) --set reduction.heuristics=[forward-selection] \
-	  --set validation.stability=false --set validation.accept={} --set terms=null $(OPTIMISER)
+	  --set validation.stability=false --set validation.accept={} --set terms=null \
+	  --set trajectories.test_count=0 --set trajectories.test_point_to_point_count=0 $(OPTIMISER)
 	$(PARAMREDUCE) compare results/reference/$*.json results/regression/$*-optimised --only kappa \
 	  --tolerance kappa=$(TOLERANCE)
 

@@ -14,6 +14,7 @@ from pydantic import BaseModel, ValidationError
 
 from paramreduce_cli.config import reading
 from paramreduce_cli.config.checks import check, remarks
+from paramreduce_cli.config.cutting import cut_to_independent
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, keyed
@@ -187,7 +188,7 @@ def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
     constants, unreadable = read_constants(data.get("constants"))
     mistaken: list[Problem] = [(("constants", name), text) for name, text in unreadable.items()]
     try:
-        config = _parse(data, constants)
+        config = cut_to_independent(_parse(data, constants))
         return config, mistaken + check(config)
     except ValidationError as error:
         problems = mistaken + _one_per_key([_describe(entry, data) for entry in error.errors()])

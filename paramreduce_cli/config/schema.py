@@ -422,6 +422,9 @@ class ReportSection(Section):
     """Coordinates of the poses in which the mechanism is drawn, rad or m; three of the validation set if left out."""
 
 
+CLOSED = r"^[^=:]+=[^=:]+(:(fixed|revolute|spherical))?$"
+
+
 class SourceSection(Section):
     """The robot file that a config was made from, and what was asked of it; so that it can be written back."""
 
@@ -439,6 +442,10 @@ class SourceSection(Section):
     """Whether the root moves freely."""
     uncoupled: bool = False
     """Whether joints that follow others in the file move on their own."""
+    closed: list[Annotated[str, Field(pattern=CLOSED)]] = []
+    """Pairs of links whose frames are held together, `A=B` for all of their motion, `A=B:revolute` but for a turn about z, `A=B:spherical` but for any turn."""
+    independent: list[str] = []
+    """Joints that are driven and determine all others where links are held together; chosen if left out."""
 
 
 class Settings(Section):

@@ -114,6 +114,14 @@ class ImportedJoint:
     line: int = 0
 
 
+CLOSED_KINDS: Mapping[str, ClosureKind] = {
+    "fixed": "fixed",
+    "revolute": "revolute",
+    "spherical": "point",
+}
+"""Kinds of closures of two frames of a file, by what they are asked for as."""
+
+
 @dataclass(frozen=True)
 class ImportedClosure:
     """What holds two links together besides the joints of the tree."""

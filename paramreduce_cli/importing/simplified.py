@@ -14,6 +14,8 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.importing.doubts import doubts
 from paramreduce_cli.importing.imported import (
+    CLOSED_KINDS,
+    ImportedClosure,
     ImportedJoint,
     ImportedRobot,
     Inertial,
@@ -95,13 +97,16 @@ class SimplifiedRobot:
     couplings: tuple[Coupling, ...]
     closures: tuple[Closure, ...]
     independent: tuple[str, ...]
-    """Coordinates that determine all others; all but the followers where the file says nothing."""
+    """Coordinates that determine all others; all but the followers where the file says nothing, none of loops
+    where they are still to be chosen."""
     gravity: tuple[float, ...]
     merged: Mapping[str, str]
     """Links that move with a body of another name, by name in the file."""
     frames: Mapping[str, FloatArray]
     """Of all links in those of the bodies they move with, (4, 4), by name in the file."""
     remarks: tuple[str, ...]
+    guess: Mapping[str, float] = field(default_factory=dict)
+    """Coordinates with which loops are closed, rad or m; those that are not zero."""
 
 
 def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
@@ -116,6 +121,7 @@ def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
 class _Simplification:
     def __init__(self, robot: ImportedRobot, choice: SourceSection) -> None:
         self._robot, self._choice = robot, choice
+        self._asked_closures = tuple(_asked_closure(text) for text in choice.closed)
         self._remarks = [*robot.remarks, *doubts(robot.links)]
         self._children: dict[str, list[ImportedJoint]] = {}
         for joint in robot.joints:
@@ -137,9 +143,11 @@ class _Simplification:
         asked = [("--root", choice.root, links), ("--tip", choice.tip, links)]
         asked += [("--ignore", name, links) for name in choice.ignored]
         asked += [("--lock", name, joints) for name in choice.locked or {}]
+        asked += [("--close", name, links) for one in self._asked_closures for name in one.links]
+        asked += [("--independent", name, joints) for name in choice.independent]
         for option, name, known in asked:
             if name is not None and name not in known:
-                kind = "joint" if option == "--lock" else "link"
+                kind = "joint" if option in ("--lock", "--independent") else "link"
                 raise ConfigError(f"{option} {name}: {unknown(kind, name, known)}.")
 
     def _found_root(self) -> str:
@@ -219,11 +227,15 @@ class _Simplification:
 
     def _closures(self) -> tuple[Closure, ...]:
         found = []
-        for closure in self._robot.closures:
+        for closure in (*self._robot.closures, *self._asked_closures):
             if any(link not in self._carried for link in closure.links):
                 self._remarks.append(f"{closure.name} holds a link that is left out, so it is too")
                 continue
             one, other = (self._carried[link] for link in closure.links)
+            if one == other and closure in self._asked_closures:
+                raise ConfigError(
+                    f"--close {'='.join(closure.links)}: both links move with {one}, so there is nothing to close."
+                )
             if one == other:
                 self._remarks.append(f"{closure.name} holds {one} to itself, so it is left out")
                 continue
@@ -242,6 +254,14 @@ class _Simplification:
         closures: tuple[Closure, ...],
     ) -> tuple[str, ...]:
         choice = self._choice
+        moved = {body.source.name: body for body in bodies if body.source is not None}
+        if self._asked_closures and not self._robot.closures:
+            still = [name for name in choice.independent if name not in moved]
+            if still:
+                raise ConfigError(f"--independent {still[0]}: does not move.")
+            return tuple(
+                name for joint in choice.independent for name in moved[joint].coordinates()
+            )
         if closures:
             options = (choice.root, choice.tip, choice.locked, choice.ignored)
             if any(options) or choice.floating or choice.uncoupled:
@@ -249,7 +269,6 @@ class _Simplification:
                     f"{self._robot.source}: has closed loops, whose independent coordinates no choice may "
                     "change; import it whole and change the config."
                 )
-            moved = {body.source.name: body for body in bodies if body.source is not None}
             return tuple(
                 moved[joint].coordinates()[k]
                 for joint, k in self._robot.independent
@@ -290,7 +309,14 @@ class _Simplification:
 
     def _filled(self, body: ImportedBody, parts: list[Inertial]) -> ImportedBody:
         inertial = together(parts)
-        if not body.massless and not inertial.mass:
+        if body.massless or inertial.mass:
+            return replace(body, inertial=inertial)
+        if self._robot.closures or self._asked_closures:
+            self._remarks.append(
+                f"{body.name} has no mass in the file, and is taken for massless, as links between the joints of a loop are"
+            )
+            body = replace(body, massless=True)
+        else:
             self._remarks.append(f"{body.name} has no mass in the file: TODO")
         return replace(body, inertial=inertial)
 
@@ -332,6 +358,15 @@ class _Simplification:
                     f"{name} follows {leader.name}, which is not here: it moves on its own"
                 )
         return tuple(result)
+
+
+def _asked_closure(text: str) -> ImportedClosure:
+    """The closure of a text such as ``A=B`` or ``A=B:revolute``."""
+    pair, _, kind = text.partition(":")
+    one, _, other = (part.strip() for part in pair.partition("="))
+    return ImportedClosure(
+        f"{one}_{other}", CLOSED_KINDS[kind or "fixed"], (one, other), (np.eye(4), np.eye(4))
+    )
 
 
 def _in_order(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:

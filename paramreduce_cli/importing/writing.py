@@ -94,6 +94,9 @@ def _description(robot: SimplifiedRobot) -> str:
         lines += ["    closures:", *(f"      - {_coupling(one)}" for one in robot.couplings)]
         lines += [f"      - {_closure(one)}" for one in robot.closures]
         lines.append(f"    independent: [{', '.join(map(_name, robot.independent))}]")
+        if robot.guess:
+            values = (f"{_name(name)}: {value:.6g}" for name, value in robot.guess.items())
+            lines.append(f"    guess: {{{', '.join(values)}}}")
     return "\n".join(lines) + "\n"
 
 

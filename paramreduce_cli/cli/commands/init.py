@@ -15,7 +15,7 @@ from paramreduce_cli.config.column_matching import guess_columns
 from paramreduce_cli.config.examples import copy_example
 from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.config.log_template import log_text
-from paramreduce_cli.config.schema import SourceSection
+from paramreduce_cli.config.schema import CLOSED, Config, SourceSection
 from paramreduce_cli.config.template import (
     dh_template,
     loop_template,
@@ -26,6 +26,7 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.numbers import parse_number
 from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.reading import described, imported
+from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.importing.writing import config_text
 
 _BASE = 6
@@ -55,6 +56,10 @@ _FARTHEST = 1e6
               help="A joint that does not move, rad or m; may be repeated.")  # fmt: skip
 @click.option("--ignore", "ignored", multiple=True, metavar="LINK",
               help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
+@click.option("--close", "closed", multiple=True, metavar="A=B[:KIND]",
+              help="Hold the frames of two links together, so that a loop is closed: fixed, revolute (but for a turn about z) or spherical; may be repeated.  [default KIND: fixed]")  # fmt: skip
+@click.option("--independent", multiple=True, metavar="JOINT",
+              help="With --close, a joint that is driven; may be repeated.  [default: chosen]")  # fmt: skip
 @click.option("--floating", is_flag=True, help="The root moves freely.")
 @click.option("--uncouple", is_flag=True, help="Joints that follow others move on their own.")
 @click.option("--log", "logs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
@@ -62,7 +67,8 @@ _FARTHEST = 1e6
 @click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
 def init(
     source: str | None, kind: str | None, joints: int, root: str | None, tip: str | None,
-    locked: tuple[str, ...], ignored: tuple[str, ...], floating: bool, uncouple: bool,
+    locked: tuple[str, ...], ignored: tuple[str, ...], closed: tuple[str, ...],
+    independent: tuple[str, ...], floating: bool, uncouple: bool,
     logs: tuple[Path, ...], output: Path | None,
 ) -> None:  # fmt: skip
     """Write a commented config: from a URDF or MJCF, or with --dh, --tree, --loop or --recorded one to be filled in.
@@ -87,8 +93,13 @@ def init(
         return
     choice = SourceSection(
         file=(described(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
-        ignored=list(ignored), floating=floating, uncoupled=uncouple,
+        ignored=list(ignored), floating=floating, uncoupled=uncouple, closed=list(map(_check_closure, closed)),
+        independent=list(independent),
     )  # fmt: skip
+    if independent and not closed:
+        raise ConfigError(
+            "--independent: belongs to --close; without loops all joints are independent."
+        )
     if kind is not None:
         if logs or choice != SourceSection(file=choice.file):
             raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
@@ -99,6 +110,8 @@ def init(
         path = output or Path("configs") / f"{robot.name}.yaml"
         if re.fullmatch(NAME, path.stem, re.ASCII):  # results go to a folder of the robot's name
             robot = replace(robot, name=path.stem)
+        if robot.closures:
+            robot = _closed(robot, choice)
         base = robot.independent[:_BASE] if floating else ()
         log = _log(path, logs, robot.independent, base) if logs else ""
         text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
@@ -178,9 +191,27 @@ def _lock(text: str) -> tuple[str, float]:
     return joint, number
 
 
-def _check(text: str) -> None:
+def _check_closure(text: str) -> str:
+    if not re.fullmatch(CLOSED, text):
+        raise ConfigError(
+            f"--close {text}: write two links as A=B, or A=B:KIND with fixed, revolute or spherical."
+        )
+    return text
+
+
+def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
+    """The robot with a guess from which its loops close, and with independent coordinates."""
+    # Late: CasADi.
+    from paramreduce_cli.importing.closing import close_loops
+
+    every = tuple(name for body in robot.bodies for name in body.coordinates())
+    text = config_text(replace(robot, independent=robot.independent or every), choice)
+    return close_loops(robot, _check(text).mechanism())
+
+
+def _check(text: str) -> Config:
     """See that the config can be loaded, before anything is written."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "config.yaml"
         path.write_text(text, encoding="utf-8")
-        load_config(path)
+        return load_config(path)

@@ -6,7 +6,7 @@ so that one singular configuration is not taken for a property of the mechanism.
 
 import dataclasses
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 import casadi as ca
 import numpy as np
@@ -55,12 +55,36 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     kept = _kept(mechanism, loops, jacobians)
     rows = [jacobian[kept] for jacobian in jacobians]
     _check_choice(mechanism, rows)
-    q = _closed(equations, mechanism, loops, mechanism.dependent)
+    q = _closed_as_given(equations, mechanism, loops, nearest)
     _check_regular(mechanism, equations.jacobian(q)[kept])
     _check_hinges(mechanism, loops, q)
     whole = len(kept) == len(jacobians[0])
     found = dataclasses.replace(loops, assembly=q, kept=None if whole else tuple(kept))
     return dataclasses.replace(mechanism, loops=found)
+
+
+def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArray, list[int]]:
+    """Close the loops with all coordinates free to move, and choose coordinates that determine all others.
+
+    Args:
+        mechanism: A mechanism with loops, whatever coordinates are called independent; it is closed
+            from its guess.
+        driven: Positions of coordinates that are to be independent if they can, the most wanted first.
+
+    Returns:
+        Generalised coordinates with closed loops, (n_q,), and positions of independent ones.
+
+    Raises:
+        ConcernError: The loops cannot be closed from the guess.
+    """
+    assert mechanism.loops is not None
+    equations = _Equations(mechanism)
+    q = _closed(equations, mechanism, mechanism.loops, range(mechanism.n_q))
+    jacobian, _ = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
+    others = [k for k in range(mechanism.n_q) if k not in driven]
+    order = np.array([*reversed(others), *reversed(driven)], dtype=np.int64)
+    dependent = set(independent_columns(jacobian, order, _RANK))
+    return q, [k for k in range(mechanism.n_q) if k not in dependent]
 
 
 class _Equations:
@@ -113,13 +137,37 @@ def _closed(
             if k not in free
         )
         raise ConcernError(
-            f"the loops cannot be closed from it"
-            f"{f' with {fixed}' if fixed else ''}: at the guess they are open by {before:.3g}, and at "
+            f"the loops cannot be closed from the guess"
+            f"{f' with {fixed}' if fixed else ''}: there they are open by {before:.3g}, and at "
             f"best by {gaps[worst]:.3g}, at {open_at} (m, or no unit for a tilt). Give a guess nearer to an assembly, or "
             "check lengths and frames.",
             Concern.ASSEMBLY,
         )
     return q
+
+
+def _closed_as_given(
+    equations: _Equations, mechanism: Mechanism, loops: Loops, nearest: FloatArray
+) -> FloatArray:
+    """Close the loops with the independent coordinates as they are in the guess.
+
+    Where no guess says anything of these and the loops do not close with zeros, they are closed where
+    all coordinates came to that were free to move, which is said.
+    """
+    try:
+        return _closed(equations, mechanism, loops, mechanism.dependent)
+    except ConcernError:
+        if loops.assembly[list(mechanism.independent)].any():
+            raise
+    names = mechanism.generalised_names
+    guess = ", ".join(f"{names[k]}: {value:.6g}" for k, value in enumerate(nearest) if value)
+    warnings.warn(
+        f"the loops do not close with zero for {', '.join(names[k] for k in mechanism.independent)}; they are closed "
+        f"with all coordinates free to move, at guess: {{{guess}}}, which the config may give",
+        ParamreduceWarning,
+        stacklevel=3,
+    )
+    return nearest
 
 
 def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:

@@ -1,0 +1,63 @@
+"""Where the loops of an imported robot are closed, and which of its coordinates determine the others."""
+
+from dataclasses import replace
+
+from paramreduce_cli.errors import ConcernError, ConfigError
+from paramreduce_cli.importing.simplified import SimplifiedRobot
+from paramreduce_cli.multibody.loops.assembly import find_assembly
+from paramreduce_cli.records import Mechanism
+
+_DIGITS = 6
+"""Decimals of the guess, which leads back to the assembly."""
+
+
+def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot:
+    """Close the loops from the pose of the file, and choose independent coordinates where none are named.
+
+    Args:
+        robot: A robot with loops.
+        mechanism: The same as a mechanism, whatever it calls independent.
+
+    Returns:
+        The robot with a guess and independent coordinates; without a guess where its loops do not close.
+
+    Raises:
+        ConfigError: Other coordinates than those that are named are independent.
+    """
+    names = mechanism.generalised_names
+    named = [names.index(name) for name in robot.independent]
+    driven = named or _driven(robot, names)
+    try:
+        q, independent = find_assembly(mechanism, driven)
+    except ConcernError as error:
+        remark = f"TODO description.tree.guess: {str(error).rstrip('.')}"
+        chosen = robot.independent or tuple(names[k] for k in driven or [0])
+        return replace(robot, independent=chosen, remarks=(*robot.remarks, remark))
+    own = tuple(names[k] for k in independent)
+    if named and set(named) != set(independent):
+        raise ConfigError(
+            f"{robot.source}: {len(independent)} coordinates determine all others, and {', '.join(robot.independent)} do "
+            f"not; {', '.join(own)} do. Name them by --independent JOINT, or leave that out."
+        )
+    guess = {name: round(float(value), _DIGITS) for name, value in zip(names, q, strict=True)}
+    guess = {name: value for name, value in guess.items() if value}
+    remarks = robot.remarks
+    if guess:
+        shown = ", ".join(f"{name} = {value:.4g}" for name, value in guess.items())
+        remarks = (*remarks, f"the loops are closed at {shown}, which is the guess")
+    if not named:
+        remarks = (
+            *remarks,
+            f"independent coordinates, which determine all others: {', '.join(own)}; --independent JOINT chooses others",
+        )
+    return replace(robot, independent=robot.independent or own, guess=guess, remarks=remarks)
+
+
+def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
+    """Coordinates of joints to which the file gives an effort, in its order."""
+    return [
+        names.index(name)
+        for body in robot.bodies
+        if body.limits is not None and body.limits.effort
+        for name in body.coordinates()
+    ]
