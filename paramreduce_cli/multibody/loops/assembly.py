@@ -29,6 +29,8 @@ _MOVES = 8
 _MOVE = 0.05
 """Length of a random move, rad or m."""
 _SEED = 0
+_RESTARTS = np.repeat([0.1, 0.3, 1.0], 5)
+"""Sizes of the random moves from a guess of zeros, rad or m."""
 _ALONG = {"fixed": (2, 0), "prismatic": (2, 0), "revolute": (2,), "cylindrical": (2,)}
 """Axes that point the same way in a closure of each kind."""
 
@@ -50,7 +52,7 @@ def assembled(mechanism: Mechanism) -> Mechanism:
             "none left to determine. Leave out those that the loops determine.",
             Concern.INDEPENDENT,
         )
-    nearest = _closed(equations, mechanism, loops, range(mechanism.n_q))
+    nearest = _closed_nearby(equations, mechanism, loops)
     jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
     kept = _kept(mechanism, loops, jacobians)
     rows = [jacobian[kept] for jacobian in jacobians]
@@ -79,10 +81,12 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     """
     assert mechanism.loops is not None
     equations = _Equations(mechanism)
-    q = _closed(equations, mechanism, mechanism.loops, range(mechanism.n_q))
-    jacobian, _ = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
-    others = [k for k in range(mechanism.n_q) if k not in driven]
-    order = np.array([*reversed(others), *reversed(driven)], dtype=np.int64)
+    q = _closed_nearby(equations, mechanism, mechanism.loops)
+    jacobian, rows = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
+    others = np.array([k for k in range(mechanism.n_q) if k not in driven], dtype=np.int64)
+    # Those that are determined best come first, and what is left over determines them.
+    _, pivots = scipy.linalg.qr(jacobian[rows][:, others], mode="r", pivoting=True)
+    order = np.array([*others[pivots], *reversed(driven)], dtype=np.int64)
     dependent = set(independent_columns(jacobian, order, _RANK))
     return q, [k for k in range(mechanism.n_q) if k not in dependent]
 
@@ -144,6 +148,31 @@ def _closed(
             Concern.ASSEMBLY,
         )
     return q
+
+
+def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
+    """Move all coordinates from the guess until the loops are closed.
+
+    A guess of zeros may be a pose in which all links lie in one line, which no step leads away from; then
+    they are moved at random before, a little at first.
+
+    Raises:
+        ConcernError: The loops cannot be closed.
+    """
+    try:
+        return _closed(equations, mechanism, loops, range(mechanism.n_q))
+    except ConcernError:
+        if loops.assembly.any():
+            raise
+        rng = np.random.default_rng(_SEED)
+        for size in _RESTARTS:
+            start = size * rng.normal(size=mechanism.n_q)
+            try:
+                moved = dataclasses.replace(loops, assembly=start)
+                return _closed(equations, mechanism, moved, range(mechanism.n_q))
+            except ConcernError:
+                continue
+        raise
 
 
 def _closed_as_given(
