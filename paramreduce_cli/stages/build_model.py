@@ -1,11 +1,12 @@
 """build-model: from the description to parameters and their base."""
 
 import dataclasses
+import warnings
 
 import numpy as np
 
 from paramreduce_cli.config.schema import ModelSection
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.errors import ConcernError, ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.formulations import formulations
 from paramreduce_cli.multibody.base_parameters import (
@@ -14,7 +15,7 @@ from paramreduce_cli.multibody.base_parameters import (
     regrouping,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assembled, find_assembly_modes
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.multibody.relations import regrouping_expressions
 from paramreduce_cli.records import (
@@ -62,6 +63,7 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     affects = affecting_parameters(mechanism, K[:, measured])
     base = base_parameters(W, _preference(model, mechanism), model.rank_tolerance, affects)
     _check_named(model, mechanism, base)
+    _say_other_modes(robot, model, mechanism, base)
     texts = _expressions(robot, mechanism, base, affects, states, rng)
     lean = formulations(mechanism, affects, base.columns, run)
     check_formulations(mechanism, lean, np.flatnonzero(affects), states, rng)
@@ -74,6 +76,37 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
         nominal_torque_given=given is not None,
         formulations=lean,
     )
+
+
+def _say_other_modes(
+    robot: Robot, model: ModelSection, mechanism: Mechanism, base: BaseParameters
+) -> None:
+    """Say where the loops can be assembled in another way that has another number of base parameters.
+
+    A guess that leads to the wrong one of them is seen by this alone.
+    """
+    if mechanism.loops is None:
+        return
+    counts = []
+    for mode in find_assembly_modes(mechanism):
+        try:
+            states = random_states(mode, _STATES // 2, np.random.default_rng(model.seed))
+            K = Dynamics(mode).regressor(*states)[:, robot.measured()]
+            affects = affecting_parameters(mode, K)
+            W = K.reshape(-1, K.shape[2])
+            found = base_parameters(W, _preference(model, mode), model.rank_tolerance, affects)
+        except (ConcernError, DataError):
+            continue
+        counts.append(found.columns.size)
+    others = sorted({count for count in counts if count != base.columns.size})
+    if others:
+        warnings.warn(
+            f"the loops have {base.columns.size} base parameters in the assembly that the guess leads to, and "
+            f"{' or '.join(map(str, others))} in others nearby with the same independent coordinates: see on the page that it "
+            "is the one that is built, or give another guess",
+            ParamreduceWarning,
+            stacklevel=2,
+        )
 
 
 def _check_named(model: ModelSection, mechanism: Mechanism, base: BaseParameters) -> None:

@@ -31,6 +31,10 @@ _MOVE = 0.05
 _SEED = 0
 _RESTARTS = np.repeat([0.1, 0.3, 1.0], 5)
 """Sizes of the random moves from a guess of zeros, rad or m."""
+_MODE_STARTS, _MODE_MOVES = 24, (0.5, 1.0, 2.0)
+"""Random starts for other assembly modes, and their sizes, rad or m."""
+_ANOTHER_MODE = 1e-3
+"""Difference of a coordinate from which on an assembly mode is another one, rad or m."""
 _ALONG = {"fixed": (2, 0), "prismatic": (2, 0), "revolute": (2,), "cylindrical": (2,)}
 """Axes that point the same way in a closure of each kind."""
 
@@ -89,6 +93,49 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     order = np.array([*others[pivots], *reversed(driven)], dtype=np.int64)
     dependent = set(independent_columns(jacobian, order, _RANK))
     return q, [k for k in range(mechanism.n_q) if k not in dependent]
+
+
+def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
+    """Find other configurations in which the loops are closed with the same independent coordinates.
+
+    Args:
+        mechanism: A mechanism with assembled loops.
+        most: How many to return, the nearest ones.
+
+    Returns:
+        The mechanism in those modes that were found from random starts; singular ones are left out.
+    """
+    loops = mechanism.loops
+    assert loops is not None
+    equations = _Equations(mechanism)
+    kept = slice(None) if loops.kept is None else list(loops.kept)
+    dependent = list(mechanism.dependent)
+    turns = [k for k in dependent if mechanism.bodies[k].joint == "revolute"]
+    rng = np.random.default_rng(_SEED)
+    modes = [loops.assembly]
+    for _ in range(_MODE_STARTS):
+        start = loops.assembly.copy()
+        start[dependent] += rng.normal(size=len(dependent)) * rng.choice(_MODE_MOVES)
+        try:
+            moved = dataclasses.replace(loops, assembly=start)
+            q = _closed(equations, mechanism, moved, dependent)
+            _check_regular(mechanism, equations.jacobian(q)[kept])
+            _check_hinges(mechanism, loops, q)
+        except ConcernError:
+            continue
+        q[turns] = loops.assembly[turns] + _within_a_turn(q[turns] - loops.assembly[turns])
+        if all(np.abs(q - known).max() > _ANOTHER_MODE for known in modes):
+            modes.append(q)
+    others = sorted(modes[1:], key=lambda q: float(np.linalg.norm(q - loops.assembly)))[:most]
+    return [
+        dataclasses.replace(mechanism, loops=dataclasses.replace(loops, assembly=q)) for q in others
+    ]
+
+
+def _within_a_turn(angles: FloatArray) -> FloatArray:
+    """Angles between minus and plus half a turn."""
+    result: FloatArray = np.angle(np.exp(1j * angles))
+    return result
 
 
 class _Equations:
