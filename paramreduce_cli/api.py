@@ -19,7 +19,7 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
-from paramreduce_cli.errors import ParamreduceError
+from paramreduce_cli.errors import DataError, ParamreduceError
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.writing import exported_model
 from paramreduce_cli.frames import frame
@@ -276,11 +276,27 @@ def inverse_dynamics(
     regressor, standard = Dynamics(model.mechanism).regressor, parameters.standard
 
     def torques(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        arrays = (np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq))
+        arrays = [np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq)]
+        _check_states(model, arrays)
         found: FloatArray = regressor(*arrays) @ standard
         return found
 
     return torques
+
+
+def _check_states(model: Model, arrays: Sequence[FloatArray]) -> None:
+    """Refuse states that are not of all coordinates.
+
+    Raises:
+        DataError: One of q, dq and ddq has another shape.
+    """
+    names = model.mechanism.generalised_names
+    for name, array in zip(("q", "dq", "ddq"), arrays, strict=True):
+        if array.ndim != 2 or array.shape[1] != len(names) or array.shape != arrays[0].shape:
+            raise DataError(
+                f"{name} has the shape {array.shape}; it must be (n_samples, {len(names)}), a column for each of "
+                f"{', '.join(names)}, as many rows as q."
+            )
 
 
 def run(

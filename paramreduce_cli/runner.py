@@ -318,6 +318,12 @@ class Runner:
         return record in [s.output for s in stages_to_run(self.config)]
 
     @property
+    def config_name(self) -> str:
+        """Name of the config's file; empty where the run was not started with one at the shell."""
+        words = shlex.split(self.asked) if self.config is not None else []
+        return Path(words[0]).name if words else ""
+
+    @property
     def _robot(self) -> str:
         if self.config is not None:
             return self.config.robot
@@ -420,6 +426,7 @@ class Runner:
             seed=next((seed for seed in seeds if seed is not None), 0),
             seconds=time.perf_counter() - started,
             cut_short=self._cut_short,
+            config=self.config_name,
             warnings=tuple(warnings),
         )
 

@@ -1,5 +1,6 @@
 """What Python users are answered."""
 
+import numpy as np
 import pytest
 from conftest import ROOT
 
@@ -14,3 +15,22 @@ def test_wrong_arguments_are_answered_with_what_is_wanted():
         TypeError, match="optimize_trajectories needs a Model, which build_model makes"
     ):
         pr.optimize_trajectories(config, None)
+
+
+def test_states_of_another_shape_are_refused_with_the_one_that_is_meant():
+    import warnings
+
+    from conftest import model_of
+
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        model = model_of("four_bar")
+    torques = pr.inverse_dynamics(model, pr.full_model(model))
+    right = np.zeros((4, 3))
+    assert torques(right, right, right).shape == (4, 1)
+    for wrong in (np.zeros((4, 1)), np.zeros(3), np.zeros((5, 3))):
+        with pytest.raises(
+            pr.ParamreduceError,
+            match=r"dq has the shape .* it must be \(n_samples, 3\), a column for each of",
+        ):
+            torques(right, wrong, right)

@@ -66,6 +66,8 @@ class Stamp:
     """Whether Ctrl-C ended a search in it, with which the next run goes on."""
     warnings: tuple[str, ...] = ()
     """What was said while it was made."""
+    config: str = ""
+    """Name of the config's file; empty where there was none, or where it was not started at the shell."""
 
 
 class Writer:
@@ -437,6 +439,7 @@ def _attributes(stamp: Stamp) -> dict[str, Any]:
         "wall_seconds": stamp.seconds,
         "digest": stamp.digest,
         "cut_short": stamp.cut_short,
+        "config": stamp.config,
         "warnings": json.dumps(stamp.warnings),
     }
 
@@ -465,5 +468,6 @@ def stamp_of(reader: Reader) -> Stamp | None:
         seconds=float(reader.attribute("wall_seconds", 0.0)),
         digest=str(reader.attribute("digest", "")),
         cut_short=bool(reader.attribute("cut_short", False)),
+        config=str(reader.attribute("config", "")),
         warnings=tuple(json.loads(reader.attribute("warnings", "[]"))),
     )

@@ -12,7 +12,7 @@ import click
 
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.cli.corrections import corrected, misplaced
-from paramreduce_cli.cli.here import config_meant, configs_in, results_in
+from paramreduce_cli.cli.here import config_meant, configs_in, has_report, results_in, results_of
 from paramreduce_cli.stages import stages
 
 _LEAST_LIKE = 0.6
@@ -47,12 +47,17 @@ def _of_here(example: str) -> str:
 
     Empty where there are some, but too few for it.
     """
-    configs, results = configs_in(Path()), results_in(Path())
+    typed = [Path(word) for word in sys.argv[1:] if word.endswith((".yaml", ".yml"))]
+    own = [path for path in typed if path.is_file()]
+    configs = list(dict.fromkeys([*own, *configs_in(Path())]))
+    results = list(
+        dict.fromkeys([*(r for r in map(results_of, own) if has_report(r)), *results_in(Path())])
+    )
     named = re.findall(r"(?:configs|results)/[\w./-]+", example)
     first = ""
     here = {True: configs, False: results}
     unused = {kind: iter(found) for kind, found in here.items()}
-    for path in (Path(name) for name in named if not Path(name).exists()):
+    for path in (Path(name) for name in named if own or not Path(name).exists()):
         of_configs = path.suffix == ".yaml"
         other = next(unused[of_configs], None)
         if other is not None:

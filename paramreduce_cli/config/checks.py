@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from paramreduce_cli.config.plausibility import implausible_bodies, implausible_speeds
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import unknown
@@ -28,7 +29,14 @@ def check(config: Config) -> list[Problem]:
 
 def remarks(config: Config) -> list[str]:
     """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
-    kinds = (_odd_bodies, _odd_drives, _odd_limits, _odd_terms)
+    kinds = (
+        _odd_bodies,
+        implausible_bodies,
+        _odd_drives,
+        _odd_limits,
+        implausible_speeds,
+        _odd_terms,
+    )
     return [f"{text}; going on" for one in kinds for text in one(config)]
 
 

@@ -202,7 +202,7 @@ def _check_closure(text: str) -> str:
 def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
     """The robot with a guess from which its loops close, and with independent coordinates."""
     # Late: CasADi.
-    from paramreduce_cli.importing.closing import close_loops
+    from paramreduce_cli.multibody.loops.imported import close_loops
 
     every = tuple(name for body in robot.bodies for name in body.coordinates())
     text = config_text(replace(robot, independent=robot.independent or every), choice)

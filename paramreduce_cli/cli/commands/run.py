@@ -80,8 +80,10 @@ def run(
             path, f"It is named under {key} in {config}, whose comments may say where it is from."
         )
     with placed_errors(config, overrides), store.locked():
-        if overrides and results is None:
-            _say_what_is_replaced(Runner(loaded, store))
+        words = asked(config, results, overrides)
+        _say_what_is_replaced(
+            Runner(loaded, store, asked=words), changed=bool(overrides) and results is None
+        )
         stages = stages_to_run(loaded)
         for number, stage in enumerate(stages, 1):
             label = f"{number}/{len(stages)} {stage.name}"
@@ -96,7 +98,7 @@ def run(
                     remark,
                     interruption.heeded,
                     interruption.check,
-                    asked(config, results, overrides),
+                    words,
                 )
                 outcome = runner.run(stage, force=force)
             if as_json:
@@ -133,13 +135,24 @@ def _remark_on_what_is_to_do(config: Path) -> None:
         )
 
 
-def _say_what_is_replaced(runner: Runner) -> None:
+def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
+    """Say whose results are replaced, where they are of another config, or of one that --set changes."""
     assert runner.config is not None
-    others = [s.name for s in stages_to_run(runner.config) if runner.made_otherwise(s)]
-    if others:
+    others = [s for s in stages_to_run(runner.config) if runner.made_otherwise(s)]
+    if not others:
+        return
+    stamp = runner.store.stamp(others[0].output)
+    owner = stamp.config if stamp is not None else ""
+    folder = runner.store.folder
+    if owner not in ("", runner.config_name):
         remark(
-            f"{runner.store.folder} holds results of other settings, which --set replaces from "
-            f"{others[0]} on; name another folder in --results to keep both"
+            f"{folder} holds results of {owner}, which those of {runner.config_name} replace from {others[0].name} on, as both are "
+            f"called robot: {runner.config.robot}; give one of them another name, or name another folder in --results, to keep both"
+        )
+    elif changed:
+        remark(
+            f"{folder} holds results of other settings, which --set replaces from "
+            f"{others[0].name} on; name another folder in --results to keep both"
         )
 
 

@@ -107,7 +107,8 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
     """
     loops = mechanism.loops
     assert loops is not None
-    equations = _Equations(mechanism)
+    whole = dataclasses.replace(mechanism, loops=dataclasses.replace(loops, kept=None))
+    equations = _Equations(whole)
     kept = slice(None) if loops.kept is None else list(loops.kept)
     dependent = list(mechanism.dependent)
     turns = [k for k in dependent if mechanism.bodies[k].joint == "revolute"]

@@ -1,0 +1,96 @@
+"""Sizes, masses and speeds that no robot is likely to have, which other units than SI would explain."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from paramreduce_cli.config.schema import Config
+from paramreduce_cli.records import Kind
+from paramreduce_cli.robots.inertia import BodyParameters
+
+_DENSEST = 23_000.0
+"""kg/m^3, of osmium."""
+_SPHERE = 4 / 3 * np.pi * 2.5**1.5
+"""Volume of a solid sphere over the cube of its radius of gyration; all other bodies of that radius are lighter."""
+_SMALLEST = 0.3
+"""Length below which a robot's own size is no measure, m."""
+_BEYOND = 10.0
+"""Times the size of the robot that a centre of mass or a radius of gyration is unlikely to reach."""
+_FASTEST = 100.0
+"""Speed of a joint that few have, rad/s or m/s."""
+_MOST = 6
+"""Bodies that are named in a sentence."""
+
+
+def implausible_bodies(config: Config) -> Iterator[str]:
+    """Sentences about bodies whose mass does not go with their size, or their size with the robot's."""
+    size = max(_SMALLEST, _extent(config))
+    found: dict[str, list[tuple[float, str]]] = {}
+    for name, body in config.body_parameters().items():
+        for what, number in _doubts(body, size):
+            found.setdefault(what, []).append((number, name))
+    for what, bodies in found.items():
+        names = [name for _, name in bodies]
+        more = f" and {len(names) - _MOST} more" if len(names) > _MOST else ""
+        yield f"{', '.join(names[:_MOST])}{more}: " + what.format(max(bodies)[0], size)
+
+
+_FAR_CENTRE = (
+    "a centre of mass up to {:.3g} m from the joint, on a robot of about {:.2g} m; are lengths in mm, or first "
+    "moments and masses in different units?"
+)
+_LARGE_INERTIA = (
+    "an inertia as of a body of up to {:.3g} m around, on a robot of about {:.2g} m; are masses in g, or inertias in "
+    "kg mm^2?"
+)
+_DENSE = (
+    "an inertia so small for its mass that the body is denser than any metal; are masses in g, or is "
+    "it a placeholder?"
+)
+
+
+def _doubts(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
+    """What is unlikely of a body on a robot of some size, m, and by how much."""
+    values = body.values()
+    mass = values[Kind.M]
+    if mass <= 0:
+        return
+    centre = np.array([values[kind] for kind in (Kind.MX, Kind.MY, Kind.MZ)]) / mass
+    about_origin = sum(values[kind] for kind in (Kind.IXX, Kind.IYY, Kind.IZZ)) / 2 / mass
+    gyration = float(np.sqrt(max(about_origin - float(centre @ centre), 0.0)))
+    distance = float(np.linalg.norm(centre))
+    if distance > _BEYOND * size:
+        yield _FAR_CENTRE, distance
+    if gyration > _BEYOND * size:
+        yield _LARGE_INERTIA, gyration
+    elif 0 < _SPHERE * gyration**3 * _DENSEST < mass:
+        yield _DENSE, mass / (_SPHERE * gyration**3 * _DENSEST)
+
+
+def _extent(config: Config) -> float:
+    """About the length of the robot, m: how far its joints are from each other, one after the other."""
+    rigid = config.description.bodies.rigid_bodies()
+    reach: list[float] = []
+    for body in rigid:
+        before = reach[body.parent] if body.parent >= 0 else 0.0
+        reach.append(before + float(np.linalg.norm(body.parent_to_joint[:3, 3])))
+    slides = [
+        max(abs(lower), abs(upper))
+        for (lower, upper), body in zip(_ranges(config), rigid, strict=False)
+        if body.joint == "prismatic"
+    ]
+    return max([*reach, *slides], default=0.0)
+
+
+def _ranges(config: Config) -> list[list[float]]:
+    given = config.trajectories.position_limits
+    return given * config.n_dof if len(given) == 1 else given
+
+
+def implausible_speeds(config: Config) -> Iterator[str]:
+    """A sentence about velocity limits that few joints reach."""
+    fast = [limit for limit in config.trajectories.velocity_limits if _FASTEST < limit < np.inf]
+    if fast:
+        yield (
+            f"trajectories.velocity_limits of {max(fast):g} are in rad/s (m/s), not degrees or revolutions per minute"
+        )
