@@ -228,7 +228,10 @@ class _Simplification:
     def _closures(self) -> tuple[Closure, ...]:
         found = []
         for closure in (*self._robot.closures, *self._asked_closures):
-            if any(link not in self._carried for link in closure.links):
+            left_out = [link for link in closure.links if link not in self._carried]
+            if left_out and closure in self._asked_closures:
+                raise ConfigError(f"--close {'='.join(closure.links)}: {left_out[0]} is left out.")
+            if left_out:
                 self._remarks.append(f"{closure.name} holds a link that is left out, so it is too")
                 continue
             one, other = (self._carried[link] for link in closure.links)

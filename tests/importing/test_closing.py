@@ -187,6 +187,43 @@ def test_what_cannot_be_closed_gets_one_message(invoke, tmp_path, options, says)
     assert not output.exists()
 
 
+CLOSE = ("--close", "tip1=corner1:spherical", "--close", "tip2=corner2:spherical")
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (["--ignore", "fore1"], "--close tip1=corner1: tip1 is left out"),
+        (["--lock", "motor0=0", "--lock", "motor1=0", "--lock", "motor2=0", "--lock", "tilt0=0", "--lock", "sway0=0"],
+         "the loops leave nothing that moves"),
+    ],
+)  # fmt: skip
+def test_loops_of_which_too_little_is_left(invoke, tmp_path, options, says):
+    said, output, _ = init(invoke, tmp_path, delta(0), *CLOSE, *options, code=2)
+    assert says in " ".join(said.split())
+    assert not output.exists()
+
+
+def test_a_base_that_floats_stays_where_it_is_while_loops_are_closed(invoke, tmp_path):
+    _, fixed, _ = init(invoke, tmp_path, delta(0), *CLOSE)
+    guess = load_config(fixed).description.bodies.guess
+    said, floating, _ = init(invoke, tmp_path, delta(0), *CLOSE, "--floating")
+    bodies = load_config(floating).description.bodies
+    assert bodies.guess == pytest.approx(guess, abs=2e-6)
+    assert len(bodies.independent) == 6 + 5
+    assert all(f"q_ground_{k}" in bodies.independent for k in range(1, 7))
+
+
+def test_blanks_around_the_signs_of_a_pair_do_not_matter(invoke, tmp_path):
+    _, output, _ = init(invoke, tmp_path, delta(0), *CLOSE)
+    expected = load_config(output).description.bodies.closures
+    spaced = [
+        part.replace("=", " = ").replace(":", " : ") if "=" in part else part for part in CLOSE
+    ]
+    _, output, _ = init(invoke, tmp_path, delta(0), *spaced)
+    assert load_config(output).description.bodies.closures == expected
+
+
 def test_loops_that_do_not_close_are_left_to_be_guessed(invoke, tmp_path):
     far = delta(0).replace('"0.3 0.0 0"', '"5 0.0 0"')
     said, output, _ = init(

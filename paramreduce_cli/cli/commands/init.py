@@ -192,6 +192,7 @@ def _lock(text: str) -> tuple[str, float]:
 
 
 def _check_closure(text: str) -> str:
+    text = re.sub(r"\s*([=:])\s*", r"\1", text.strip())
     if not re.fullmatch(CLOSED, text):
         raise ConfigError(
             f"--close {text}: write two links as A=B, or A=B:KIND with fixed, revolute or spherical."

@@ -87,10 +87,12 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     equations = _Equations(mechanism)
     q = _closed_nearby(equations, mechanism, mechanism.loops)
     jacobian, rows = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
-    others = np.array([k for k in range(mechanism.n_q) if k not in driven], dtype=np.int64)
+    in_loops = _in_loops(mechanism)
+    others = np.array([k for k in in_loops if k not in driven], dtype=np.int64)
     # Those that are determined best come first, and what is left over determines them.
     _, pivots = scipy.linalg.qr(jacobian[rows][:, others], mode="r", pivoting=True)
-    order = np.array([*others[pivots], *reversed(driven)], dtype=np.int64)
+    turned = [k for k in reversed(driven) if k in in_loops]
+    order = np.array([*others[pivots], *turned], dtype=np.int64)
     dependent = set(independent_columns(jacobian, order, _RANK))
     return q, [k for k in range(mechanism.n_q) if k not in dependent]
 
@@ -207,17 +209,19 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
     Raises:
         ConcernError: The loops cannot be closed.
     """
+    moving = _in_loops(mechanism)
     try:
-        return _closed(equations, mechanism, loops, range(mechanism.n_q))
+        return _closed(equations, mechanism, loops, moving)
     except ConcernError:
         if loops.assembly.any():
             raise
         rng = np.random.default_rng(_SEED)
         for size in _RESTARTS:
-            start = size * rng.normal(size=mechanism.n_q)
+            start = np.zeros(mechanism.n_q)
+            start[moving] = size * rng.normal(size=len(moving))
             try:
                 moved = dataclasses.replace(loops, assembly=start)
-                return _closed(equations, mechanism, moved, range(mechanism.n_q))
+                return _closed(equations, mechanism, moved, moving)
             except ConcernError:
                 continue
         raise
@@ -266,6 +270,25 @@ def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
     """Choose the Jacobian of the largest rank, and its rows that do not depend on those before them."""
     found = ((J, independent_columns(J.T, _rows_beyond_rounding(J), _RANK)) for J in jacobians)
     return max(found, key=lambda pair: len(pair[1]))
+
+
+def _in_loops(mechanism: Mechanism) -> list[int]:
+    """Coordinates on the way around a loop; those of a base that floats, or of an arm beside the loops, are on none."""
+    assert mechanism.loops is not None
+    found: set[int] = set()
+    for closure in mechanism.loops.closures:
+        one, other = (_carriers(mechanism, body) for body in closure.bodies)
+        found |= set(closure.bodies) if closure.kind == "coupling" else one ^ other
+    return sorted(found)
+
+
+def _carriers(mechanism: Mechanism, body: int) -> set[int]:
+    """A body and those that carry it."""
+    found = set()
+    while body != BASE:
+        found.add(body)
+        body = mechanism.bodies[body].parent
+    return found
 
 
 def _rows_beyond_rounding(jacobian: FloatArray) -> IntArray:

@@ -33,6 +33,11 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot
         remark = f"TODO description.tree.guess: {str(error).rstrip('.')}"
         chosen = robot.independent or tuple(names[k] for k in driven or [0])
         return replace(robot, independent=chosen, remarks=(*robot.remarks, remark))
+    if not independent:
+        raise ConfigError(
+            f"{robot.source}: the loops leave nothing that moves. Close fewer, let more joints move, or close them "
+            "with more freedom: fixed, revolute, spherical."
+        )
     own = tuple(names[k] for k in independent)
     if named and set(named) != set(independent):
         raise ConfigError(
