@@ -194,7 +194,7 @@ CLOSE = ("--close", "tip1=corner1:spherical", "--close", "tip2=corner2:spherical
     ("options", "says"),
     [
         (["--ignore", "fore1"], "--close tip1=corner1: tip1 is left out"),
-        (["--lock", "motor0=0", "--lock", "motor1=0", "--lock", "motor2=0", "--lock", "tilt0=0", "--lock", "sway0=0"],
+        (["--lock", "motor0=0", "--lock", "motor1=0", "--lock", "motor2=0", "--lock", "level=0", "--lock", "turn=0"],
          "the loops leave nothing that moves"),
     ],
 )  # fmt: skip
@@ -207,7 +207,7 @@ def test_loops_of_which_too_little_is_left(invoke, tmp_path, options, says):
 def test_a_base_that_floats_stays_where_it_is_while_loops_are_closed(invoke, tmp_path):
     _, fixed, _ = init(invoke, tmp_path, delta(0), *CLOSE)
     guess = load_config(fixed).description.bodies.guess
-    said, floating, _ = init(invoke, tmp_path, delta(0), *CLOSE, "--floating")
+    _, floating, _ = init(invoke, tmp_path, delta(0), *CLOSE, "--floating")
     bodies = load_config(floating).description.bodies
     assert bodies.guess == pytest.approx(guess, abs=2e-6)
     assert len(bodies.independent) == 6 + 5
