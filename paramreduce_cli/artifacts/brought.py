@@ -141,7 +141,7 @@ def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
 
 
 def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
-    header, data = read_csv(path)
+    header, data, _ = read_csv(path)
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}
     for key in ("z", "dz", "ddz", "tau"):

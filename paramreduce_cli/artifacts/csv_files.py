@@ -1,5 +1,6 @@
 """Tables of numbers as text: CSV, and its relatives with tabs, semicolons or blanks."""
 
+import codecs
 import csv
 import gzip
 import itertools
@@ -7,14 +8,28 @@ import math
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import NamedTuple
 
 from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.scratch import LargeTable
 
+_UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+"""First bytes of what spreadsheets call Unicode text."""
 
-def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], FloatArray]:
+
+class NumberTable(NamedTuple):
+    """A table of numbers under headings."""
+
+    header: list[str]
+    numbers: FloatArray
+    """(n_rows, n_columns)"""
+    left_out: list[str]
+    """Headings of columns that hold text."""
+
+
+def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
     """Read the headings and numbers of a table, also gzipped.
 
     Columns are separated by commas, tabs, semicolons or blanks, as the line of headings is. Numbers are held as numbers from
@@ -25,9 +40,6 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
         leave_out_text: Whether columns that hold text in the first row are left out; empty cells are not a number
             then. Otherwise both are errors.
 
-    Returns:
-        The headings, and the numbers, (n_rows, n_columns).
-
     Raises:
         DataError: It is no table of numbers under headings that differ.
         ArtifactError: The file cannot be read.
@@ -35,14 +47,16 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
     check_is_file(path)
     try:
         opener = gzip.open if path.suffix == ".gz" else open
-        with opener(path, "rt", encoding="utf-8-sig", newline="") as file, LargeTable() as table:
+        with opener(path, "rb") as file:
+            encoding = "utf-16" if file.read(2) in _UTF_16 else "utf-8-sig"
+        with opener(path, "rt", encoding=encoding, newline="") as file, LargeTable() as table:
             first = next(file, "")
             delimiter = _delimiter(first)
             lines: Iterator[str] = itertools.chain([first.lstrip("# ")], file)
             if delimiter == " ":
                 lines = (line.strip() + "\n" for line in lines)
             rows = csv.reader(lines, delimiter=delimiter, skipinitialspace=delimiter == " ")
-            header = [name.strip() for name in next(rows, [])]
+            header = [name.strip().strip('"').strip() for name in next(rows, [])]
             _check_header(path, header)
             kept = list(range(len(header)))
             begun_empty: set[int] = set()
@@ -71,7 +85,8 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> tuple[list[str], Fl
                     )
                     for k in kept
                 )  # fmt: skip
-            return [header[k] for k in kept], table.matrix(len(kept))
+            left_out = [name for k, name in enumerate(header) if name and k not in kept]
+            return NumberTable([header[k] for k in kept], table.matrix(len(kept)), left_out)
     except FileNotFoundError as error:
         raise missing(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:

@@ -61,9 +61,9 @@ def load_log(path: Path) -> RawLog:
             )
     if path.suffix == ".npz":
         return _npz(path)
-    header, table = read_csv(path, leave_out_text=True)
-    columns = dict(zip(header, table.T, strict=True))
-    return RawLog(str(path), columns, first_line=2)
+    table = read_csv(path, leave_out_text=True)
+    columns = dict(zip(table.header, table.numbers.T, strict=True))
+    return RawLog(str(path), columns, first_line=2, others=dict.fromkeys(table.left_out, "text"))
 
 
 _NUMBERS = "numbers"

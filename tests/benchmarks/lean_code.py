@@ -105,7 +105,8 @@ def headers():
     import pinocchio
 
     prefix = next(p for p in Path(pinocchio.__file__).parents if p.name == "cmeel.prefix")
-    return [prefix / "include", prefix / "include" / "eigen3"]
+    # Newer wheels bring no Eigen; a package of the system does.
+    return [prefix / "include", prefix / "include" / "eigen3", Path("/usr/include/eigen3")]
 
 
 CONTRACTED, APART = "-ffp-contract=fast", "-ffp-contract=off"

@@ -140,7 +140,10 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
 
     from paramreduce_cli.artifacts.log_files import load_log
 
-    recorded = load_log(logs[0]).columns
+    log = load_log(logs[0])
+    recorded = log.columns
+    if not any(column.size for column in recorded.values()):
+        raise ConfigError(f"{logs[0]}: has headings, but no rows of numbers below.")
     empty = [name for name, column in recorded.items() if not np.isfinite(column).any()]
     if empty:
         say(f"- {', '.join(empty)}: no numbers, left out.")
@@ -148,6 +151,9 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
     try:
         columns = guess_columns(names, joints)
     except ConfigError as error:
+        if not base and log.others:
+            held = " ".join(f"{name} holds {kind}." for name, kind in log.others.items())
+            raise ConfigError(f"{error} {held}") from error
         if not base:
             raise
         guess_columns(names, joints[len(base) :])
