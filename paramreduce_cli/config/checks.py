@@ -4,7 +4,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from paramreduce_cli.config.plausibility import implausible_bodies, implausible_speeds
+from paramreduce_cli.config.plausibility import (
+    implausible_bodies,
+    implausible_gravity,
+    implausible_speeds,
+)
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import unknown
@@ -32,6 +36,7 @@ def remarks(config: Config) -> list[str]:
     kinds = (
         _odd_bodies,
         implausible_bodies,
+        implausible_gravity,
         _odd_drives,
         _odd_limits,
         implausible_speeds,

@@ -18,6 +18,8 @@ _BEYOND = 10.0
 """Times the size of the robot that a centre of mass or a radius of gyration is unlikely to reach."""
 _FASTEST = 100.0
 """Speed of a joint that few have, rad/s or m/s."""
+_STRONGEST_GRAVITY = 30.0
+"""m/s^2; on Jupiter it is 25."""
 _MOST = 6
 """Bodies that are named in a sentence."""
 
@@ -85,6 +87,13 @@ def _extent(config: Config) -> float:
 def _ranges(config: Config) -> list[list[float]]:
     given = config.trajectories.position_limits
     return given * config.n_dof if len(given) == 1 else given
+
+
+def implausible_gravity(config: Config) -> Iterator[str]:
+    """A sentence about a gravity that no planet with a surface has."""
+    size = float(np.linalg.norm(config.description.gravity))
+    if size > _STRONGEST_GRAVITY:
+        yield f"description.gravity of {size:.4g} is in m/s^2, not mm/s^2; on Earth it is 9.81"
 
 
 def implausible_speeds(config: Config) -> Iterator[str]:

@@ -12,6 +12,7 @@ from paramreduce_cli.config import load_config
 ARM = """\
 robot: arm
 description:
+  gravity: [0, 0, -{gravity}]
   tree:
     bodies:
       - {{name: upper, at: [0, 0, 0.3]}}
@@ -24,9 +25,9 @@ trajectories: {{position_limits: [-1, 1], velocity_limits: {speed}}}
 """
 
 
-def said(tmp_path, mass=2.0, far=0.2, inertia=0.02, speed=2.0):
+def said(tmp_path, mass=2.0, far=0.2, inertia=0.02, speed=2.0, gravity=9.81):
     path = tmp_path / "arm.yaml"
-    path.write_text(ARM.format(mass=mass, far=far, inertia=inertia, speed=speed))
+    path.write_text(ARM.format(mass=mass, far=far, inertia=inertia, speed=speed, gravity=gravity))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         load_config(path)
@@ -40,6 +41,7 @@ def said(tmp_path, mass=2.0, far=0.2, inertia=0.02, speed=2.0):
         ({"mass": 1400, "inertia": 4e6}, "upper: an inertia as of a body of up to 65.5 m around"),
         ({"mass": 2000.0}, "upper: an inertia so small for its mass that the body is denser than any metal"),
         ({"inertia": 1e-6}, "denser than any metal"),
+        ({"gravity": 9810}, "description.gravity of 9810 is in m/s^2, not mm/s^2"),
         ({"speed": 180}, "velocity_limits of 180 are in rad/s (m/s), not degrees"),
     ],
 )  # fmt: skip
