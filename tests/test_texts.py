@@ -1,9 +1,12 @@
 """How numbers are written for people."""
 
+import math
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from paramreduce_cli.texts import share_range
 from paramreduce_cli.texts.measured import measured
 
 
@@ -28,3 +31,18 @@ def test_what_is_left_out_is_far_less_than_the_deviation(value, deviation):
     told, _ = measured(value, deviation)
     assert abs(float(told) - value) <= 0.06 * deviation + 1e-12 * abs(value) or deviation > 10
     assert abs(float(told) - value) <= 0.5
+
+
+@pytest.mark.parametrize(
+    ("errors", "text"),
+    [
+        ((0.0133, 0.0105, 0.0224), "1.33 % (1.05 to 2.24 %)"),
+        ((0.5, 0.5, 0.5), "50 %"),
+        ((99.0, 20.0, math.inf), "> 1000 % (> 1000 to ∞)"),
+        ((99.0, 20.0, 30.0), "> 1000 %"),
+        ((0.0, 0.0, 1e-14), "0 %"),
+        ((math.nan, math.nan, math.nan), "-"),
+    ],
+)
+def test_ranges_of_errors(errors, text):
+    assert share_range(*errors) == text

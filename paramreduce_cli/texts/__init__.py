@@ -26,6 +26,8 @@ def share_range(median: float, least: float, worst: float) -> str:
     """Median, smallest and largest of errors over motions; a dash where there are no motions."""
     if math.isnan(median):
         return "-"
+    if share(least) == share(worst):
+        return share(median)
     return f"{share(median)} ({share(least).removesuffix(' %')} to {share(worst)})"
 
 

@@ -154,6 +154,8 @@ def cells(label, file, options):
                     f"{100 * file_[f'{heuristic}/torque_error_{name_}'][kept - 1]:.2g} %"
                     for name_ in ("estimation", "validation")
                 )
+                test = 100 * file_[f"{heuristic}/torque_error_test"][kept - 1]
+                errors += f" / {np.median(test):.2g} % ({test.min():.2g}–{test.max():.2g})"
         rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
     return minutes, rows, pinocchio_nanoseconds(config)
 
@@ -161,7 +163,7 @@ def cells(label, file, options):
 def main():
     FOLDER.mkdir(parents=True, exist_ok=True)
     lines = [
-        "| robot | model | parameters | ε_τ, estimation / validation | operations of d | ns | Pinocchio, ns |",
+        "| robot | model | parameters | ε_τ, estimation / validation / test, median (range) | operations of d | ns | Pinocchio, ns |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
     for label, (file, options) in ROBOTS.items():
