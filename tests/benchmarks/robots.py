@@ -155,7 +155,7 @@ def cells(label, file, options):
                     for name_ in ("estimation", "validation")
                 )
                 test = 100 * file_[f"{heuristic}/torque_error_test"][kept - 1]
-                errors += f" / {np.median(test):.2g} % ({test.min():.2g}–{test.max():.2g})"
+                errors += f" / {np.median(test):.2g} % ({test.min():.2g} to {test.max():.2g})"
         rows.append((tolerance, kept, base, errors, operations, nanoseconds(code, name, n)))
     return minutes, rows, pinocchio_nanoseconds(config)
 
