@@ -5,7 +5,7 @@ from pathlib import Path
 
 from paramreduce_cli.cli.here import configs_in, has_report, project_above, results_of
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.texts import share, share_range
+from paramreduce_cli.texts import format_share_range, share
 
 _MOST = 8
 """Robots that are listed."""
@@ -89,7 +89,7 @@ def _said_of(results: Path) -> str:
             errors = {part: selected["torque_error"][part] for part in ("estimation", "validation")}
             told = ", ".join(f"{share(e)} ({part})" for part, e in errors.items() if e is not None)
             if test := selected["torque_error"].get("test"):
-                told += f", {share_range(**test)} (test)"
+                told += f", {format_share_range(**test)} (test)"
         else:
             told = f"{share(measured['reduced']['held_out'])} of the measured torques, held out"
     except (ArtifactError, KeyError, TypeError) as problem:

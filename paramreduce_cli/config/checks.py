@@ -5,9 +5,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from paramreduce_cli.config.plausibility import (
-    implausible_bodies,
-    implausible_gravity,
-    implausible_speeds,
+    find_implausible_bodies,
+    find_implausible_gravity,
+    find_implausible_speeds,
 )
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
@@ -35,11 +35,11 @@ def remarks(config: Config) -> list[str]:
     """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
     kinds = (
         _odd_bodies,
-        implausible_bodies,
-        implausible_gravity,
+        find_implausible_bodies,
+        find_implausible_gravity,
         _odd_drives,
         _odd_limits,
-        implausible_speeds,
+        find_implausible_speeds,
         _odd_terms,
     )
     return [f"{text}; going on" for one in kinds for text in one(config)]

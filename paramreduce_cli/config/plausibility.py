@@ -24,8 +24,8 @@ _MOST = 6
 """Bodies that are named in a sentence."""
 
 
-def implausible_bodies(config: Config) -> Iterator[str]:
-    """Sentences about bodies whose mass does not go with their size, or their size with the robot's."""
+def find_implausible_bodies(config: Config) -> Iterator[str]:
+    """Yield a sentence for each kind of body whose mass does not go with its size, or its size with the robot's."""
     size = max(_SMALLEST, _extent(config))
     found: dict[str, list[tuple[float, str]]] = {}
     for name, body in config.body_parameters().items():
@@ -52,7 +52,12 @@ _DENSE = (
 
 
 def _doubts(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
-    """What is unlikely of a body on a robot of some size, m, and by how much."""
+    """Yield a sentence for each unlikely property of a body, and the number that goes into the sentence.
+
+    Args:
+        body: Standard parameters of the body.
+        size: Approximate length of the robot, m.
+    """
     values = body.values()
     mass = values[Kind.M]
     if mass <= 0:
@@ -70,7 +75,7 @@ def _doubts(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
 
 
 def _extent(config: Config) -> float:
-    """About the length of the robot, m: how far its joints are from each other, one after the other."""
+    """Estimate the length of the robot, m: the largest sum of distances between joints from the base to a body."""
     rigid = config.description.bodies.rigid_bodies()
     reach: list[float] = []
     for body in rigid:
@@ -89,15 +94,15 @@ def _ranges(config: Config) -> list[list[float]]:
     return given * config.n_dof if len(given) == 1 else given
 
 
-def implausible_gravity(config: Config) -> Iterator[str]:
-    """A sentence about a gravity that no planet with a surface has."""
+def find_implausible_gravity(config: Config) -> Iterator[str]:
+    """Yield a sentence if gravity is stronger than on any planet."""
     size = float(np.linalg.norm(config.description.gravity))
     if size > _STRONGEST_GRAVITY:
         yield f"description.gravity of {size:.4g} is in m/s^2, not mm/s^2; on Earth it is 9.81"
 
 
-def implausible_speeds(config: Config) -> Iterator[str]:
-    """A sentence about velocity limits that few joints reach."""
+def find_implausible_speeds(config: Config) -> Iterator[str]:
+    """Yield a sentence if a velocity limit is above the speed of most joints."""
     fast = [limit for limit in config.trajectories.velocity_limits if _FASTEST < limit < np.inf]
     if fast:
         yield (

@@ -12,7 +12,7 @@ from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import Constraint, FloatArray, JointLimits, Model, PointToPoint
 
 _PEAK_SPEED = 1.875
-"""Of a motion over a unit in unit time."""
+"""Largest speed of a motion over a unit in unit time; the largest acceleration is below."""
 _PEAK_ACCELERATION = 10 / np.sqrt(3)
 _TRIES = 30
 """Pairs of positions that are tried for each motion that is asked for."""
@@ -21,7 +21,7 @@ _SLOWER = 1.25
 _SLOWDOWNS = 12
 
 
-def point_to_point_states(
+def evaluate_point_to_point(
     motion: PointToPoint, time: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Evaluate a motion.
@@ -41,13 +41,13 @@ def point_to_point_states(
     return z, dz, ddz
 
 
-def point_to_point_times(motion: PointToPoint, points: int) -> FloatArray:
+def sample_point_to_point_times(motion: PointToPoint, points: int) -> FloatArray:
     """Return equidistant times from the beginning of a motion to its end, (points,), s."""
     return np.linspace(0.0, motion.duration, points)
 
 
-def states_along(motions: Sequence[PointToPoint], points: int, finer: int) -> StatesAt:
-    """Return what gives the states of a span of the motions.
+def evaluate_along(motions: Sequence[PointToPoint], points: int, finer: int) -> StatesAt:
+    """Return a function that evaluates the states of a span of the motions.
 
     Args:
         motions: The motions.
@@ -57,11 +57,11 @@ def states_along(motions: Sequence[PointToPoint], points: int, finer: int) -> St
 
     def at(span: Span) -> StateBlock:
         motion = motions[span.trajectory]
-        times = point_to_point_times(motion, points)[span.start : span.stop]
+        times = sample_point_to_point_times(motion, points)[span.start : span.stop]
         step = motion.duration / (points - 1) / finer
         between = times[0] + step * np.arange(finer * times.size)
-        way = point_to_point_states(motion, np.minimum(between, motion.duration))[0]
-        states = point_to_point_states(motion, times)
+        way = evaluate_point_to_point(motion, np.minimum(between, motion.duration))[0]
+        states = evaluate_point_to_point(motion, times)
         return StateBlock(span.trajectory, times, *states, way=way if finer > 1 else None)
 
     return at
@@ -90,20 +90,20 @@ def find_point_to_point(
     Returns:
         The motions; fewer than asked for where most straight lines leave the constraints.
     """
-    check = _Check(model, limits, constraints, points)
+    within = _MotionLimits(model, limits, constraints, points)
     found: list[PointToPoint] = []
     for _ in range(_TRIES * count):
         if len(found) == count:
             break
         start, end = positions[rng.integers(len(positions), size=2)]
-        motion = check.fastest(start, end)
+        motion = within.find_fastest(start, end)
         if motion is not None:
             found.append(motion)
     return tuple(found)
 
 
-class _Check:
-    """What every motion keeps to.
+class _MotionLimits:
+    """A search for the fastest motion within limits.
 
     Args:
         model: Model of the robot.
@@ -120,7 +120,7 @@ class _Check:
         self._quantities = Quantities(model.mechanism, constraints)
         self._dynamics = Dynamics(model.mechanism)
 
-    def fastest(self, start: FloatArray, end: FloatArray) -> PointToPoint | None:
+    def find_fastest(self, start: FloatArray, end: FloatArray) -> PointToPoint | None:
         """Return the fastest motion between two positions; None where there is none."""
         way = np.abs(end - start)
         duration = max(
@@ -137,9 +137,9 @@ class _Check:
         return None
 
     def _is_free(self, motion: PointToPoint) -> bool:
-        """Whether the loops close along the way, and all constraints are kept to."""
-        time = point_to_point_times(motion, self._points)
-        z, _, _ = point_to_point_states(motion, time)
+        """Whether the loops close along a motion and all constraints hold."""
+        time = sample_point_to_point_times(motion, self._points)
+        z, _, _ = evaluate_point_to_point(motion, time)
         try:
             q = self._coordinates.positions(z, None)
             self._coordinates.check_motion(time, q)
@@ -148,11 +148,13 @@ class _Check:
         return bool((self._quantities.rows(q) <= 0).all())
 
     def _is_strong_enough(self, motion: PointToPoint) -> bool:
-        """Whether the torques and powers of the model are within their limits."""
+        """Whether the torques and powers that the model predicts for a motion are within their limits."""
         torque, power = self._limits.torque, self._limits.power
         if not (np.isfinite(torque).any() or np.isfinite(power).any()):
             return True
-        z, dz, ddz = point_to_point_states(motion, point_to_point_times(motion, self._points))
+        z, dz, ddz = evaluate_point_to_point(
+            motion, sample_point_to_point_times(motion, self._points)
+        )
         states = self._coordinates.states(z, dz, ddz)
         tau = np.abs(self._dynamics.inverse(*states, self._values))
         return bool(((tau <= torque) & (tau * np.abs(dz) <= power)).all())

@@ -16,7 +16,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
-from paramreduce_cli.texts import EXACT, share, share_range
+from paramreduce_cli.texts import EXACT, format_share_range, share
 
 FULL, BASE = "full", "base"
 IDENTIFIED, CONSISTENT = "identified", "consistent"
@@ -74,7 +74,7 @@ def chosen_model(
         title += f", {share(other)} on the validation set"
         test = judged.torque_error_test[known_row]
         if test.size:
-            title += f", {share_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
+            title += f", {format_share_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
     return reduced_model(reduction, choice.heuristic, row, known), title
 
@@ -123,7 +123,7 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
     if term.torque_error_test.size:
-        test = share_range(*ErrorRange.of(term.torque_error_test))
+        test = format_share_range(*ErrorRange.of(term.torque_error_test))
         title += f", {test} on {term.torque_error_test.size} motions that no search looked at"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)

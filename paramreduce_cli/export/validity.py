@@ -3,7 +3,7 @@
 import numpy as np
 
 from paramreduce_cli.records import ErrorRange, FloatArray, Mechanism, TermModel
-from paramreduce_cli.texts import share, share_range
+from paramreduce_cli.texts import format_share_range, share
 
 
 def within(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
@@ -38,7 +38,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
     test = ErrorRange.of(term.acceleration_error_test)
     if np.isfinite(test.median):
-        lines.append(f"The same on motions that no search looked at: {share_range(*test)}.")
+        lines.append(f"The same on motions that no search looked at: {format_share_range(*test)}.")
     where = "both sets"
     if term.random_states or term.mass_states:
         lines.append("Random states inside the limits were looked at, with these ranges:")

@@ -20,7 +20,7 @@ class ErrorRange(NamedTuple):
 
     @classmethod
     def of(cls, errors: FloatArray) -> "ErrorRange":
-        """Of one model's errors, (n_motions,)."""
+        """Return the range of one model's errors, (n_motions,)."""
         if not errors.size:
             return NO_MOTIONS
         return cls(float(np.median(errors)), float(errors.min()), float(errors.max()))

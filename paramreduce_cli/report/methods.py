@@ -16,7 +16,7 @@ from paramreduce_cli.records import (
     Trajectories,
 )
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.texts import share, share_range
+from paramreduce_cli.texts import format_share_range, share
 
 _BIBTEX = {
     "Atkeson1986": ("article", "C. G. Atkeson and C. H. An and J. M. Hollerbach",
@@ -181,7 +181,7 @@ def _result(data: ReportData) -> Iterator[str]:
     test = result.torque_error_test[row]
     if test.size:
         errors.append(
-            f"{share_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
+            f"{format_share_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
         )
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
     if data.known_model is not None:

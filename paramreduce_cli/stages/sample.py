@@ -18,7 +18,7 @@ from paramreduce_cli.excitation.fourier import (
     fourier_basis,
     sample_times,
 )
-from paramreduce_cli.excitation.point_to_point import states_along
+from paramreduce_cli.excitation.point_to_point import evaluate_along
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
@@ -203,7 +203,7 @@ def _generated(
         _motions_states(
             len(series),
             _series_states(series, trajectories.period, points, finer),
-            states_along(motions, points, finer),
+            evaluate_along(motions, points, finer),
         ),
         dynamics,
         model.values,

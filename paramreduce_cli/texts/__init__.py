@@ -22,8 +22,8 @@ def share(value: float | None) -> str:
     return f"{100 * value:.3g} %" if value >= EXACT else "0 %"
 
 
-def share_range(median: float, least: float, worst: float) -> str:
-    """Median, smallest and largest of errors over motions; a dash where there are no motions."""
+def format_share_range(median: float, least: float, worst: float) -> str:
+    """Format the median of errors over motions, with the smallest and the largest in brackets; a dash for no motions."""
     if math.isnan(median):
         return "-"
     if share(least) == share(worst):

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.excitation.point_to_point import (
+    evaluate_along,
+    evaluate_point_to_point,
     find_point_to_point,
-    point_to_point_states,
-    point_to_point_times,
-    states_along,
+    sample_point_to_point_times,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -27,8 +27,8 @@ NUMBERS = st.floats(-3, 3)
 @given(st.tuples(NUMBERS, NUMBERS), st.tuples(NUMBERS, NUMBERS), st.floats(0.1, 10))
 def test_a_motion_is_that_of_least_jerk(start, end, duration):
     motion = PointToPoint(np.array(start), np.array(end), duration)
-    time = point_to_point_times(motion, 201)
-    z, dz, ddz = point_to_point_states(motion, time)
+    time = sample_point_to_point_times(motion, 201)
+    z, dz, ddz = evaluate_point_to_point(motion, time)
     np.testing.assert_allclose(z[[0, -1]], [start, end], atol=1e-12)
     np.testing.assert_allclose([dz[0], dz[-1], ddz[0], ddz[-1]], np.zeros((4, 2)), atol=1e-12)
     way = np.abs(motion.end - motion.start)
@@ -62,7 +62,7 @@ def test_motions_are_as_fast_as_the_limits_allow(robot):
     assert len(motions) == 5
     for motion in motions:
         assert (positions == motion.start).all(axis=1).any()
-        _, dz, ddz = point_to_point_states(motion, point_to_point_times(motion, 2001))
+        _, dz, ddz = evaluate_point_to_point(motion, sample_point_to_point_times(motion, 2001))
         shares = (np.abs(dz) / limits.velocity).max(), (np.abs(ddz) / limits.acceleration).max()
         assert max(shares) == pytest.approx(1.0, abs=1e-5), (
             "one of them binds, and none is exceeded"
@@ -78,7 +78,7 @@ def test_motions_take_no_more_torque_or_power_than_there_is():
     slower = {motion.duration for motion in motions} - {motion.duration for motion in free}
     assert slower, "the limits bind, so that this test shows something"
     for motion in motions:
-        z, dz, ddz = point_to_point_states(motion, point_to_point_times(motion, 2001))
+        z, dz, ddz = evaluate_point_to_point(motion, sample_point_to_point_times(motion, 2001))
         tau = np.abs(Dynamics(model.mechanism).inverse(z, dz, ddz, model.values))
         assert (tau <= 1.001 * limits.torque).all()
         assert (tau * np.abs(dz) <= 1.001 * limits.power).all()
@@ -94,7 +94,7 @@ def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
     motions = find_point_to_point(model, limits, constraints, positions, 4, 200, rng)
     assert motions
     coordinates, quantities = Coordinates(model.mechanism), Quantities(model.mechanism, constraints)
-    at = states_along(motions, 20, 4)
+    at = evaluate_along(motions, 20, 4)
     for span in spans([20] * len(motions)):
         block = at(span)
         assert block.way.shape == (80, home.size)

@@ -10,7 +10,10 @@ from conftest import ROUGH_TERMS, TWO_LINK, config_and_model, run_stages, summar
 
 from paramreduce_cli.artifacts.brought import load_coefficients
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.excitation.point_to_point import point_to_point_states, point_to_point_times
+from paramreduce_cli.excitation.point_to_point import (
+    evaluate_point_to_point,
+    sample_point_to_point_times,
+)
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Run
 from paramreduce_cli.stages.optimize_trajectories import optimize_trajectories
@@ -159,7 +162,7 @@ def test_motions_keep_to_torque_limits_and_too_few_are_said(monkeypatch):
     dynamics = Dynamics(model.mechanism)
     assert len(found.test_point_to_point) == 10
     for motion in found.test_point_to_point:
-        states = point_to_point_states(motion, point_to_point_times(motion, 300))
+        states = evaluate_point_to_point(motion, sample_point_to_point_times(motion, 300))
         assert (np.abs(dynamics.inverse(*states, model.values)) <= 1.01 * limits).all()
     monkeypatch.setattr("paramreduce_cli.excitation.point_to_point._TRIES", 0)
     with pytest.warns(ParamreduceWarning, match="^0 of 10 point-to-point motions of the test set"):

@@ -36,7 +36,7 @@ from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import absent_files, stages_to_run
 from paramreduce_cli.records import Report
 from paramreduce_cli.runner import Runner, asked
-from paramreduce_cli.texts import share, share_range
+from paramreduce_cli.texts import format_share_range, share
 
 _TABLE_WIDTH = 110
 _MOST_PLACES = 8
@@ -225,5 +225,5 @@ def _summary_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
 def _said(error: dict[str, Any]) -> str:
     """Return the errors of a function on the test set, or on the sets that there are; empty where none are known."""
     if error["test"] is not None:
-        return share_range(**error["test"])
+        return format_share_range(**error["test"])
     return " / ".join(share(one) for one in error.values() if one is not None)

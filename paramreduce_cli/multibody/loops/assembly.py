@@ -87,7 +87,7 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     equations = _Equations(mechanism)
     q = _closed_nearby(equations, mechanism, mechanism.loops)
     jacobian, rows = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
-    in_loops = _in_loops(mechanism)
+    in_loops = _find_loop_coordinates(mechanism)
     others = np.array([k for k in in_loops if k not in driven], dtype=np.int64)
     # Those that are determined best come first, and what is left over determines them.
     _, pivots = scipy.linalg.qr(jacobian[rows][:, others], mode="r", pivoting=True)
@@ -126,7 +126,7 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
             _check_hinges(mechanism, loops, q)
         except ConcernError:
             continue
-        q[turns] = loops.assembly[turns] + _within_a_turn(q[turns] - loops.assembly[turns])
+        q[turns] = loops.assembly[turns] + _wrap_angles(q[turns] - loops.assembly[turns])
         if all(np.abs(q - known).max() > _ANOTHER_MODE for known in modes):
             modes.append(q)
     others = sorted(modes[1:], key=lambda q: float(np.linalg.norm(q - loops.assembly)))[:most]
@@ -135,8 +135,8 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
     ]
 
 
-def _within_a_turn(angles: FloatArray) -> FloatArray:
-    """Angles between minus and plus half a turn."""
+def _wrap_angles(angles: FloatArray) -> FloatArray:
+    """Add whole turns to angles so that they are between minus and plus half a turn."""
     result: FloatArray = np.angle(np.exp(1j * angles))
     return result
 
@@ -209,7 +209,7 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
     Raises:
         ConcernError: The loops cannot be closed.
     """
-    moving = _in_loops(mechanism)
+    moving = _find_loop_coordinates(mechanism)
     try:
         return _closed(equations, mechanism, loops, moving)
     except ConcernError:
@@ -272,18 +272,18 @@ def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
     return max(found, key=lambda pair: len(pair[1]))
 
 
-def _in_loops(mechanism: Mechanism) -> list[int]:
-    """Coordinates on the way around a loop; those of a base that floats, or of an arm beside the loops, are on none."""
+def _find_loop_coordinates(mechanism: Mechanism) -> list[int]:
+    """Return the coordinates that a closure depends on: not those of a floating base, nor of an arm beside the loops."""
     assert mechanism.loops is not None
     found: set[int] = set()
     for closure in mechanism.loops.closures:
-        one, other = (_carriers(mechanism, body) for body in closure.bodies)
+        one, other = (_find_carriers(mechanism, body) for body in closure.bodies)
         found |= set(closure.bodies) if closure.kind == "coupling" else one ^ other
     return sorted(found)
 
 
-def _carriers(mechanism: Mechanism, body: int) -> set[int]:
-    """A body and those that carry it."""
+def _find_carriers(mechanism: Mechanism, body: int) -> set[int]:
+    """Return a body and all bodies between it and the base."""
     found = set()
     while body != BASE:
         found.add(body)

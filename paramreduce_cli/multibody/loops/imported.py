@@ -1,4 +1,4 @@
-"""Where the loops of an imported robot are closed, and which of its coordinates determine the others."""
+"""Closed configurations and independent coordinates of imported robots with loops."""
 
 from dataclasses import replace
 
@@ -59,7 +59,7 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot
 
 
 def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
-    """Coordinates of joints to which the file gives an effort, in its order."""
+    """Return positions of the coordinates whose joints have an effort limit in the file, in the order of the file."""
     return [
         names.index(name)
         for body in robot.bodies
