@@ -278,7 +278,7 @@ def _acceptance(config: Config) -> Iterator[Problem]:
     elif sampling.simulation is not None and not sampling.simulation.test_runs:
         instead = "give sampling.simulation.test_runs"
     elif sampling.simulation is None and not (
-        motions.test_count or motions.test_point_to_point_count
+        motions.file or motions.test_count or motions.test_point_to_point_count
     ):
         instead = "give trajectories.test_count"
     else:

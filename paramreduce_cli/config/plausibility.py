@@ -26,7 +26,9 @@ _MOST = 6
 
 def find_implausible_bodies(config: Config) -> Iterator[str]:
     """Yield a sentence for each kind of body whose mass does not go with its size, or its size with the robot's."""
-    size = max(_SMALLEST, _extent(config))
+    extent = _extent(config)
+    # Of a single joint nothing else tells a size.
+    size = max(_SMALLEST, extent) if extent > 0 else np.inf
     found: dict[str, list[tuple[float, str]]] = {}
     for name, body in config.body_parameters().items():
         for what, number in _doubts(body, size):
@@ -76,22 +78,23 @@ def _doubts(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
 
 def _extent(config: Config) -> float:
     """Estimate the length of the robot, m: the largest sum of distances between joints from the base to a body."""
-    rigid = config.description.bodies.rigid_bodies()
+    bodies = config.description.bodies
+    rigid = bodies.rigid_bodies()
     reach: list[float] = []
     for body in rigid:
         before = reach[body.parent] if body.parent >= 0 else 0.0
-        reach.append(before + float(np.linalg.norm(body.parent_to_joint[:3, 3])))
+        shifts = (frame[:3, 3] for frame in (body.parent_to_joint, body.joint_to_body))
+        reach.append(before + sum(float(np.linalg.norm(shift)) for shift in shifts))
+    joints = {body.coordinate: body.joint for body in rigid}
+    given = config.trajectories.position_limits
+    names = bodies.independent_names()
+    ranges = given * len(names) if len(given) == 1 else given
     slides = [
         max(abs(lower), abs(upper))
-        for (lower, upper), body in zip(_ranges(config), rigid, strict=False)
-        if body.joint == "prismatic"
+        for (lower, upper), name in zip(ranges, names, strict=False)
+        if joints.get(name) == "prismatic"
     ]
     return max([*reach, *slides], default=0.0)
-
-
-def _ranges(config: Config) -> list[list[float]]:
-    given = config.trajectories.position_limits
-    return given * config.n_dof if len(given) == 1 else given
 
 
 def find_implausible_gravity(config: Config) -> Iterator[str]:

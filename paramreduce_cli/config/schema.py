@@ -70,7 +70,7 @@ class TrajectoriesSection(Section):
     test_count: CountOrNone = 10
     """Trajectories of the test set, which are optimised like the others, and which nothing before `validate` looks at."""
     test_point_to_point_count: CountOrNone = 10
-    """Motions from rest to rest that the test set holds besides, between positions that its trajectories pass, as fast as the limits allow."""
+    """Motions from rest to rest that the test set holds besides, between positions that its trajectories pass, or those of the validation set where it has none, as fast as the limits allow."""
     harmonics: Annotated[Whole, Field(ge=1, le=100)] = 4
     """Harmonics of the Fourier series."""
     period: Span = 2 * np.pi
@@ -190,7 +190,7 @@ class SamplingSection(Section):
     test_file: Path | None = None
     """Recorded states (CSV or HDF5) instead of the trajectories of the test set; relative to this file."""
     simulation: SimulationSection | None = None
-    """Simulated motions instead of trajectories, for both sets."""
+    """Simulated motions instead of trajectories, for all sets."""
     log: LogSection | None = None
     """Logs of the machine instead of trajectories, for both sets."""
     torques: Literal["measured", "model"] = "measured"

@@ -71,6 +71,7 @@ def find_point_to_point(
     model: Model,
     limits: JointLimits,
     constraints: tuple[Constraint, ...],
+    period: float,
     positions: FloatArray,
     count: int,
     points: int,
@@ -82,6 +83,8 @@ def find_point_to_point(
         model: Model of the robot, whose torques keep to the limits.
         limits: Limits of the independent coordinates.
         constraints: Bounds on other quantities along the way.
+        period: Period of other motions, s; half of it is the least duration where a joint that moves has no limit of
+            speed or acceleration.
         positions: Positions that keep to all of these, (n_positions, n_dof), rad or m.
         count: Number of motions.
         points: Points along each motion at which it is checked.
@@ -90,7 +93,7 @@ def find_point_to_point(
     Returns:
         The motions; fewer than asked for where most straight lines leave the constraints.
     """
-    within = _MotionLimits(model, limits, constraints, points)
+    within = _MotionLimits(model, limits, constraints, period, points)
     found: list[PointToPoint] = []
     for _ in range(_TRIES * count):
         if len(found) == count:
@@ -109,13 +112,21 @@ class _MotionLimits:
         model: Model of the robot.
         limits: Limits of the independent coordinates.
         constraints: Bounds on other quantities.
+        period: Period of other motions, s.
         points: Points along each motion at which they are evaluated.
     """
 
     def __init__(
-        self, model: Model, limits: JointLimits, constraints: tuple[Constraint, ...], points: int
+        self,
+        model: Model,
+        limits: JointLimits,
+        constraints: tuple[Constraint, ...],
+        period: float,
+        points: int,
     ) -> None:
         self._values, self._limits, self._points = model.values, limits, points
+        unlimited = np.isinf(limits.velocity) & np.isinf(limits.acceleration)
+        self._least = np.where(unlimited, period / 2, 0.0)
         self._coordinates = Coordinates(model.mechanism, once=True)
         self._quantities = Quantities(model.mechanism, constraints)
         self._dynamics = Dynamics(model.mechanism)
@@ -126,6 +137,7 @@ class _MotionLimits:
         duration = max(
             float(np.max(_PEAK_SPEED * way / self._limits.velocity)),
             float(np.sqrt(np.max(_PEAK_ACCELERATION * way / self._limits.acceleration))),
+            float(np.max(self._least[way > 0], initial=0.0)),
         )
         motion = PointToPoint(start, end, duration)
         if duration == 0 or not self._is_free(motion):

@@ -258,7 +258,7 @@ class _Simplification:
     ) -> tuple[str, ...]:
         choice = self._choice
         moved = {body.source.name: body for body in bodies if body.source is not None}
-        if self._asked_closures and not self._robot.closures:
+        if choice.independent or (self._asked_closures and not self._robot.closures):
             still = [name for name in choice.independent if name not in moved]
             if still:
                 raise ConfigError(f"--independent {still[0]}: does not move.")

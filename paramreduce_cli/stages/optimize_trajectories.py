@@ -141,6 +141,7 @@ def _find_point_to_point(
         model,
         task.settings.limits,
         task.constraints,
+        period,
         np.concatenate(positions),
         wanted.test_point_to_point_count,
         FINER * wanted.points,

@@ -33,7 +33,7 @@ from paramreduce_cli.terms.judging import Errors, Judge
 from paramreduce_cli.terms.searching import LookedAt, Searcher
 from paramreduce_cli.terms.simplify import simplified
 from paramreduce_cli.terms.starts import starts_within
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import share as share_of
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
 """Samples of the estimation and the validation set that are looked at while terms are left out, at first and
@@ -66,7 +66,7 @@ def reduce_terms(
 
     Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
     within 80 % of the budget there and on the validation set, so that those on the test set, which
-    is not looked at, are within it on the median. Measured ones are kept within it on the training part. A function for which nothing
+    is not looked at, are likely within it on the median. Measured ones are kept within it on the training part. A function for which nothing
     is found is left out, with a warning. A share of the work are some of the functions.
     """
     if section is None:
@@ -97,7 +97,12 @@ def reduce_terms(
             functions |= {} if found is None else {name: found}
     functions = {name: functions[name] for name in names if name in functions}
     if share.whole:
-        _say_missing([name for name in names if name not in functions], bool(functions))
+        part = (
+            "it"
+            if sampling.measured
+            else f"{share_of(_MARGIN)} of it, which leaves room for other motions,"
+        )
+        _say_missing([name for name in names if name not in functions], bool(functions), part)
     alone = sampling.measured or samples.validation is None
     return TermReduction(allowed.torque, allowed.acceleration, alone, functions)
 
@@ -222,14 +227,14 @@ def _say_unfit(term: TermModel) -> None:
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
-            f"terms: accelerations from the direct dynamics are off by {share(np.nanmax(errors))}, as nothing "
+            f"terms: accelerations from the direct dynamics are off by {share_of(np.nanmax(errors))}, as nothing "
             "asks for more than a positive definite M. Give terms.acceleration_error",
             ParamreduceWarning,
             stacklevel=3,
         )
 
 
-def _say_missing(names: list[str], others: bool) -> None:
+def _say_missing(names: list[str], others: bool, part: str) -> None:
     """Of functions that stay as they are; what comes after goes on if there is another one.
 
     Raises:
@@ -238,7 +243,7 @@ def _say_missing(names: list[str], others: bool) -> None:
     if not names:
         return
     text = (
-        f"nothing within it was found for the {' and the '.join(names)} dynamics. Allow more, or let "
+        f"nothing within {part} was found for the {' and the '.join(names)} dynamics. Allow more, or let "
         "reduction find subsets that are better than that"
     )
     if not others:

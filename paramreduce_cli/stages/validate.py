@@ -177,7 +177,8 @@ def _refuse_what_needs_a_test_set(judging: ValidationSection) -> None:
     for name in judging.accept.model_dump(exclude_none=True):
         if "_test" in name:
             raise ConfigError(
-                "needs a test set, which samples.h5 does not hold: give trajectories.test_count, or sampling.test_file "
+                "needs a test set, which samples.h5 does not hold: give trajectories.test_count, coefficients of a test set "
+                "in trajectories.file, trajectories.test_point_to_point_count, or sampling.test_file "
                 "beside recordings; a log has its held-out part, the validation set, instead.",
                 ("validation", "accept", name),
             )

@@ -22,9 +22,9 @@ def share(value: float | None) -> str:
     return f"{100 * value:.3g} %" if value >= EXACT else "0 %"
 
 
-def format_share_range(median: float, least: float, worst: float) -> str:
+def format_share_range(median: float | None, least: float | None, worst: float | None) -> str:
     """Format the median of errors over motions, with the smallest and the largest in brackets; a dash for no motions."""
-    if math.isnan(median):
+    if median is not None and math.isnan(median):
         return "-"
     if share(least) == share(worst):
         return share(median)

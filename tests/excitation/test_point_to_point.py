@@ -51,7 +51,7 @@ def found(robot, count=5, seed=0, **limits):
     rng = np.random.default_rng(seed)
     positions = rng.uniform(0.5 * own.lower + 0.5 * own.middle, 0.5 * own.upper + 0.5 * own.middle, (40, own.lower.size))  # fmt: skip
     constraints = wanted.bounded(model.mechanism)
-    motions = find_point_to_point(model, own, constraints, positions, count, 200, rng)
+    motions = find_point_to_point(model, own, constraints, 2 * np.pi, positions, count, 200, rng)
     return model, own, constraints, positions, motions
 
 
@@ -67,6 +67,13 @@ def test_motions_are_as_fast_as_the_limits_allow(robot):
         assert max(shares) == pytest.approx(1.0, abs=1e-5), (
             "one of them binds, and none is exceeded"
         )
+
+
+def test_joints_without_limits_of_speed_take_half_a_period():
+    unlimited = np.full(2, np.inf)
+    *_, motions = found("two_link", velocity=unlimited, acceleration=unlimited)
+    assert len(motions) == 5
+    assert all(motion.duration == pytest.approx(np.pi) for motion in motions)
 
 
 def test_motions_take_no_more_torque_or_power_than_there_is():
@@ -91,7 +98,7 @@ def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
     home = model.mechanism.loops.assembly[list(model.mechanism.independent)]
     rng = np.random.default_rng(1)
     positions = np.clip(home + rng.uniform(-0.6, 0.6, (30, home.size)), limits.lower, limits.upper)
-    motions = find_point_to_point(model, limits, constraints, positions, 4, 200, rng)
+    motions = find_point_to_point(model, limits, constraints, 6, positions, 4, 200, rng)
     assert motions
     coordinates, quantities = Coordinates(model.mechanism), Quantities(model.mechanism, constraints)
     at = evaluate_along(motions, 20, 4)
@@ -112,6 +119,7 @@ def test_fewer_motions_are_found_where_straight_lines_are_not_free():
         model,
         limits,
         config.trajectories.bounded(model.mechanism),
+        6.0,
         far,
         3,
         100,

@@ -177,8 +177,9 @@ def test_a_four_bar_whose_ends_are_joined(invoke, tmp_path, kind):
         (["--close", "tip1=fore1"], "--close tip1=fore1: both links move with fore1, so there is nothing to close"),
         (["--close", "tip1=corner1:spherical", "--independent", "moter1"], "joint 'moter1' is not known; did you mean motor1?"),
         (["--close", "tip1=corner1:spherical", "--independent", "end1"], "--independent end1: does not move"),
-        (["--close", "tip1=corner1:spherical", "--independent", "motor1"], "8 coordinates determine all others, and motor1 do not"),
-        (["--independent", "motor1"], "--independent: belongs to --close"),
+        (["--close", "tip1=corner1:spherical", *(part for k in (0, 1) for name in ("motor", "tilt", "sway")
+           for part in ("--independent", f"{name}{k}"))], "--independent: the loops tie"),
+        (["--independent", "motor1"], "--independent: belongs to loops"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_closed_gets_one_message(invoke, tmp_path, options, says):
@@ -212,6 +213,18 @@ def test_a_base_that_floats_stays_where_it_is_while_loops_are_closed(invoke, tmp
     assert bodies.guess == pytest.approx(guess, abs=2e-6)
     assert len(bodies.independent) == 6 + 5
     assert all(f"q_ground_{k}" in bodies.independent for k in range(1, 7))
+
+
+def test_what_is_named_comes_first_and_others_are_added(invoke, tmp_path):
+    """Joints beside the loop, and those that are left over, are independent besides; a base that floats too."""
+    close = ("--close", "tip1=corner1:spherical", "--independent", "tilt1")
+    for options, base in (((), 0), (("--floating",), 6)):
+        said, output, _ = init(invoke, tmp_path, delta(0), *close, *options)
+        found = load_config(output).description.bodies.independent
+        assert {"tilt1", "motor2", "tilt2", "sway2"} <= set(found)
+        assert len(found) == base + 8 - 3 + 3
+        assert "independent coordinates, which determine all others" in said
+        closed_mechanism(output)
 
 
 def test_blanks_around_the_signs_of_a_pair_do_not_matter(invoke, tmp_path):

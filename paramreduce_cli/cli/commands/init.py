@@ -3,6 +3,7 @@
 import os
 import re
 import tempfile
+import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -22,7 +23,7 @@ from paramreduce_cli.config.template import (
     recorded_template,
     tree_template,
 )
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.fields.numbers import parse_number
 from paramreduce_cli.fields.section import NAME
 from paramreduce_cli.importing.reading import described, imported
@@ -96,10 +97,6 @@ def init(
         ignored=list(ignored), floating=floating, uncoupled=uncouple, closed=list(map(_check_closure, closed)),
         independent=list(independent),
     )  # fmt: skip
-    if independent and not closed:
-        raise ConfigError(
-            "--independent: belongs to --close; without loops all joints are independent."
-        )
     if kind is not None:
         if logs or choice != SourceSection(file=choice.file):
             raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
@@ -110,6 +107,10 @@ def init(
         path = output or Path("configs") / f"{robot.name}.yaml"
         if re.fullmatch(NAME, path.stem, re.ASCII):  # results go to a folder of the robot's name
             robot = replace(robot, name=path.stem)
+        if independent and not robot.closures:
+            raise ConfigError(
+                "--independent: belongs to loops, such as those of --close; without any all joints are independent."
+            )
         if robot.closures:
             robot = _closed(robot, choice)
         base = robot.independent[:_BASE] if floating else ()
@@ -213,7 +214,10 @@ def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
 
     every = tuple(name for body in robot.bodies for name in body.coordinates())
     text = config_text(replace(robot, independent=robot.independent or every), choice)
-    return close_loops(robot, _check(text).mechanism())
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ParamreduceWarning)  # they come with the final text
+        mechanism = _check(text).mechanism()
+    return close_loops(robot, mechanism, asked=bool(choice.independent))
 
 
 def _check(text: str) -> Config:

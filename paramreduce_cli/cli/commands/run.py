@@ -146,8 +146,8 @@ def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
     folder = runner.store.folder
     if owner not in ("", runner.config_name):
         remark(
-            f"{folder} holds results of {owner}, which those of {runner.config_name} replace from {others[0].name} on, as both are "
-            f"called robot: {runner.config.robot}; give one of them another name, or name another folder in --results, to keep both"
+            f"{folder} holds results of {owner}, which those of {runner.config_name} replace from {others[0].name} on; give "
+            "one of them another name under robot:, or name another folder in --results, to keep both"
         )
     elif changed:
         remark(
@@ -186,13 +186,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
     table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
     say_table(table, _TABLE_WIDTH)
     if tested:
-        count = (
-            len(trajectories["test"]) + len(trajectories["test_point_to_point"])
-            if trajectories
-            else 0
-        )
-        of = f"{count} motions" if count else "its motions"
-        say(f"T: the test set, which no search looks at; the median and the worst of {of}.")
+        say("T: the test set, which no search looks at; the median and the worst of its motions.")
     for one in summary["terms"]:
         name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
         said = "".join(

@@ -232,7 +232,7 @@ def _closed_as_given(
 ) -> FloatArray:
     """Close the loops with the independent coordinates as they are in the guess.
 
-    Where no guess says anything of these and the loops do not close with zeros, they are closed where
+    Where the guess is zero for all of these, or leaves them out, and the loops do not close so, they are closed where
     all coordinates came to that were free to move, which is said.
     """
     try:

@@ -11,18 +11,19 @@ _DIGITS = 6
 """Decimals of the guess, which leads back to the assembly."""
 
 
-def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot:
-    """Close the loops from the pose of the file, and choose independent coordinates where none are named.
+def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) -> SimplifiedRobot:
+    """Close the loops from the pose of the file, and choose independent coordinates, those that are named first.
 
     Args:
         robot: A robot with loops.
-        mechanism: The same as a mechanism, whatever it calls independent.
+        mechanism: The same robot as a mechanism with any independent coordinates.
+        asked: Whether the user named the independent coordinates, not the file.
 
     Returns:
         The robot with a guess and independent coordinates; without a guess where its loops do not close.
 
     Raises:
-        ConfigError: Other coordinates than those that are named are independent.
+        ConfigError: A named coordinate depends on the others, or nothing moves.
     """
     names = mechanism.generalised_names
     named = [names.index(name) for name in robot.independent]
@@ -39,10 +40,11 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot
             "with more freedom: fixed, revolute, spherical."
         )
     own = tuple(names[k] for k in independent)
-    if named and set(named) != set(independent):
+    lost = [names[k] for k in named if k not in independent]
+    if lost and asked:
         raise ConfigError(
-            f"{robot.source}: {len(independent)} coordinates determine all others, and {', '.join(robot.independent)} do "
-            f"not; {', '.join(own)} do. Name them by --independent JOINT, or leave that out."
+            f"--independent: the loops tie {', '.join(lost)} to the other coordinates that are named. "
+            f"{', '.join(own)} determine all others; name some of these."
         )
     guess = {name: round(float(value), _DIGITS) for name, value in zip(names, q, strict=True)}
     guess = {name: value for name, value in guess.items() if value}
@@ -50,12 +52,10 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism) -> SimplifiedRobot
     if guess:
         shown = ", ".join(f"{name} = {value:.4g}" for name, value in guess.items())
         remarks = (*remarks, f"the loops are closed at {shown}, which is the guess")
-    if not named:
-        remarks = (
-            *remarks,
-            f"independent coordinates, which determine all others: {', '.join(own)}; --independent JOINT chooses others",
-        )
-    return replace(robot, independent=robot.independent or own, guess=guess, remarks=remarks)
+    if set(named) != set(independent):
+        text = f"independent coordinates, which determine all others: {', '.join(own)}"
+        remarks = (*remarks, f"{text}; --independent JOINT chooses others")
+    return replace(robot, independent=own, guess=guess, remarks=remarks)
 
 
 def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
