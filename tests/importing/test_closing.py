@@ -227,6 +227,38 @@ def test_what_is_named_comes_first_and_others_are_added(invoke, tmp_path):
         closed_mechanism(output)
 
 
+def test_driven_joints_that_the_loops_tie_are_said(invoke, tmp_path):
+    """Welded rods of a five-bar leave its two motors nothing: their hinges turn about y, and a weld holds that turn."""
+    text = '<robot name="five">\n  <link name="ground"/>\n'
+    for side, x in (("l", -0.2), ("r", 0.2)):
+        text += LINK.format(f"crank_{side}", "0 0 0.15", 1) + LINK.format(
+            f"rod_{side}", "0 0 0.2", 0.5
+        )
+        text += JOINT.format(
+            f"m_{side}", "revolute", "ground", f"crank_{side}", f"{x} 0 0", "0 0 0", "0 1 0", EFFORT
+        )
+        text += JOINT.format(
+            f"e_{side}",
+            "revolute",
+            f"crank_{side}",
+            f"rod_{side}",
+            "0 0 0.3",
+            "0 0 0",
+            "0 1 0",
+            PASSIVE,
+        )
+        text += f'  <link name="tip_{side}"/>\n'
+        text += JOINT.format(
+            f"t_{side}", "fixed", f"rod_{side}", f"tip_{side}", "0 0 0.4", "0 0 0", "1 0 0", ""
+        )
+    text += "</robot>\n"
+    for kind, tied in (("fixed", True), ("spherical", False)):
+        said, output, _ = init(invoke, tmp_path, text, "--close", f"tip_l=tip_r:{kind}")
+        assert ("although the joints are driven" in said) == tied
+        independent = load_config(output).description.bodies.independent
+        assert (set(independent) == {"m_l", "m_r"}) != tied
+
+
 def test_blanks_around_the_signs_of_a_pair_do_not_matter(invoke, tmp_path):
     _, output, _ = init(invoke, tmp_path, delta(0), *CLOSE)
     expected = load_config(output).description.bodies.closures

@@ -58,7 +58,7 @@ _FARTHEST = 1e6
 @click.option("--ignore", "ignored", multiple=True, metavar="LINK",
               help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
 @click.option("--close", "closed", multiple=True, metavar="A=B[:KIND]",
-              help="Hold the frames of two links together, so that a loop is closed: fixed, revolute (but for a turn about z) or spherical; may be repeated.  [default KIND: fixed]")  # fmt: skip
+              help="Hold the frames of two links together, so that a loop is closed: fixed, revolute (but for a turn about z of the frames; a pin about another axis is spherical) or spherical; may be repeated.  [default KIND: fixed]")  # fmt: skip
 @click.option("--independent", multiple=True, metavar="JOINT",
               help="With --close, a joint that is driven; may be repeated.  [default: chosen]")  # fmt: skip
 @click.option("--floating", is_flag=True, help="The root moves freely.")

@@ -52,6 +52,13 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     if guess:
         shown = ", ".join(f"{name} = {value:.4g}" for name, value in guess.items())
         remarks = (*remarks, f"the loops are closed at {shown}, which is the guess")
+    passed_over = [names[k] for k in driven if k not in independent]
+    if passed_over:
+        remarks = (
+            *remarks,
+            f"the loops tie {', '.join(passed_over)} to other coordinates, although the joints are driven: do the closures "
+            "take more freedom than those of the robot? `spherical` takes the least",
+        )
     if set(named) != set(independent):
         text = f"independent coordinates, which determine all others: {', '.join(own)}"
         remarks = (*remarks, f"{text}; --independent JOINT chooses others")
