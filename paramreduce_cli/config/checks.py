@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from paramreduce_cli.config.cutting import PER_JOINT, read_per_joint
 from paramreduce_cli.config.plausibility import (
     find_implausible_bodies,
     find_implausible_gravity,
@@ -197,35 +198,8 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
 
 def _per_joint(config: Config) -> Iterator[Problem]:
     n = config.n_dof
-    trajectories = config.trajectories
-    counted: list[tuple[Key, object, str]] = [
-        (("nominal_torque",), config.nominal_torque, "N m (N for a prismatic joint)"),
-        (
-            ("trajectories", "position_limits"),
-            trajectories.position_limits,
-            "rad (m for a prismatic joint)",
-        ),
-        (
-            ("trajectories", "velocity_limits"),
-            trajectories.velocity_limits,
-            "rad/s (m/s for a prismatic joint)",
-        ),
-        (
-            ("trajectories", "acceleration_limits"),
-            trajectories.acceleration_limits,
-            "rad/s^2 (m/s^2 for a prismatic joint)",
-        ),
-        (("trajectories", "torque_limits"), trajectories.torque_limits, "N m (N)"),
-        (("trajectories", "power_limits"), trajectories.power_limits, "W"),
-        (("trajectories", "torque_noise"), trajectories.torque_noise, "N m (N)"),
-        (("trajectories", "start_pose"), trajectories.start_pose, "rad (m)"),
-        (
-            ("sampling", "nominal_acceleration"),
-            config.sampling.nominal_acceleration,
-            "rad/s^2 (m/s^2 for a prismatic joint)",
-        ),
-    ]
-    for path, values, unit in counted:
+    for path, unit in PER_JOINT.items():
+        values = read_per_joint(config, path)
         if isinstance(values, list) and len(values) not in (1, n):
             yield (
                 path,

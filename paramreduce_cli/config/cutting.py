@@ -3,20 +3,30 @@
 import warnings
 from typing import Any
 
-from pydantic import BaseModel
-
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import ParamreduceWarning
 
-_PER_JOINT = {
-    (): ("nominal_torque",),
-    ("trajectories",): (
-        "position_limits", "velocity_limits", "acceleration_limits", "torque_limits",
-        "power_limits", "torque_noise", "start_pose",
-    ),
-    ("sampling",): ("nominal_acceleration",),
-}  # fmt: skip
-"""Keys that take a value for each independent coordinate, by their sections."""
+_TORQUE, _POSITION = "N m (N for a prismatic joint)", "rad (m for a prismatic joint)"
+PER_JOINT: dict[tuple[str, ...], str] = {
+    ("nominal_torque",): _TORQUE,
+    ("trajectories", "position_limits"): _POSITION,
+    ("trajectories", "velocity_limits"): "rad/s (m/s for a prismatic joint)",
+    ("trajectories", "acceleration_limits"): "rad/s^2 (m/s^2 for a prismatic joint)",
+    ("trajectories", "torque_limits"): _TORQUE,
+    ("trajectories", "power_limits"): "W",
+    ("trajectories", "torque_noise"): _TORQUE,
+    ("trajectories", "start_pose"): _POSITION,
+    ("sampling", "nominal_acceleration"): "rad/s^2 (m/s^2 for a prismatic joint)",
+}
+"""Units of the keys that take a value for each independent coordinate."""
+
+
+def read_per_joint(config: Config, key: tuple[str, ...]) -> Any:
+    """Return the value of a key of :data:`PER_JOINT`."""
+    value: Any = config
+    for part in key:
+        value = getattr(value, part)
+    return value
 
 
 def cut_to_independent(config: Config) -> Config:
@@ -27,21 +37,15 @@ def cut_to_independent(config: Config) -> Config:
     names = bodies.generalised_names()
     places = [names.index(name) for name in bodies.independent_names() if name in names]
     cut: list[str] = []
-
-    def without_others(section: BaseModel, path: tuple[str, ...]) -> dict[str, Any]:
-        found = {}
-        for key in _PER_JOINT[path]:
-            values = getattr(section, key)
-            if isinstance(values, list) and len(values) == len(names) != len(places):
-                found[key] = [values[k] for k in places]
-                cut.append(".".join((*path, key)))
-        return found
-
-    update: dict[str, Any] = without_others(config, ())
-    for path in (path for path in _PER_JOINT if path):
-        section = getattr(config, path[0])
-        if own := without_others(section, path):
-            update[path[0]] = section.model_copy(update=own)
+    for key in PER_JOINT:
+        values = read_per_joint(config, key)
+        if not isinstance(values, list) or len(values) != len(names) or len(values) == len(places):
+            continue
+        cut.append(".".join(key))
+        own: Any = [values[k] for k in places]
+        for depth in range(len(key) - 1, 0, -1):
+            own = read_per_joint(config, key[:depth]).model_copy(update={key[depth]: own})
+        config = config.model_copy(update={key[0]: own})
     if cut:
         warnings.warn(
             f"{', '.join(cut)}: given for all {len(names)} coordinates; those of the independent ones are "
@@ -49,4 +53,4 @@ def cut_to_independent(config: Config) -> Config:
             ParamreduceWarning,
             stacklevel=2,
         )
-    return config.model_copy(update=update) if update else config
+    return config

@@ -36,7 +36,7 @@ class TermFront:
     """Not numbers for the inverse dynamics."""
     acceleration_error_validation: FloatArray
     torque_error_test: FloatArray
-    """Of every motion of the test set, which no search looks at, (n_models, n_motions)."""
+    """Errors on every motion of the test set, which no search looks at, (n_models, n_motions)."""
     acceleration_error_test: FloatArray
 
 
@@ -72,7 +72,7 @@ class TermModel:
     """Not a number for the inverse dynamics, like all that is of accelerations."""
     acceleration_error_validation: float
     torque_error_test: FloatArray
-    """Of every motion of the test set, which no search looks at, (n_motions,)."""
+    """Errors on every motion of the test set, which no search looks at, (n_motions,)."""
     acceleration_error_test: FloatArray
     random_torque_error: float
     """On random states inside the limits; not a number where the torques are not known there."""

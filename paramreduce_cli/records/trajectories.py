@@ -97,9 +97,9 @@ class PointToPoint:
     start: FloatArray
     """Independent coordinates at its beginning, (n_dof,), rad or m."""
     end: FloatArray
-    """The same at its end."""
+    """Independent coordinates at its end, (n_dof,), rad or m."""
     duration: float
-    """s"""
+    """Time from rest to rest, s."""
 
 
 @dataclass(frozen=True)

@@ -43,10 +43,10 @@ class HeuristicValidation(BySize):
     acceleration_error_joint_estimation: FloatArray
     acceleration_error_joint_validation: FloatArray
     torque_error_test: FloatArray
-    """Of every motion of the test set, (m, n_motions), none where there is no such set."""
+    """Errors on every motion of the test set, (m, n_motions); no columns where there is no test set."""
     acceleration_error_test: FloatArray
     torque_error_joint_test: FloatArray
-    """Over all motions of the test set together, (m, n_dof)."""
+    """Errors over all motions of the test set together, (m, n_dof)."""
     acceleration_error_joint_test: FloatArray
     mass_matrix_condition: FloatArray
     """Largest over the samples."""

@@ -100,9 +100,9 @@ def _excitation(data: ReportData) -> Iterator[str]:
     elif data.known_model is None:
         yield "The observation matrix and the forces were given."
     elif data.simulated:
-        yield "The states of both sets are those of simulated motions of the full model."
+        yield "The states of all sets are those of simulated motions of the full model."
     else:
-        yield "The states of both sets were given."
+        yield "The states of all sets were given."
 
 
 def _measured(log: MeasuredLog) -> str:

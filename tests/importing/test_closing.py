@@ -7,6 +7,7 @@ import pytest
 from robot_files import FOUR_BAR
 
 from paramreduce_cli.config import load_config
+from paramreduce_cli.errors import ConcernError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -290,21 +291,39 @@ def test_loops_that_do_not_close_are_left_to_be_guessed(invoke, tmp_path):
 
 
 def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, tmp_path):
-    close = ("--close", "tip1=corner1:spherical", "--close", "tip2=corner2:spherical")
-    _, output, _ = init(invoke, tmp_path, delta(0), *close)
-    config = load_config(output)
-    lines = [line for line in output.read_text().splitlines() if "guess:" not in line]
-    driven = "    independent: [motor0, motor1, motor2, level, turn]"
-    assert config.description.bodies.guess
-    output.write_text("\n".join(driven if "    independent:" in line else line for line in lines))
-    nowhere = load_config(output)
-    with warnings.catch_warnings(record=True) as caught:
-        warnings.simplefilter("always")
-        found = assembled(nowhere.mechanism())
-    gap = np.abs(found.loops.assembly[list(found.independent)]).max()
-    assert (gap > 0) == any(
-        "with all coordinates free to move, at guess: {" in str(w.message) for w in caught
+    """A four-bar whose crank points away from the rocker at zero, where coupler and rocker do not reach."""
+    text = '<robot name="four">\n  <link name="ground"/>\n'
+    for name, joint, parent, at, turn in (
+        ("crank", "q1", "ground", "0 0 0", "0 0 3.141592653589793"),
+        ("coupler", "q2", "crank", "0.2 0 0", "0 0 3.141592653589793"),
+        ("rocker", "q3", "ground", "0.6 0 0", "0 0 1.5707963267948966"),
+    ):
+        text += LINK.format(name, "0.1 0 0", 1)
+        text += JOINT.format(joint, "revolute", parent, name, at, turn, "0 0 1", EFFORT)
+    for name, length in (("coupler", 0.3), ("rocker", 0.25)):
+        text += f'  <link name="{name}_tip"/>\n'
+        text += JOINT.format(
+            f"{name}_end", "fixed", name, f"{name}_tip", f"{length} 0 0", "0 0 0", "1 0 0", ""
+        )
+    text += "</robot>\n"
+    _, output, _ = init(
+        invoke, tmp_path, text, "--close", "coupler_tip=rocker_tip:spherical", "--independent", "q1"
     )
+    assert abs(load_config(output).description.bodies.guess["q1"]) > 0.1
+    lines = [line for line in output.read_text().splitlines() if "guess:" not in line]
+    output.write_text("\n".join(lines))
+    with pytest.warns(
+        match="do not close with zero for q1; they are closed with all coordinates free to move, at guess: {"
+    ):
+        found = assembled(load_config(output).mechanism())
+    assert abs(found.loops.assembly[found.independent[0]]) > 0.1
+    output.write_text(
+        "\n".join(lines).replace(
+            "    independent: [q1]", "    independent: [q1]\n    guess: {q1: 0.01}"
+        )
+    )
+    with pytest.raises(ConcernError, match="cannot be closed from the guess with q1 = 0.01"):
+        assembled(load_config(output).mechanism())
 
 
 def test_lists_for_all_coordinates_are_cut_to_the_independent_ones(tmp_path, invoke):
