@@ -137,7 +137,7 @@ def _reason(
 
 def _listed(tolerances: Mapping[str, float]) -> str:
     shown = [
-        f"{key.replace('_', ' ')} at most {share(value)} on both sets"
+        f"{key.replace('_', ' ')} at most {share(value)} on the estimation and the validation set"
         if "error" in key
         else f"at most {value:g} operations of d"
         for key, value in tolerances.items()
