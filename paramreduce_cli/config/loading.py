@@ -61,7 +61,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         raise ConfigError("\n".join(lines))
     for text in remarks(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
-    return _with_paths(config, path.parent)
+    return _with_paths(_without_unused_tests(config), path.parent)
 
 
 def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
@@ -307,6 +307,16 @@ def _line(document: Document, problem: Problem) -> str:
     path, message = problem
     end = "" if message.rstrip().endswith((".", "?")) else "."
     return f"{document.place(path)}: {keyed(path, message)}{end}"
+
+
+def _without_unused_tests(config: Config) -> Config:
+    """Ask for no test trajectories by default where a recording is the test set."""
+    defaults = {"test_count": 0, "test_point_to_point_count": 0}
+    update = {k: n for k, n in defaults.items() if k not in config.trajectories.model_fields_set}
+    if config.sampling.test_file is None or not update:
+        return config
+    trajectories = config.trajectories.model_copy(update=update)
+    return config.model_copy(update={"trajectories": trajectories})
 
 
 def _with_paths(config: Config, folder: Path) -> Config:

@@ -79,7 +79,7 @@ trajectories:
 """
 JUDGEMENT = """\
 selected:
-  torque_error: 0.01            # the smallest model of all heuristics with an error of at most 1 %; or n: 18
+  torque_error: 0.01            # the smallest model of all heuristics with an error of at most 1 %; or n: 8
 
 validation:
   accept:                       # exit code 1 where these are not met

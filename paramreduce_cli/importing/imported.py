@@ -113,6 +113,19 @@ class ImportedJoint:
     """Friction, rotor and spring by the keys of a drive in a config; those that are not zero."""
     line: int = 0
 
+    @property
+    def is_limited(self) -> bool:
+        """Whether the file limits the coordinate to a range, rad or m."""
+        lower, upper = self.lower, self.upper
+        return (
+            self.kind != "continuous" and lower is not None and upper is not None and lower < upper
+        )
+
+    def allows(self, coordinate: float) -> bool:
+        """Whether a coordinate, rad or m, lies between the limits of the file."""
+        lower, upper = self.lower, self.upper
+        return (lower is None or lower <= coordinate) and (upper is None or coordinate <= upper)
+
 
 CLOSED_KINDS: Mapping[str, ClosureKind] = {
     "fixed": "fixed",

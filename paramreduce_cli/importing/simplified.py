@@ -108,6 +108,16 @@ class SimplifiedRobot:
     guess: Mapping[str, float] = field(default_factory=dict)
     """Coordinates with which loops are closed, rad or m; those that are not zero."""
 
+    def dependent_limits(self) -> dict[str, ImportedJoint]:
+        """Joints of the file that limit coordinates which the loops make dependent, by coordinate."""
+        followers = {coupling.follower.coordinate for coupling in self.couplings}
+        return {
+            body.coordinate: body.limits
+            for body in self.bodies
+            if self.closures and body.coordinate is not None and body.limits is not None
+            if body.limits.is_limited and body.coordinate not in {*self.independent, *followers}
+        }
+
 
 def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
     """Merge what does not move, and name everything as configs allow.
@@ -148,7 +158,7 @@ class _Simplification:
         for option, name, known in asked:
             if name is not None and name not in known:
                 kind = "joint" if option in ("--lock", "--independent") else "link"
-                raise ConfigError(f"{option} {name}: {unknown(kind, name, known)}.")
+                raise ConfigError(f"{option} {name}: {unknown(kind, name, known)}")
 
     def _found_root(self) -> str:
         if self._choice.root is not None:

@@ -223,14 +223,25 @@ def _limits(robot: SimplifiedRobot) -> str:
         )
 
     return (
-        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position, _ranged)}"
+        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position, _is_limited)}"
         f"  velocity_limits:              # rad/s or m/s\n{rows(_velocity, _fast)}"
+        f"{_dependent_limits(robot)}"
     )
 
 
-def _ranged(limits: ImportedJoint) -> bool:
-    lower, upper = limits.lower, limits.upper
-    return limits.kind != "continuous" and lower is not None and upper is not None and lower < upper
+def _dependent_limits(robot: SimplifiedRobot) -> str:
+    """Write the position limits of joints that depend on others as constraints; empty where there are none."""
+    rows = [
+        f"    - {{name: {name}, quantity: coordinate, coordinate: {name}, "
+        f"min: {limits.lower:.6g}, max: {limits.upper:.6g}}}\n"
+        for name, limits in robot.dependent_limits().items()
+        if limits.allows(robot.guess.get(name, 0.0))
+    ]
+    return f"{_CONSTRAINTS}{''.join(rows)}" if rows else ""
+
+
+def _is_limited(limits: ImportedJoint) -> bool:
+    return limits.is_limited
 
 
 def _fast(limits: ImportedJoint) -> bool:
@@ -238,7 +249,7 @@ def _fast(limits: ImportedJoint) -> bool:
 
 
 def _position(kind: str, limits: ImportedJoint | None) -> str:
-    if limits is None or not _ranged(limits):
+    if limits is None or not limits.is_limited:
         return _RANGE[kind]
     return f"[{limits.lower:.6g}, {limits.upper:.6g}]"
 
@@ -249,6 +260,9 @@ def _velocity(kind: str, limits: ImportedJoint | None) -> str:
     return f"{abs(limits.velocity):.6g}"
 
 
+_CONSTRAINTS = """\
+  constraints:                  # limits of joints that depend on the others, rad or m
+"""
 _NO_DRIVES = """\
 # Friction and rotors of the joints, of which the file says nothing: inertia (kg m^2, kg), viscous
 # (N m s/rad, N s/m), coulomb and offset (N m, N), stiffness; a number, or unknown if yet to be found.

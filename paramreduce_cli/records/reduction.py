@@ -196,6 +196,8 @@ class ProofStatus(StrEnum):
     """The search has not ended: there is a lower bound."""
     UNCERTIFIED = "uncertified"
     """Double precision is not enough for a proof."""
+    BEYOND_RANK = "beyond-rank"
+    """The size exceeds the rank of the columns: the error is that of all columns together."""
 
 
 @dataclass(frozen=True)
@@ -219,6 +221,16 @@ class Proofs(BySize):
     """Where each unfinished search stopped, to go on from there."""
     dealt: IntArray
     """Digest of the subtrees that a search was dealt as among several jobs, 0 where it was not, (m,)."""
+
+    @property
+    def n_proven(self) -> int:
+        """Number of sizes whose best subset is proven."""
+        return self.status.count(ProofStatus.OPTIMAL)
+
+    @property
+    def n_provable(self) -> int:
+        """Number of sizes up to the rank of the columns."""
+        return self.n.size - self.status.count(ProofStatus.BEYOND_RANK)
 
 
 @dataclass(frozen=True)

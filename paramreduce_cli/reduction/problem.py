@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -26,6 +26,7 @@ class SelectionProblem:
         candidates: Columns that may be chosen, in ascending order.
         preference: All columns, the most wanted first; it breaks every tie.
         groups: Sets of columns that are chosen or left out together; all others stand alone.
+        certifiable: Whether round-off leaves no doubt about which columns have an effect.
     """
 
     W: FloatArray
@@ -33,11 +34,12 @@ class SelectionProblem:
     candidates: IntArray
     preference: IntArray
     groups: tuple[IntArray, ...] = ()
+    certifiable: bool = True
 
     def on(self, factor: FloatArray) -> SelectionProblem:
         """The same choice on other data, a triangular factor of [W | chi]."""
         W, chi = factor[:, :-1], factor[:, -1]
-        return SelectionProblem(W, chi, self.candidates, self.preference, self.groups)
+        return replace(self, W=W, chi=chi)
 
     @property
     def candidates_by_preference(self) -> IntArray:

@@ -51,8 +51,24 @@ def _check_sizes(what: str, values: FloatArray) -> None:
         )
 
 
-def _remark_on_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
-    lengths = np.abs(W).max(axis=0)  # squares of the smallest would be zero
+_ROUND_OFF = 1e-15
+"""Length of a column, relative to the longest, up to which its numbers are taken for round-off."""
+
+
+def _column_lengths(W: FloatArray) -> FloatArray:
+    """Return the largest magnitude in each column, whose square need not be a number."""
+    lengths: FloatArray = np.abs(W).max(axis=0)
+    return lengths
+
+
+def _affecting_columns(W: FloatArray, values: FloatArray | None) -> BoolArray:
+    """Find the columns with an effect, (n,): by what each contributes too where its value is known."""
+    affecting = affecting_columns(W)
+    return affecting if values is None else affecting | affecting_columns(W * values)
+
+
+def _warn_of_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
+    lengths = _column_lengths(W)
     small = np.flatnonzero((lengths > 0) & ~affecting)
     if small.size:
         largest = int(np.argmax(lengths))
@@ -60,16 +76,22 @@ def _remark_on_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[s
             f"{small.size} columns of the observation matrix count as zero beside {names[largest]}, "
             f"which is up to {lengths[largest] / lengths[small].min():.2g} times longer: "
             f"{', '.join(names[k] for k in small[:5])}{', ...' if small.size > 5 else ''}; give that "
-            "parameter another unit if they matter",
+            "parameter another unit, or the samples /parameters/values, if they matter",
             ParamreduceWarning,
             stacklevel=2,
         )
 
 
 def selection_problem(
-    factor: FloatArray, model: Model | None, grouped: GroupedColumns
+    factor: FloatArray, model: Model | None, grouped: GroupedColumns, values: FloatArray | None
 ) -> SelectionProblem:
-    """The least-squares problem behind a triangular factor of [W | chi].
+    """Return the least-squares problem behind a triangular factor of [W | chi].
+
+    Args:
+        factor: Triangular factor of the weighted [W | chi], (n + 1, n + 1).
+        model: Model that says which parameters have an effect; without one the columns' lengths say that.
+        grouped: Columns among which is chosen.
+        values: Values of the standard parameters where these are known, (n_standard,).
 
     Raises:
         DataError: There is nothing to choose from, or nothing to explain.
@@ -79,12 +101,16 @@ def selection_problem(
     if not np.any(chi):
         raise DataError("the torques of the estimation set are all zero: nothing to explain.")
     _check_sizes("torques", chi)
+    certifiable = True
     if model is not None:
         affecting = model.affecting @ grouped.columns.expansion > 0
     else:
-        affecting = affecting_columns(W)
-        _remark_on_small_columns(W, affecting, grouped.columns.names)
+        known = values if not grouped.columns.tied else None
+        affecting = _affecting_columns(W, known)
+        _warn_of_small_columns(W, affecting, grouped.columns.names)
+        lengths = _column_lengths(W)
+        certifiable = not np.any(lengths[~affecting] > _ROUND_OFF * lengths.max())
     candidates = np.flatnonzero(affecting)
     if candidates.size == 0:
         raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
-    return SelectionProblem(W, chi, candidates, grouped.preference, grouped.groups)
+    return SelectionProblem(W, chi, candidates, grouped.preference, grouped.groups, certifiable)

@@ -10,7 +10,6 @@ from paramreduce_cli.records import (
     ErrorRange,
     Identification,
     MeasuredLog,
-    ProofStatus,
     SelectionMethod,
     TermReduction,
     Trajectories,
@@ -162,10 +161,9 @@ def _selection(data: ReportData) -> Iterator[str]:
         yield "Those selected by acceleration (@acceleration) are fitted to the accelerations instead."
     proofs = data.reduction.proofs
     if proofs is not None:
-        proven = sum(status is ProofStatus.OPTIMAL for status in proofs.status)
         yield (
             "A branch-and-bound search [Furnival1974], with bounds and rules of its own, proved the best subset by torque "
-            f"error for {proven} of {proofs.n.size} sizes."
+            f"error for {proofs.n_proven} of {proofs.n_provable} sizes up to the rank."
         )
     if data.validation.cross_validation:
         yield "The size was chosen by cross-validation inside the estimation set with the one-standard-error rule [Hastie2009]."

@@ -77,7 +77,7 @@ def reduce(
     grouped = selection_columns(reduction, samples)
     columns = grouped.columns
     factor = merged_factor(combined_factor(samples.estimation.factors(), weights), columns)
-    problem = selection_problem(factor, model, grouped)
+    problem = selection_problem(factor, model, grouped, samples.values)
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
         raise DataError(
@@ -218,10 +218,10 @@ def _criterion_inputs(
 
 def _remark_on_proofs(proofs: Proofs | None, share: Share) -> None:
     """Say what is not proven."""
-    if not share.whole or proofs is None or set(proofs.status) == {ProofStatus.OPTIMAL}:
+    if not share.whole or proofs is None or proofs.n_proven == proofs.n_provable:
         return
     counts = {status: proofs.status.count(status) for status in ProofStatus}
-    text = f"best-subset: {counts[ProofStatus.OPTIMAL]} of {proofs.n.size} sizes are proven"
+    text = f"best-subset: {proofs.n_proven} of {proofs.n_provable} sizes are proven"
     if counts[ProofStatus.BEST_FOUND]:
         text += (
             f", {counts[ProofStatus.BEST_FOUND]} are the best found so far, with lower bounds; `paramreduce "
@@ -230,7 +230,7 @@ def _remark_on_proofs(proofs: Proofs | None, share: Share) -> None:
     if counts[ProofStatus.UNCERTIFIED]:
         text += (
             f", {counts[ProofStatus.UNCERTIFIED]} cannot be certified in double precision, because columns "
-            "are nearly dependent"
+            "are nearly dependent or differ too much in size"
         )
     warnings.warn(text, ParamreduceWarning, stacklevel=2)
 

@@ -397,7 +397,7 @@ def _cross_validation(
         (factor(np.delete(factors, k, axis=0)), factor(factors[k : k + 1]))
         for k in range(len(factors))
     ]
-    problem = selection_problem(reduction.factor, model, grouped)
+    problem = selection_problem(reduction.factor, model, grouped, samples.values)
     quick = replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
     found = {}
     for k, (name, heuristic) in enumerate(methods.items()):
@@ -432,7 +432,7 @@ def _stability(
     """The selection repeated by torque with each trajectory left out and with fewer samples."""
     grouped = selection_columns(search, samples)
     weights = reduction.nominal_torque
-    problem = selection_problem(reduction.factor, model, grouped)
+    problem = selection_problem(reduction.factor, model, grouped, samples.values)
     quick = replace(effort(search, run), node_limit=_NODES)
     heuristic = SelectionMethod.parse(selected.heuristic).heuristic
 

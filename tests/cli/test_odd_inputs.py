@@ -179,6 +179,23 @@ def test_columns_that_count_as_zero_are_named(invoke, brought):
         assert "1 columns of the observation matrix count as zero" in done.err
 
 
+@pytest.mark.parametrize("size", [1e-12, 1e12])
+def test_columns_far_apart_are_not_proven_unless_values_say_what_they_contribute(
+    invoke, brought, tmp_path, size
+):
+    def statuses():
+        with h5py.File(tmp_path / "r" / "reduction.h5") as file:
+            return set(file["proofs/status"].asstr()[:])
+
+    scales = np.array([1, 1, size, 1, 1])
+    invoke(*brought(W * scales, TAU))
+    assert statuses() == {"uncertified"}
+    invoke(
+        *brought(W * scales, TAU, [("parameters/values", np.arange(1.0, 6) / scales)]), "--force"
+    )
+    assert statuses() == {"optimal"}
+
+
 def test_links_out_of_a_file_are_not_followed(invoke, brought, tmp_path):
     with h5py.File(tmp_path / "other.h5", "w") as file:
         file["W"] = W

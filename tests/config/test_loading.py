@@ -225,3 +225,10 @@ def test_nothing_in_a_config_raises_anything_but_a_config_error(write_config, ke
 def test_words_may_be_listed_with_commas(listed):
     config = config_of("two_link", f"report.formats={listed}")
     assert config.report.formats == ["pdf", "png"]
+
+
+@pytest.mark.parametrize(("counts", "expected"), [("", 0), ("  test_count: 4\n", 4)])
+def test_a_recorded_test_set_needs_no_test_trajectories(write_config, counts, expected):
+    recorded = "sampling:\n  test_file: test.csv\n\nselected:"
+    path = write_config(("  test_count: 4\n", counts), ("selected:", recorded))
+    assert load_config(path).trajectories.test_count == expected

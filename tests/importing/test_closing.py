@@ -353,3 +353,15 @@ def test_lists_for_all_coordinates_are_cut_to_the_independent_ones(tmp_path, inv
             code=2,
         ).err
     )
+
+
+@pytest.mark.parametrize(("upper", "kept"), [(3, True), (0.25, False)])
+def test_limits_of_dependent_joints_become_constraints_unless_the_guess_is_outside(
+    invoke, tmp_path, upper, kept
+):
+    text = delta(0).replace('upper="3"', f'upper="{upper}"')
+    said, output, _ = init(invoke, tmp_path, text, *CLOSE)
+    constraints = {c.name: (c.min, c.max) for c in load_config(output).trajectories.constraints}
+    assert constraints["tilt1"] == (-3, upper)
+    assert ("tilt0" in constraints) == kept
+    assert ("the guess lies outside the limits" in " ".join(said.split())) != kept

@@ -62,7 +62,19 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     if set(named) != set(independent):
         text = f"independent coordinates, which determine all others: {', '.join(own)}"
         remarks = (*remarks, f"{text}; --independent JOINT chooses others")
-    return replace(robot, independent=own, guess=guess, remarks=remarks)
+    closed = replace(robot, independent=own, guess=guess)
+    outside = [
+        f"{name} ({joint.lower:.4g} to {joint.upper:.4g})"
+        for name, joint in closed.dependent_limits().items()
+        if not joint.allows(guess.get(name, 0.0))
+    ]
+    if outside:
+        remarks = (
+            *remarks,
+            f"the guess lies outside the limits that the file gives {', '.join(outside)}; trajectories do not keep to "
+            "these limits. Give another guess, or add constraints by hand",
+        )
+    return replace(closed, remarks=remarks)
 
 
 def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:

@@ -69,7 +69,12 @@ def _where_all_stand(shares: Sequence[Proofs], row: int) -> IntArray:
 
 def _of_all(found: Sequence[ProofStatus]) -> ProofStatus:
     """What is proven where every share must be."""
-    order = (ProofStatus.UNCERTIFIED, ProofStatus.BEST_FOUND, ProofStatus.OPTIMAL)
+    order = (
+        ProofStatus.UNCERTIFIED,
+        ProofStatus.BEST_FOUND,
+        ProofStatus.OPTIMAL,
+        ProofStatus.BEYOND_RANK,
+    )
     return min(found, key=order.index)
 
 

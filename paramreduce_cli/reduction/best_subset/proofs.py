@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import (
@@ -266,7 +267,12 @@ class ProofSearch:
         list(pool.map(work, self._open()))
 
     def _certain(self, search: PartedSearch) -> bool:
-        return self._problem.certifiable and not search.doubtful
+        clear = self._objective.problem.certifiable and self._problem.certifiable
+        return clear and not search.doubtful
+
+    def _rank(self) -> int:
+        problem = self._objective.problem
+        return len(independent_columns(problem.W, problem.candidates_by_preference))
 
     def _take_over(self, proof: _Proof, search: PartedSearch) -> None:
         """Note how far a search has come."""
@@ -318,13 +324,19 @@ class ProofSearch:
     def record(self) -> Proofs:
         """All proofs by size."""
         proofs = [self._proofs[n] for n in sorted(self._proofs)]
+        rank = self._rank()
+
+        def status(proof: _Proof) -> ProofStatus:
+            done = proof.status == ProofStatus.OPTIMAL and proof.n > rank
+            return ProofStatus.BEYOND_RANK if done else proof.status
+
         return Proofs(
             units=tuple(self._objective.units),
             n=np.array([p.n for p in proofs]),
             subsets=tuple(self._problem.columns[p.subset] for p in proofs),
             torque_error=np.sqrt([p.squared_error for p in proofs]),
             lower_bound=np.sqrt([p.squared_bound for p in proofs]),
-            status=tuple(p.status for p in proofs),
+            status=tuple(map(status, proofs)),
             seconds=np.array([p.seconds for p in proofs]),
             nodes=np.array([p.nodes for p in proofs], dtype=np.int64),
             logs=tuple(p.log for p in proofs),

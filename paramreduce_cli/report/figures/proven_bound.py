@@ -3,7 +3,7 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from paramreduce_cli.records import ProofStatus, SelectionMethod
+from paramreduce_cli.records import SelectionMethod
 from paramreduce_cli.report.curves import curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
@@ -43,9 +43,8 @@ def proven_bound(data: ReportData) -> Figure:
         )  # fmt: skip
     axes.set_yscale("log")
     axes.set_ylim(bottom=floor)
-    unproven = [status is not ProofStatus.OPTIMAL for status in proofs.status]
     axes.set_title(
-        f"optimal for {len(unproven) - sum(unproven)} of {len(unproven)} sizes",
+        f"optimal for {proofs.n_proven} of {proofs.n_provable} sizes up to the rank",
         fontsize="medium",
         loc="left",
     )

@@ -17,11 +17,8 @@ def proofs(data: ReportData) -> Table:
     rows = []
     for k, n in enumerate(found.n):
         error, bound = float(found.torque_error[k]), float(found.lower_bound[k])
-        gap = (
-            "0"
-            if found.status[k] is ProofStatus.OPTIMAL
-            else share(1 - bound / error if error else 0.0)
-        )
+        closed = found.status[k] in (ProofStatus.OPTIMAL, ProofStatus.BEYOND_RANK)
+        gap = "0" if closed else share(1 - bound / error if error else 0.0)
         rows.append(
             (
                 str(n), share(error), share(bound), gap, str(found.status[k]),
