@@ -7,7 +7,7 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import is_section, section
 from paramreduce_cli.pipeline import Stage, maker_of
-from paramreduce_cli.records import UNSHARED, WHOLE, Run, Share, Shares, Tell
+from paramreduce_cli.records import Items, Run, Tell
 from paramreduce_cli.taken import OUTSIDE, Inputs, called
 
 
@@ -27,7 +27,7 @@ def made_in_memory(
         ParamreduceError: It fails.
     """
     inputs = Inputs(config if isinstance(config, Config) else None)
-    lent: dict[Any, Any] = {Run: run, Tell: run.progress, Share: WHOLE, Shares: UNSHARED, **records}
+    lent: dict[Any, Any] = {Run: run, Tell: run.progress, Items: Items(), **records}
     arguments: dict[str, Any] = {}
     for entry in stage.inputs:
         if is_section(entry.type):

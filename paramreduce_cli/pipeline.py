@@ -15,6 +15,7 @@ from paramreduce_cli.config.sections import has_default, is_section
 from paramreduce_cli.records import (
     Coefficients,
     Identification,
+    Items,
     MeasuredLog,
     RawLogs,
     Recordings,
@@ -22,7 +23,7 @@ from paramreduce_cli.records import (
     Report,
     Run,
     Samples,
-    Share,
+    Tell,
     TermReduction,
     Trajectories,
     Validation,
@@ -31,6 +32,8 @@ from paramreduce_cli.stages import stages
 from paramreduce_cli.stages.process_log import no_log
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
+LENT: tuple[Any, ...] = (Run, Tell, Items)
+"""Types of what the caller lends a stage, beside what the stage has made before."""
 
 
 @dataclass(frozen=True)
@@ -73,9 +76,9 @@ class Stage:
         return next((entry for entry in self.inputs if entry.type is Run), None)
 
     @property
-    def in_shares(self) -> bool:
-        """Whether it can be done as several jobs."""
-        return any(entry.type is Share for entry in self.inputs)
+    def has_items(self) -> bool:
+        """Whether several jobs can do its items."""
+        return any(entry.type is Items for entry in self.inputs)
 
     @property
     def needs_config(self) -> bool:

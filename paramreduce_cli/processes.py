@@ -1,4 +1,4 @@
-"""Work in other processes, which end with their parent and leave interruptions to it."""
+"""Worker processes, which end with their parent and leave interruptions to it."""
 
 import contextlib
 import multiprocessing
@@ -11,12 +11,80 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from multiprocessing.context import BaseContext
-from typing import Any, TypeVar
+from typing import Any, Generic, TypeVar
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 
+State = TypeVar("State")
 Item = TypeVar("Item")
 Result = TypeVar("Result")
+
+
+class WorkerPool(Generic[State]):
+    """Workers that each hold the same state: other processes, or this one.
+
+    Args:
+        state: Returns the state; called where this process itself works.
+        processes: Other processes, which hold the state; None to work in this process.
+    """
+
+    def __init__(self, state: Callable[[], State], processes: ProcessPoolExecutor | None) -> None:
+        self._state, self._processes = state, processes
+
+    def as_done(
+        self, work: Callable[[State, Item], Result], items: Iterable[Item]
+    ) -> Iterator[tuple[Item, Result]]:
+        """Work on items.
+
+        Args:
+            work: Called with the state and an item; picklable.
+            items: Picklable items.
+
+        Yields:
+            Each item with its result, in the order in which they are done.
+
+        Raises:
+            DataError: A process died.
+        """
+        if self._processes is None:
+            state = self._state()
+            for item in items:
+                yield item, work(state, item)
+            return
+        try:
+            with _interruption_held():  # so that new processes are born without it
+                futures = {self._processes.submit(_work_on, work, item): item for item in items}
+            for future in as_completed(futures):
+                yield futures[future], future.result()
+        except BrokenProcessPool as error:
+            raise DataError(
+                "a worker process died, for want of memory, or because a script asks for jobs outside of "
+                '`if __name__ == "__main__":`, which each of them runs again. Run it again, with fewer jobs.'
+            ) from error
+
+
+@contextlib.contextmanager
+def worker_pool(jobs: int, state: Callable[[], State]) -> Iterator[WorkerPool[State]]:
+    """Start worker processes, which ignore Ctrl-C; this process stops them, however it ends.
+
+    Args:
+        jobs: Number of processes; below 2 all work is done in this process.
+        state: Returns what the work on every item needs; picklable. Each process calls it once.
+    """
+    if jobs < 2:
+        yield WorkerPool(state, None)
+        return
+    others = set(multiprocessing.active_children())
+    environment = dict(os.environ)  # the server of processes keeps the one that it was started in
+    processes = ProcessPoolExecutor(jobs, process_context(), _begin, (environment, state))
+    try:
+        yield WorkerPool(state, processes)
+        processes.shutdown()
+    except BaseException:
+        processes.shutdown(wait=False, cancel_futures=True)
+        for process in set(multiprocessing.active_children()) - others:
+            process.terminate()
+        raise
 
 
 def process_context() -> BaseContext:
@@ -34,53 +102,6 @@ def process_context() -> BaseContext:
 
 
 @contextlib.contextmanager
-def workers(
-    jobs: int, start: Callable[..., None], *arguments: Any
-) -> Iterator[ProcessPoolExecutor]:
-    """Start processes that ignore Ctrl-C; their parent stops them, however the parent ends.
-
-    Args:
-        jobs: How many processes.
-        start: Function that each process calls when it begins.
-        arguments: Arguments of ``start``.
-    """
-    others = set(multiprocessing.active_children())
-    environment = dict(os.environ)  # the server of processes keeps the one that it was started in
-    pool = ProcessPoolExecutor(jobs, process_context(), _begin, (environment, start, arguments))
-    try:
-        yield pool
-        pool.shutdown()
-    except BaseException:
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in set(multiprocessing.active_children()) - others:
-            process.terminate()
-        raise
-
-
-def as_done(
-    pool: ProcessPoolExecutor, work: Callable[[Item], Result], items: Iterable[Item]
-) -> Iterator[tuple[Item, Result]]:
-    """Work on items in any order.
-
-    Yields:
-        Each item with its result, when it is done.
-
-    Raises:
-        DataError: A process died.
-    """
-    try:
-        with _interruption_held():  # so that new processes are born without it
-            futures = {pool.submit(work, item): item for item in items}
-        for future in as_completed(futures):
-            yield futures[future], future.result()
-    except BrokenProcessPool as error:
-        raise DataError(
-            "a worker process died, for want of memory, or because a script asks for jobs outside of "
-            '`if __name__ == "__main__":`, which each of them runs again. Run it again, with fewer jobs.'
-        ) from error
-
-
-@contextlib.contextmanager
 def _interruption_held() -> Iterator[None]:
     """Keep Ctrl-C waiting; processes started meanwhile never get it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
@@ -90,17 +111,25 @@ def _interruption_held() -> Iterator[None]:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _begin(
-    environment: dict[str, str], start: Callable[..., None], arguments: tuple[Any, ...]
-) -> None:
-    """Prepare a worker process, then call its ``start``."""
+class _Worker:
+    """What a worker process holds; set once when it begins."""
+
+    state: Any
+
+
+def _begin(environment: dict[str, str], state: Callable[[], Any]) -> None:
+    """Prepare a worker process, and make its state."""
     threading.Thread(target=_end_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.environ.clear()
     os.environ.update(environment)
     warnings.simplefilter("ignore", ParamreduceWarning)  # the parent has said it
-    start(*arguments)
+    _Worker.state = state()
+
+
+def _work_on(work: Callable[[Any, Item], Result], item: Item) -> Result:
+    return work(_Worker.state, item)
 
 
 def _end_with_parent() -> None:

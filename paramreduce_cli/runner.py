@@ -17,27 +17,25 @@ from typing import Any
 
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
-from paramreduce_cli.artifacts.incumbents import StoredIncumbents
-from paramreduce_cli.artifacts.parts import Parts, StoredShares
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
+from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.checks import remarks
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.pipeline import Stage, StageInput, maker_of, pipeline, stages_to_run
+from paramreduce_cli.pipeline import LENT, Stage, StageInput, maker_of, pipeline, stages_to_run
 from paramreduce_cli.records import (
-    UNSHARED,
     WHOLE,
+    Items,
+    Part,
+    PartFinished,
     Progress,
     Provenance,
     Report,
     Run,
     Samples,
-    Share,
-    Shares,
     Tell,
-    Trajectories,
 )
 from paramreduce_cli.taken import OUTSIDE, Inputs, called, noted_warnings
 
@@ -125,17 +123,15 @@ class Runner:
     """Whether Ctrl-C has ended a search of the stage at hand."""
 
     def run(
-        self, stage: Stage, *, force: bool = False, go_on: bool = False, share: Share = WHOLE
+        self, stage: Stage, *, force: bool = False, go_on: bool = False, part: Part = WHOLE
     ) -> Outcome:
-        """Run one stage, unless its artifact is up to date, or do a share of its work.
-
-        What is found of shares is put together where all of the work is asked for.
+        """Run one stage, unless its artifact is up to date, or do a part of its items.
 
         Args:
             stage: Which one.
-            force: Run it even so.
+            force: Run it even so, and do finished items again.
             go_on: Run it also where more time could make its artifact better.
-            share: What of it is to be done.
+            part: Items to be done; the artifact is made only where they are all items.
 
         Raises:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
@@ -144,95 +140,52 @@ class Runner:
         self._cut_short = False
         self.store.refuse_to_replace(stage.output, self._robot)
         self._look_at_inputs(stage)
-        if not share.whole:
-            return self._run_share(stage, share, force)
         previous = self._previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
         if not force and not better and self.is_current(stage):
-            self.store.touch(stage.output)
-            stamp = self.store.stamp(stage.output)
-            for text in stamp.warnings if stamp else ():  # still true of what was found
+            return self._current_outcome(stage, part)
+        started = time.perf_counter()
+        inputs = Inputs(self.config, self.progress)
+        lent_types = (*LENT, stage.output)
+        arguments = {
+            i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent_types
+        }
+        with noted_warnings() as warnings:
+
+            def stamp(seconds: float) -> Stamp:
+                return self._stamp(stage, inputs, seconds, warnings)
+
+            kept = StoredItems(path, stamp, from_start=force)
+            earlier = kept.stamps() if part.is_whole else []
+            said = dict.fromkeys(text for one in earlier for text in one.warnings)
+            for text in said:
                 self.remark(text)
-            return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
-        started = time.perf_counter()
-        inputs = Inputs(self.config, self.progress)
-        arguments = self._arguments(stage, inputs)
-        unchanged = frozenset() if force or previous is None else self._unchanged(stage, inputs)
-        parts = self._lend_run(stage, arguments, inputs, unchanged)
-        shares = StoredShares(path)
-        found, before, said = ((), 0.0, ()) if force else self._shares(stage, inputs, shares)
-        for text in said:
-            self.remark(text)
-        self._hand(
-            stage,
-            arguments,
-            {Tell: self.progress, stage.output: previous, Share: WHOLE, Shares: Shares(found)},
-        )
-        with noted_warnings() as warnings:
-            record = called(stage, arguments)
+            unchanged = self._unchanged(stage, inputs) if previous and not force else frozenset()
+            run = Run(self.jobs, self.progress, self._cut, unchanged)
+            lent = {Run: run, Tell: self.progress, Items: Items(kept, part), stage.output: previous}
+            arguments |= {i.name: lent[i.type] for i in stage.inputs if i.type in lent}
+            try:
+                record = called(stage, arguments)
+            except PartFinished:
+                seconds = time.perf_counter() - started
+                return Outcome(stage.name, path, not kept.written, seconds)
         self.check()
+        seconds = time.perf_counter() - started
+        total = seconds + sum(one.seconds for one in earlier)
         texts = tuple(dict.fromkeys([*said, *warnings]))
-        self.store.save(record, self._stamp(stage, inputs, started - before, texts))
-        if parts is not None:
-            parts.clear()
-        shares.clear()
+        self.store.save(record, self._stamp(stage, inputs, total, texts))
+        kept.clear()
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 
-    def _run_share(self, stage: Stage, share: Share, force: bool) -> Outcome:
-        """Do a share of a stage's work, unless that is done."""
-        started = time.perf_counter()
-        shares = StoredShares(self.store.path(stage.output))
-        inputs = Inputs(self.config)
-        inputs.digests |= self._input_digests(stage)
-        path = shares.path(share)
-        stamp = self._stamp(stage, inputs, started)
-        if not force and (self.is_current(stage) or shares.is_finished(share, stamp)):
-            return Outcome(stage.name, path, True, 0.0)
-        inputs = Inputs(self.config, self.progress)
-        arguments = self._arguments(stage, inputs)
-        told = StoredIncumbents(shares.folder, stamp)
-        self._lend_run(stage, arguments, inputs, incumbents=told)
-        previous = None
-        if stage.previous is not None and not force and shares.is_usable(share, stamp):
-            previous = load_file(path, stage.output, self._robot, stage.name)[0]
-        self._hand(
-            stage,
-            arguments,
-            {Tell: self.progress, stage.output: previous, Share: share, Shares: UNSHARED},
-        )
-        with noted_warnings() as warnings:
-            record = called(stage, arguments)
-        self.check()
-        self.store.save(record, self._stamp(stage, inputs, started, warnings), path)
-        return Outcome(stage.name, path, False, time.perf_counter() - started, record)
-
-    def _arguments(self, stage: Stage, inputs: Inputs) -> dict[str, Any]:
-        """What a stage takes from the config and from files, by name."""
-        lent = (Run, Tell, stage.output, Share, Shares)
-        return {i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent}
-
-    def _hand(self, stage: Stage, arguments: dict[str, Any], values: dict[Any, Any]) -> None:
-        """Add what is lent, by its type, where the stage asks for it."""
-        arguments |= {e.name: values[e.type] for e in stage.inputs if e.type in values}
-
-    def _shares(
-        self, stage: Stage, inputs: Inputs, shares: StoredShares
-    ) -> tuple[tuple[Any, ...], float, tuple[str, ...]]:
-        """Records of all shares of a stage that were made from the same, the seconds that all took, and their warnings.
-
-        None where it is done as a whole.
-        """
-        if not stage.in_shares:
-            return (), 0.0, ()
-        command = f"{stage.name} {self.asked}".rstrip()
-        if self.samples is not None:
-            command += f" --samples {shlex.quote(str(self.samples))}"
-        paths = shares.found(self._stamp(stage, inputs, time.perf_counter()), command)
-        loaded = [load_file(path, stage.output, self._robot, stage.name) for path in paths]
-        stamps = [stamp for _, stamp in loaded if stamp is not None]
-        said = dict.fromkeys(text for stamp in stamps for text in stamp.warnings)
-        seconds = sum(stamp.seconds for stamp in stamps)
-        return tuple(record for record, _ in loaded), seconds, tuple(said)
+    def _current_outcome(self, stage: Stage, part: Part) -> Outcome:
+        """Say again what is still true of an artifact that is up to date."""
+        path = self.store.path(stage.output)
+        stamp = self.store.stamp(stage.output)
+        if part.is_whole:
+            self.store.touch(stage.output)
+            for text in stamp.warnings if stamp else ():
+                self.remark(text)
+        return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""
@@ -376,39 +329,12 @@ class Runner:
             if found is not None and name in stamp.inputs and found.digest != stamp.inputs[name]
         ]
 
-    def _lend_run(
-        self,
-        stage: Stage,
-        arguments: dict[str, Any],
-        inputs: Inputs,
-        unchanged: frozenset[str] = frozenset(),
-        incumbents: StoredIncumbents | None = None,
-    ) -> Parts | None:
-        """Hand workers, finished parts, what other jobs have found and progress to a stage that asks for them."""
-        if stage.lends_run is None:
-            return None
-        parts = None
-        if stage.output is Trajectories:
-            # A part may be used again only if nothing that could change it has changed.
-            path = self.store.path(stage.output)
-            stamp = self._stamp(stage, inputs, time.perf_counter())
-            parts = Parts(path.with_name(f"{path.name}.parts"), stamp)
-        arguments[stage.lends_run.name] = Run(
-            jobs=self.jobs,
-            parts={} if parts is None else parts,
-            incumbents={} if incumbents is None else incumbents,
-            progress=self.progress,
-            interrupted=self._cut,
-            unchanged=unchanged,
-        )
-        return parts
-
     def _cut(self) -> None:
         self.interrupted()
         self._cut_short = True
 
     def _stamp(
-        self, stage: Stage, inputs: Inputs, started: float, warnings: Sequence[str] = ()
+        self, stage: Stage, inputs: Inputs, seconds: float, warnings: Sequence[str] = ()
     ) -> Stamp:
         sections: dict[str, str] = {}
         seeds = []
@@ -424,7 +350,7 @@ class Runner:
             sections=sections,
             inputs=dict(inputs.digests),
             seed=next((seed for seed in seeds if seed is not None), 0),
-            seconds=time.perf_counter() - started,
+            seconds=seconds,
             cut_short=self._cut_short,
             config=self.config_name,
             warnings=tuple(warnings),

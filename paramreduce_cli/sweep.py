@@ -21,7 +21,7 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import unknown
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.pipeline import Stage, pipeline, stages_to_run
-from paramreduce_cli.records import PROVING, Reduction, Report, Samples, Share, Validation
+from paramreduce_cli.records import PROVING, Part, Reduction, Report, Samples, Validation
 
 _SEED = "trajectories.seed"
 """What a seed of the list sets."""
@@ -46,7 +46,7 @@ def _named(variants: dict[str, list[str]]) -> dict[str, list[str]]:
 
 
 def _known(parts: dict[str, int]) -> dict[str, int]:
-    names = [stage.name for stage in pipeline() if stage.in_shares]
+    names = [stage.name for stage in pipeline() if stage.has_items]
     for name in parts:
         if name not in names:
             raise ValueError(unknown("stage that is done in parts", name, names))
@@ -103,7 +103,7 @@ class SweepRun:
             return False
         if stage.output is Reduction and PROVING not in self.config.reduction.heuristics:
             return False
-        return stage.in_shares
+        return stage.has_items
 
     def file(self, stage: Stage) -> str:
         """What a stage makes."""
@@ -114,18 +114,18 @@ class SweepRun:
         read = {entry.type for entry in stage.artifacts}
         return [str(self.path), *(self.file(s) for s in self.stages if s.output in read)]
 
-    def command(self, stage: Stage, share: Share | None = None, jobs: str = "") -> str:
-        """What does a stage of it, or a share of that, at the shell.
+    def command(self, stage: Stage, part: Part | None = None, jobs: str = "") -> str:
+        """What does a stage of it, or a part of that, at the shell.
 
         Args:
             stage: Which one.
-            share: Which part; all of the stage if None.
+            part: Which part; all of the stage if None.
             jobs: How many processes it may have, for stages that take more than one.
         """
         words = [sys.executable, "-m", "paramreduce_cli", stage.name, str(self.path)]
         words += ["--results", str(self.folder)]
         words += [word for text in self.overrides for word in ("--set", text)]
-        words += ["--part", str(share)] if share is not None else []
+        words += ["--part", str(part)] if part is not None else []
         text = shlex.join([*words, "--quiet", "--wait"])
         if stage.lends_run is not None and jobs:
             text += f" --jobs {jobs}"
@@ -152,10 +152,10 @@ class Sweep:
         words = [sys.executable, "-m", "paramreduce_cli", "table", "--sweep", str(self.path)]
         return shlex.join([*words, "--output", str(self.folder / "table")])
 
-    def shares(self, stage: Stage, run: SweepRun) -> list[Share]:
+    def parts_of(self, stage: Stage, run: SweepRun) -> list[Part]:
         """The jobs that a stage of a run is done as; none where it is one."""
         count = self.parts.get(stage.name, 1) if run.divides(stage) else 1
-        return [Share(number, count) for number in range(1, count + 1)] if count > 1 else []
+        return [Part(number, count) for number in range(1, count + 1)] if count > 1 else []
 
     def phases(self, jobs: str) -> list[list[str]]:
         """Commands that can run side by side, in phases of which each waits for the one before.
@@ -177,9 +177,9 @@ class Sweep:
         for stage in pipeline():
             having = {name: run for name, run in self.runs.items() if stage in run.stages}
             parts = [
-                run.command(stage, share, "1")
+                run.command(stage, part, "1")
                 for run in having.values()
-                for share in self.shares(stage, run)
+                for part in self.parts_of(stage, run)
             ]
             if parts:
                 close()

@@ -26,7 +26,7 @@ LAYERS = [
     {"importing"},
     {"config"},
     {"robots"},
-    {"fields"},
+    {"fields", "item_completion"},
     {"records"},
     {"registry", "texts", "processes", "scratch"},
     {"errors"},

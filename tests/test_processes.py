@@ -1,27 +1,32 @@
 """Work in other processes."""
 
-import operator
 import os
 import signal
-import time
+from functools import partial
 
 import pytest
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import worker_pool
 
 
-def test_each_item_comes_with_its_result():
-    with workers(2, time.sleep, 0) as pool:
-        assert dict(as_done(pool, operator.neg, range(5))) == {k: -k for k in range(5)}
+@pytest.mark.parametrize("jobs", [1, 2])
+def test_each_item_comes_with_its_result(jobs):
+    with worker_pool(jobs, partial(int, "3")) as pool:
+        assert dict(pool.as_done(pow, range(5))) == {k: 3**k for k in range(5)}
+        assert dict(pool.as_done(divmod, [2])) == {2: (1, 1)}
+
+
+def end_process(_, status):
+    os._exit(status)
 
 
 @pytest.mark.parametrize("between", [False, True])
 def test_a_process_that_dies_is_said_whenever_it_does(between):
-    with workers(1, time.sleep, 0) as pool:
-        assert list(as_done(pool, operator.neg, [1])) == [(1, -1)]
+    with worker_pool(2, partial(int, "3")) as pool:
+        assert dict(pool.as_done(pow, range(50))) == {k: 3**k for k in range(50)}
         if between:
-            for number in pool._processes:
+            for number in pool._processes._processes:
                 os.kill(number, signal.SIGKILL)
         with pytest.raises(DataError, match="a worker process died"):
-            list(as_done(pool, operator.neg if between else os._exit, range(100)))
+            list(pool.as_done(pow if between else end_process, range(100)))

@@ -10,7 +10,7 @@ from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.cli.terminal import Interruption
 from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
 from paramreduce_cli.pipeline import pipeline, stages_to_run
-from paramreduce_cli.records import Reduction, Share
+from paramreduce_cli.records import Part, Reduction
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.runner import Runner
 
@@ -116,7 +116,7 @@ def test_what_a_stage_has_warned_of_is_said_again_when_it_is_up_to_date(two_link
 
 def test_a_share_that_ctrl_c_cut_short_is_gone_on_with(two_link_copy, monkeypatch):
     (two_link_copy / "reduction.h5").unlink()
-    runner, share = Runner(config_of("two_link"), Store(two_link_copy)), Share(1, 2)
+    runner, share = Runner(config_of("two_link"), Store(two_link_copy)), Part(1, 2)
 
     def ended(*_):
         raise KeyboardInterrupt
@@ -124,9 +124,9 @@ def test_a_share_that_ctrl_c_cut_short_is_gone_on_with(two_link_copy, monkeypatc
     with monkeypatch.context() as patch, warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)
         patch.setattr(ProofSearch, "_round", ended)
-        assert not runner.run(STAGES["reduce"], share=share).current
-    assert not runner.run(STAGES["reduce"], share=share).current
-    assert runner.run(STAGES["reduce"], share=share).current
+        assert not runner.run(STAGES["reduce"], part=share).current
+    assert not runner.run(STAGES["reduce"], part=share).current
+    assert runner.run(STAGES["reduce"], part=share).current
 
 
 def test_what_a_swallowed_interruption_may_have_spoilt_is_not_written(two_link_copy, monkeypatch):

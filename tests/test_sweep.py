@@ -11,7 +11,7 @@ from simulated_logs import log_config
 from paramreduce_cli import workflow
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.pipeline import pipeline
-from paramreduce_cli.records import Share
+from paramreduce_cli.records import Part
 from paramreduce_cli.sweep import Sweep, load_sweep
 from paramreduce_cli.workflow import slurm_script
 
@@ -44,9 +44,9 @@ def test_every_robot_with_every_seed_and_every_variant(tmp_path):
     assert run.config.trajectories.points == 200
     assert run.folder == tmp_path / "here" / "two_link-5-long"
     assert (run.seed, run.variant) == (5, "long")
-    assert sweep.shares(STAGES["reduce"], run) == [Share(1, 3), Share(2, 3), Share(3, 3)]
-    assert sweep.shares(STAGES["sample"], run) == []
-    assert sweep.shares(STAGES["validate"], run) == []
+    assert sweep.parts_of(STAGES["reduce"], run) == [Part(1, 3), Part(2, 3), Part(3, 3)]
+    assert sweep.parts_of(STAGES["sample"], run) == []
+    assert sweep.parts_of(STAGES["validate"], run) == []
 
 
 def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
@@ -56,8 +56,8 @@ def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
     )
     sweep = load_sweep(listed(tmp_path, text))
     proven, swapped = sweep.runs.values()
-    assert len(sweep.shares(STAGES["reduce"], proven)) == 2
-    assert sweep.shares(STAGES["reduce"], swapped) == []
+    assert len(sweep.parts_of(STAGES["reduce"], proven)) == 2
+    assert sweep.parts_of(STAGES["reduce"], swapped) == []
     assert (
         sum(
             " reduce " in line and "--part" in line for lines in sweep.phases("1") for line in lines
@@ -66,14 +66,14 @@ def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
     )
     log_config(tmp_path)
     logged = load_sweep(listed(tmp_path, "robots: [arm.yaml]\nparts: {sample: 2}\n"))
-    assert logged.shares(STAGES["sample"], logged.runs["arm"]) == []
+    assert logged.parts_of(STAGES["sample"], logged.runs["arm"]) == []
 
 
 def test_commands_are_those_of_the_shell(tmp_path):
     config = CONFIGS / "two_link.yaml"
     sweep = load_sweep(listed(tmp_path, f"robots: [{config}]\nresults: r\n"))
     (run,) = sweep.runs.values()
-    text = run.command(STAGES["reduce"], Share(2, 3), jobs="4")
+    text = run.command(STAGES["reduce"], Part(2, 3), jobs="4")
     words = shlex.split(text)
     assert words[2:4] == ["paramreduce_cli", "reduce"]
     assert words[-4:] == ["--quiet", "--wait", "--jobs", "4"]

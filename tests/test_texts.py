@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from paramreduce_cli.texts import format_share_range
+from paramreduce_cli.texts import format_percent_range
 from paramreduce_cli.texts.measured import measured
 
 
@@ -45,4 +45,4 @@ def test_what_is_left_out_is_far_less_than_the_deviation(value, deviation):
     ],
 )
 def test_ranges_of_errors(errors, text):
-    assert format_share_range(*errors) == text
+    assert format_percent_range(*errors) == text

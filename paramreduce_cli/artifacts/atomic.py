@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.places import SHARES
+from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.errors import ArtifactError
 
 
@@ -73,7 +73,7 @@ def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
     for path in folder.rglob(".*.tmp"):
         # Shares of a stage may be at work on other machines.
-        shared = path.parent.suffix == SHARES
+        shared = path.parent.suffix == ITEMS
         if _LEFT.fullmatch(path.name) and not (shared and _may_be_written(path)):
             path.unlink(missing_ok=True)
 

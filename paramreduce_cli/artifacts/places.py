@@ -1,5 +1,5 @@
 """Where things are below a results folder."""
 
 SUMMARY = "report/summary.json"
-SHARES = ".parts"
-"""Ending of folders with parts of an artifact that is not whole yet."""
+ITEMS = ".items"
+"""Ending of folders with finished items of an artifact that is not whole yet."""

@@ -16,7 +16,7 @@ import numpy as np
 
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
-from paramreduce_cli.artifacts.places import SHARES
+from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
@@ -159,7 +159,7 @@ class StoredSet:
             ArtifactError: It is not next to the file.
         """
         path = self._path.with_name(_MODEL)
-        if self._path.parent.suffix == SHARES:
+        if self._path.parent.suffix == ITEMS:
             path = self._path.parent.with_name(_MODEL)
         own = read_stamp(self._path)
         with reading(
@@ -254,13 +254,10 @@ def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
 def load_samples(reader: Reader) -> Samples:
     """samples.h5, the project's own or one that a user brings."""
     own = reader.attribute("stage") == "sample"
-    if own and _is_empty(reader, "estimation"):  # of a share that had nothing to do
-        n = len(reader.texts("parameters/names"))
-    else:
-        W = _matrix_shape(reader, "estimation")
-        if len(W) != 2:
-            raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
-        n = W[1]
+    W = _matrix_shape(reader, "estimation")
+    if len(W) != 2:
+        raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
+    n = W[1]
     if "parameters/names" in reader:
         names = reader.texts("parameters/names")
         if len(names) != n or len(set(names)) != n:
@@ -274,7 +271,7 @@ def load_samples(reader: Reader) -> Samples:
     def stored(name: str) -> SampleSet | None:
         if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader:
             return StoredSet(reader.path, name, n, own=own)
-        return JoinedSet([]) if own and _is_empty(reader, name) else None
+        return None
 
     estimation = stored("estimation")
     assert estimation is not None
@@ -296,10 +293,9 @@ def load_samples(reader: Reader) -> Samples:
     )
 
 
-def _is_empty(reader: Reader, name: str) -> bool:
-    """Whether a set was written without any sample."""
-    known = f"{name}/factors"
-    return known in reader and reader.array(known).size == 0
+def load_item_set(reader: Reader, name: str) -> StoredSet:
+    """Return a set that the project wrote by itself."""
+    return StoredSet(reader.path, name, _matrix_shape(reader, name)[1], own=True)
 
 
 def _matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from paramreduce_cli.cli.here import configs_in, has_report, project_above, results_of
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 
 _MOST = 8
 """Robots that are listed."""
@@ -87,11 +87,13 @@ def _said_of(results: Path) -> str:
         selected, measured = summary["selected"], summary["identification"]
         if measured is None:
             errors = {part: selected["torque_error"][part] for part in ("estimation", "validation")}
-            told = ", ".join(f"{share(e)} ({part})" for part, e in errors.items() if e is not None)
+            told = ", ".join(
+                f"{format_percent(e)} ({part})" for part, e in errors.items() if e is not None
+            )
             if test := selected["torque_error"].get("test"):
-                told += f", {format_share_range(**test)} (test)"
+                told += f", {format_percent_range(**test)} (test)"
         else:
-            told = f"{share(measured['reduced']['held_out'])} of the measured torques, held out"
+            told = f"{format_percent(measured['reduced']['held_out'])} of the measured torques, held out"
     except (ArtifactError, KeyError, TypeError) as problem:
         return f"its report cannot be read ({problem})"
     return f"{selected['heuristic']} with {selected['n']} parameters, torque error {told}"

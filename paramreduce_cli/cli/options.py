@@ -9,7 +9,7 @@ import click
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.records import Share
+from paramreduce_cli.records import Part
 
 CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
 OPTIONAL_CONFIG = click.argument(
@@ -32,24 +32,22 @@ JOBS = click.option(
 )  # fmt: skip
 
 
-class ShareType(click.ParamType):
-    """A share of a stage's work, such as 3/8."""
+class PartType(click.ParamType):
+    """A part of a stage's items, such as 3/8."""
 
     name = "i/N"
 
-    def convert(
-        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
-    ) -> Share:
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Part:
         """Read it."""
         try:
-            return Share.parse(str(value))
+            return Part.parse(str(value))
         except ValueError as error:
             self.fail(str(error), param, ctx)
 
 
 PART = click.option(
-    "--part", "share", type=ShareType(), metavar="i/N",
-    help="Do the i-th of N shares of the work; afterwards the same command without it puts them together.",
+    "--part", "part", type=PartType(), metavar="i/N",
+    help="Do every N-th item of the work, from the i-th on; the same command without --part does what is missing and combines all.",
 )  # fmt: skip
 
 WAIT = click.option(

@@ -3,11 +3,12 @@
 A loop is compiled when it is first called, and kept for all runs. Here small examples call every loop.
 """
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import worker_pool
 
 _EXAMPLE = "two_link"
 _QUICK = (
@@ -25,17 +26,17 @@ def compile_loops() -> None:
     Raises:
         DataError: A process died.
     """
-    with workers(2, _prepare) as pool:
-        for _ in as_done(pool, _call, ["proofs", "terms"]):
+    with worker_pool(2, _search_examples) as pool:
+        for _ in pool.as_done(_compile, ["proofs", "terms"]):
             pass
 
 
-def _prepare() -> None:
-    """Prepare a worker process, which needs nothing."""
+def _search_examples() -> dict[str, Callable[[], None]]:
+    return {"proofs": _prove_best_subsets, "terms": _leave_out_terms}
 
 
-def _call(name: str) -> None:
-    {"proofs": _prove_best_subsets, "terms": _leave_out_terms}[name]()
+def _compile(examples: dict[str, Callable[[], None]], name: str) -> None:
+    examples[name]()
 
 
 def _prove_best_subsets() -> None:

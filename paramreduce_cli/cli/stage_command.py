@@ -23,7 +23,7 @@ from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, remark, sho
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.pipeline import Stage, check_is_asked_for, describe_stage
-from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Share, Validation
+from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
 from paramreduce_cli.runner import Outcome, Runner, asked
 from paramreduce_cli.stages import stages
 
@@ -45,7 +45,7 @@ def stage_command(name: str) -> click.Command:
         wait: bool,
         jobs: int | None = None,
         samples: Path | None = None,
-        share: Share | None = None,
+        part: Part | None = None,
     ) -> int:
         if config is None and samples is None:
             raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
@@ -54,7 +54,7 @@ def stage_command(name: str) -> click.Command:
         settings = None if loaded is not None else load_settings(config, overrides)
         store = results_store(loaded, results)
         placed = placed_errors(config, overrides)
-        lock = "" if share is None else f"-{stage.name}-{share.number}-{share.count}"
+        lock = "" if part is None else f"-{stage.name}-{part.number}-{part.count}"
         with placed, store.locked(lock, wait=wait), show_progress(stage.name, quiet) as progress:
             if loaded is not None:
                 check_is_asked_for(stage, loaded)
@@ -70,7 +70,7 @@ def stage_command(name: str) -> click.Command:
                 interruption.check,
                 asked(config if robot else None, results, overrides),
             )
-            outcome = runner.run(stage, force=force, go_on=True, share=share or WHOLE)
+            outcome = runner.run(stage, force=force, go_on=True, part=part or WHOLE)
         if not quiet:
             say_outcome(outcome)
         return _exit_code(stage, outcome, quiet)
@@ -78,7 +78,7 @@ def stage_command(name: str) -> click.Command:
     params: list[Any] = [RESULTS, SET, FORCE, QUIET, VERBOSE, LOG, WAIT]
     if stage.lends_run is not None:
         params.append(JOBS)
-    if stage.in_shares:
+    if stage.has_items:
         params.append(PART)
     if config_optional:
         params.append(

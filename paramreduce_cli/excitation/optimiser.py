@@ -13,7 +13,7 @@ ten times as far as others, and neither random starts nor the solver would find 
 """
 
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -142,19 +142,13 @@ class _Candidate:
     status: str = ""
 
 
-def optimise_trajectory(
-    excitation: Excitation,
-    settings: Settings,
-    seed: list[int],
-    progress: Callable[[float], None] = lambda share: None,
-) -> Trajectory:
+def optimise_trajectory(excitation: Excitation, settings: Settings, seed: list[int]) -> Trajectory:
     """Find one exciting trajectory.
 
     Args:
         excitation: What is measured.
         settings: What is asked.
         seed: Of the random starts; the result depends on nothing else.
-        progress: Told the share of the work done, 0 to 1.
 
     Raises:
         ConcernError: No motion keeps the bounds; says which one stops it.
@@ -164,13 +158,11 @@ def optimise_trajectory(
     steps = search.plan.steps
     counts = [settings.going_on(step.share) for step in steps]
     candidates = search.starts(seed)
-    done = iterations = 0
+    iterations = 0
     for step, count in zip(steps, counts, strict=True):
         candidates = sorted(candidates, key=lambda candidate: candidate.value)[:count]
         for candidate in candidates:
             iterations += search.descend(candidate, step)
-            done += 1
-            progress(done / sum(counts))
     results: list[tuple[_Candidate, FloatArray, float]] = []
     failures: list[ParamreduceError] = []
     for candidate in candidates:

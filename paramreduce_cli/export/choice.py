@@ -16,7 +16,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
-from paramreduce_cli.texts import EXACT, format_share_range, share
+from paramreduce_cli.texts import EXACT, format_percent, format_percent_range
 
 FULL, BASE = "full", "base"
 IDENTIFIED, CONSISTENT = "identified", "consistent"
@@ -66,15 +66,15 @@ def chosen_model(
             f"log also {IDENTIFIED} and {CONSISTENT}, with terms left out {TERMS}."
         )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
-    worth = "exact" if error < EXACT else f"torque error {share(error)}"
+    worth = "exact" if error < EXACT else f"torque error {format_percent(error)}"
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
     judged = validation and validation.heuristics.get(choice.heuristic)
     if judged and (known_row := judged.row(choice.n)) is not None:
         other = float(judged.torque_error_validation[known_row])
-        title += f", {share(other)} on the validation set"
+        title += f", {format_percent(other)} on the validation set"
         test = judged.torque_error_test[known_row]
         if test.size:
-            title += f", {format_share_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
+            title += f", {format_percent_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
     return reduced_model(reduction, choice.heuristic, row, known), title
 
@@ -85,7 +85,7 @@ def _identified(
     if text == IDENTIFIED:
         found = identification.full
         chosen = base_model(model)
-        worth = f"identified base parameters, {share(found.held_out)} held out"
+        worth = f"identified base parameters, {format_percent(found.held_out)} held out"
         return replace(chosen, values=found.values), worth
     consistency = identification.consistency
     if consistency is None:
@@ -93,7 +93,7 @@ def _identified(
             f"--model {CONSISTENT}: identification.h5 holds none; set identification.consistency, or install "
             "cvxpy with `pip install 'paramreduce[identify]'`, and run `paramreduce identify` again."
         )
-    worth = f"physically consistent parameters, {share(consistency.held_out)} held out"
+    worth = f"physically consistent parameters, {format_percent(consistency.held_out)} held out"
     return full_model(replace(model, values=consistency.standard)), worth
 
 
@@ -114,16 +114,16 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
             "`paramreduce reduce-terms` to find something within the budget."
         )
     errors = [term.torque_error_estimation, term.torque_error_validation]
-    known = " / ".join(share(error) for error in errors if error == error)
-    allowed = share(found.torque_budget)
+    known = " / ".join(format_percent(error) for error in errors if error == error)
+    allowed = format_percent(found.torque_budget)
     if name == "direct" and found.acceleration_budget < float("inf"):
-        allowed += f", of accelerations {share(found.acceleration_budget)}"
+        allowed += f", of accelerations {format_percent(found.acceleration_budget)}"
     title = (
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
     if term.torque_error_test.size:
-        test = format_share_range(*ErrorRange.of(term.torque_error_test))
+        test = format_percent_range(*ErrorRange.of(term.torque_error_test))
         title += f", {test} on {term.torque_error_test.size} motions that no search looked at"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from paramreduce_cli.records import ErrorRange, FloatArray, Mechanism, TermModel
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 
 
 def within(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
@@ -34,11 +34,13 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
         *within(mechanism, term.lower, term.upper),
     ]
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
-    if known := " / ".join(share(error) for error in errors if np.isfinite(error)):
+    if known := " / ".join(format_percent(error) for error in errors if np.isfinite(error)):
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
     test = ErrorRange.of(term.acceleration_error_test)
     if np.isfinite(test.median):
-        lines.append(f"The same on motions that no search looked at: {format_share_range(*test)}.")
+        lines.append(
+            f"The same on motions that no search looked at: {format_percent_range(*test)}."
+        )
     where = "both sets"
     if term.random_states or term.mass_states:
         lines.append("Random states inside the limits were looked at, with these ranges:")
@@ -46,10 +48,10 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     if term.random_states:
         where = "these"
         lines.append(
-            f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
+            f"Torque error on {term.random_states} of them: {format_percent(term.random_torque_error)}."
         )
         if not np.isnan(term.random_acceleration_error):
-            error = share(term.random_acceleration_error)
+            error = format_percent(term.random_acceleration_error)
             lines.append(f"Error of the accelerations on these: {error}.")
     lines.append(f"Largest differences of torques, N m or N, on {where}:")
     differences = zip(mechanism.coordinate_names, term.largest_difference.tolist(), strict=True)

@@ -3,7 +3,7 @@
 import numpy as np
 
 from paramreduce_cli.records import Estimate
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 _ALIKE = 0.02
 """Relative difference of held-out errors, of which there is but one each, that says nothing."""
@@ -16,7 +16,7 @@ def compared(full: Estimate, reduced: Estimate) -> str:
     if len(full.names) == len(reduced.names):
         return (
             f"The reduced model has as many parameters as the full one, {len(full.names)}: "
-            f"{share(full.held_out)} held out."
+            f"{format_percent(full.held_out)} held out."
         )
     beside = reduced.held_out / full.held_out - 1 if full.held_out > 0 else np.inf
     verdict = "beats the full one" if beside < 0 else "is worse"
@@ -24,8 +24,8 @@ def compared(full: Estimate, reduced: Estimate) -> str:
         verdict = "is as good as the full one"
     n, m = len(reduced.names), len(full.names)
     text = (
-        f"Held out, the error of {n} parameters is {share(reduced.held_out)}, that of all {m} is "
-        f"{share(full.held_out)}: the reduced model {verdict}."
+        f"Held out, the error of {n} parameters is {format_percent(reduced.held_out)}, that of all {m} is "
+        f"{format_percent(full.held_out)}: the reduced model {verdict}."
     )
     if full.folds.size < 2 or full.folds.size != reduced.folds.size:
         return text

@@ -23,7 +23,7 @@ from paramreduce_cli.records import (
     Model,
     SampleSet,
 )
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 _HARDLY = 0.3
 """Share of the torques that is left where hardly anything was understood."""
@@ -102,13 +102,13 @@ def _missed(full: Estimate) -> Iterator[str]:
     """What errors say as they are."""
     if full.train > _HARDLY:
         yield (
-            f"All base parameters together leave {share(full.train)} of the torques unexplained: is the log of this "
+            f"All base parameters together leave {format_percent(full.train)} of the torques unexplained: is the log of this "
             "robot, are its columns in this order, is friction modelled?"
         )
     if full.held_out > _FARTHER * full.train and full.held_out > _NOTABLE:
         yield (
-            f"Torques that were held out are missed by {share(full.held_out)}, those that were learned from by "
-            f"{share(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?"
+            f"Torques that were held out are missed by {format_percent(full.held_out)}, those that were learned from by "
+            f"{format_percent(full.train)}: is the log of this robot, does it excite all parameters, are its parts of the same motion?"
         )
 
 
@@ -118,8 +118,8 @@ def _impossible(full: Estimate, consistency: Consistency | None) -> Iterator[str
         return
     if consistency.train > max(_IMPOSSIBLE * full.train, full.train + _BESIDE):
         yield (
-            f"Bodies and friction that can exist leave {share(consistency.train)} of the torques unexplained, base "
-            f"parameters without that restriction {share(full.train)}: is the log of this robot, are the kinematics in "
+            f"Bodies and friction that can exist leave {format_percent(consistency.train)} of the torques unexplained, base "
+            f"parameters without that restriction {format_percent(full.train)}: is the log of this robot, are the kinematics in "
             "the config right, and are friction and rotors modelled?"
         )
 

@@ -21,7 +21,7 @@ from paramreduce_cli.records import (
     Selected,
 )
 from paramreduce_cli.reduction.models import reduced_model
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 
 def select(
@@ -89,12 +89,12 @@ def _cross_validated(
         beside = "the least of all, and no smaller model is within one standard error of it"
     else:
         beside = (
-            f"within one standard error ({share(best.standard_error[least])}) of the best, {share(best.mean[least])} "
+            f"within one standard error ({format_percent(best.standard_error[least])}) of the best, {format_percent(best.mean[least])} "
             f"with n = {best.n[least]}"
         )
     reason = (
         f"{choice.heuristic} with n = {choice.n}: with each of {folds} parts left out in turn its torque error "
-        f"there is {share(float(own.mean[own.n == choice.n][0]))}, {beside}."
+        f"there is {format_percent(float(own.mean[own.n == choice.n][0]))}, {beside}."
     )
     return choice.heuristic, row, reason
 
@@ -137,7 +137,7 @@ def _reason(
 
 def _listed(tolerances: Mapping[str, float]) -> str:
     shown = [
-        f"{key.replace('_', ' ')} at most {share(value)} on the estimation and the validation set"
+        f"{key.replace('_', ' ')} at most {format_percent(value)} on the estimation and the validation set"
         if "error" in key
         else f"at most {value:g} operations of d"
         for key, value in tolerances.items()

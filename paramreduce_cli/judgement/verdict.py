@@ -13,7 +13,7 @@ from paramreduce_cli.records import (
     Remark,
     Selected,
 )
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 _NEGLIGIBLE = 1e-6
 """Errors below this are not compared: there a model is exact but for round-off."""
@@ -56,7 +56,7 @@ def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
 
 
 def _shown(value: float, relative: bool) -> str:
-    return share(value) if relative else f"{value:g}"
+    return format_percent(value) if relative else f"{value:g}"
 
 
 def remarks(

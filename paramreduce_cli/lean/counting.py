@@ -1,13 +1,13 @@
 """Operation counts of reduced models."""
 
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels, lean_models
 from paramreduce_cli.multibody.plain import PlainDynamics
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.records import (
     BoolArray,
     CountedDynamics,
@@ -98,18 +98,15 @@ def count_all(
     different = dict(zip(keys, chosen, strict=True))
     tasks = list(different.items())
     known: dict[bytes, list[int]] = {}
-    if run.jobs < 2 or len(tasks) * model.mechanism.n_parameters < _MANY:
-        counts = Counts(model, counted)
-        for key, one in tasks:
+    pays = len(tasks) * model.mechanism.n_parameters >= _MANY
+    size = _AT_ONCE if pays else 1
+    chunks = [tasks[k : k + size] for k in range(0, len(tasks), size)]
+    jobs = min(run.jobs, len(chunks)) if pays else 1
+    run.progress(Progress("count operations", 0, len(tasks)))
+    with worker_pool(jobs, partial(Counts, model, counted)) as pool:
+        for _, found in pool.as_done(_count, chunks):
+            known |= found
             run.progress(Progress("count operations", len(known), len(tasks)))
-            known[key] = counts.lean(one)
-    else:
-        parts = [tasks[k : k + _AT_ONCE] for k in range(0, len(tasks), _AT_ONCE)]
-        with workers(min(run.jobs, len(parts)), _start_worker, model, counted) as pool:
-            for _, found in as_done(pool, _count, parts):
-                known |= found
-                run.progress(Progress("count operations", len(known), len(tasks)))
-    run.progress(Progress("count operations", len(tasks), len(tasks)))
     return np.array([known[key] for key in keys], dtype=np.int64)
 
 
@@ -120,15 +117,6 @@ def structure(one: ReducedModel, model: Model) -> bytes:
     return bytes(str([ties.get(k, k) for k in one.kept.tolist()]), "ascii")
 
 
-class _Worker:
-    """What a worker process knows; set once when it starts."""
-
-    counts: Counts
-
-
-def _start_worker(model: Model, counted: CountedDynamics) -> None:
-    _Worker.counts = Counts(model, counted)
-
-
-def _count(tasks: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:
-    return {key: _Worker.counts.lean(one) for key, one in tasks}
+def _count(counts: Counts, chunk: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:
+    """Count the models of a chunk, by structure."""
+    return {structure: counts.lean(one) for structure, one in chunk}

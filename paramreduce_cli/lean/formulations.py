@@ -8,6 +8,7 @@ given subsets where that is worth it.
 import heapq
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from paramreduce_cli.lean.choices import (
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.search import best_choices
 from paramreduce_cli.lean.tree import Tree, lean_tree
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.records import (
     BoolArray,
     Formulation,
@@ -132,13 +133,18 @@ def _searched(
     mechanism: Mechanism, asked: Sequence[_Searches], jobs: int
 ) -> Iterator[tuple[_Searches, list[_Choices]]]:
     """In any order."""
-    jobs = min(jobs, len(asked))
-    if jobs < 2 or len(lean_tree(mechanism).joints) < _MANY:
-        yield from ((one, _best(mechanism, one)) for one in asked)
-        forget()
-        return
-    with workers(jobs, _start_worker, mechanism) as pool:
-        yield from as_done(pool, _in_worker, asked)
+    pays = len(lean_tree(mechanism).joints) >= _MANY
+    with worker_pool(min(jobs, len(asked)) if pays else 1, partial(_same, mechanism)) as pool:
+        yield from pool.as_done(_work, asked)
+    forget()
+
+
+def _same(mechanism: Mechanism) -> Mechanism:
+    return mechanism
+
+
+def _work(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
+    return _best(mechanism, asked)
 
 
 def _best(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
@@ -153,20 +159,6 @@ def _best(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
 
 def _build(direct: bool) -> Build:
     return direct_outputs if direct else inverse_outputs
-
-
-class _Worker:
-    """What a worker process knows; set once when it starts."""
-
-    mechanism: Mechanism
-
-
-def _start_worker(mechanism: Mechanism) -> None:
-    _Worker.mechanism = mechanism
-
-
-def _in_worker(asked: _Searches) -> list[_Choices]:
-    return _best(_Worker.mechanism, asked)
 
 
 def formulations_for(

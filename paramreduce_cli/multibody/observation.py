@@ -7,6 +7,7 @@ of trajectories follows from the factors alone.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import Block, FloatArray, Share
+from paramreduce_cli.records import Block, FloatArray
 
 if TYPE_CHECKING:
     from paramreduce_cli.multibody.dynamics import Dynamics
@@ -23,6 +24,8 @@ if TYPE_CHECKING:
 
 BLOCK_SAMPLES = 150
 """Samples evaluated at a time: small enough for the cache, large enough for the loops."""
+PIECE_SAMPLES = 60_000
+"""Samples of a piece of a long trajectory, a multiple of the former."""
 _FACTORISED_AT_ONCE = 600
 """Samples: the factor found so far is worked into again each time."""
 
@@ -77,7 +80,7 @@ class ObservedSet:
     source: str
     """What the states are, for messages."""
     divisible: bool = False
-    """Whether a share may begin within a trajectory, whose factor is then the same to round-off alone."""
+    """Whether a piece may begin within a trajectory, whose factor is then the same to round-off alone."""
     recomputable = True
 
     @property
@@ -89,13 +92,13 @@ class ObservedSet:
         """Yield the states in order; every call starts anew."""
         return map(self.at, self.spans)
 
-    def restricted(self, share: Share) -> ObservedSet:
-        """A share of it: whole trajectories, some shares none, or a piece where there are fewer and it is divisible."""
-        numbers = list(dict.fromkeys(span.trajectory for span in self.spans))
-        if self.divisible and len(numbers) < share.count:
-            return replace(self, spans=share.cut(self.spans))
-        own = set(share.cut(numbers))
-        return replace(self, spans=[span for span in self.spans if span.trajectory in own])
+    def pieces(self) -> Iterator[ObservedSet]:
+        """Yield the set as trajectories, long ones in pieces where the set is divisible."""
+        most = PIECE_SAMPLES // BLOCK_SAMPLES if self.divisible else len(self.spans)
+        for _, own in itertools.groupby(self.spans, lambda span: span.trajectory):
+            rest = list(own)
+            for start in range(0, len(rest), most):
+                yield replace(self, spans=rest[start : start + most])
 
     @cached_property
     def _coordinates(self) -> Coordinates:

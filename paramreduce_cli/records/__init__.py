@@ -5,6 +5,7 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 """
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.items import NO_ITEMS, WHOLE, Items, Part, PartFinished
 from paramreduce_cli.records.logs import (
     Consistency,
     Estimate,
@@ -52,6 +53,7 @@ from paramreduce_cli.records.reduction import (
     BySize,
     Columns,
     ModelChoice,
+    ProofItem,
     Proofs,
     ProofStatus,
     ReducedModel,
@@ -61,7 +63,6 @@ from paramreduce_cli.records.reduction import (
 )
 from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Tell
 from paramreduce_cli.records.samples import SETS, Block, Recording, Recordings, Samples, SampleSet
-from paramreduce_cli.records.shares import UNSHARED, WHOLE, Share, Shares
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
     TERMS,

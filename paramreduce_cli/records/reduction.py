@@ -222,6 +222,28 @@ class Proofs(BySize):
     dealt: IntArray
     """Digest of the subtrees that a search was dealt as among several jobs, 0 where it was not, (m,)."""
 
+    def of_size(self, n: int) -> Proofs:
+        """Return the proof of one size alone.
+
+        Raises:
+            KeyError: There is none of that size.
+        """
+        row = self.row(n)
+        if row is None:
+            raise KeyError(n)
+        arrays = (
+            "subsets",
+            "torque_error",
+            "lower_bound",
+            "status",
+            "seconds",
+            "nodes",
+            "logs",
+            "dealt",
+        )
+        rows = {name: getattr(self, name)[row : row + 1] for name in ("n", *arrays)}
+        return replace(self, **rows)
+
     @property
     def n_proven(self) -> int:
         """Number of sizes whose best subset is proven."""
@@ -231,6 +253,15 @@ class Proofs(BySize):
     def n_provable(self) -> int:
         """Number of sizes up to the rank of the columns."""
         return self.n.size - self.status.count(ProofStatus.BEYOND_RANK)
+
+
+@dataclass(frozen=True)
+class ProofItem:
+    """Proofs of some sizes that one job has found, and the data on which they hold."""
+
+    factor: FloatArray
+    """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
+    proofs: Proofs
 
 
 @dataclass(frozen=True)

@@ -1,11 +1,8 @@
 """What a run lends its stages, and what it knows of them."""
 
-from collections.abc import Callable, Mapping, MutableMapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
-
-from paramreduce_cli.records.arrays import IntArray
-from paramreduce_cli.records.trajectories import Trajectory
 
 
 @dataclass(frozen=True)
@@ -48,14 +45,10 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Run:
-    """What the caller lends a stage: workers, a place for finished parts, an audience."""
+    """What the caller lends a stage: worker processes and callbacks."""
 
     jobs: int = 1
     """Worker processes; 0 for doing all in this one."""
-    parts: MutableMapping[str, Trajectory] = field(default_factory=dict)
-    """Finished parts of an artifact that is not whole yet, kept across interruptions."""
-    incumbents: MutableMapping[int, IntArray] = field(default_factory=dict)
-    """Best subsets by size, which jobs that search for the same tell each other."""
     progress: Tell = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.records import WHOLE, IntArray, Progress, Proofs, Share
+from paramreduce_cli.records import WHOLE, IntArray, Part, Progress, Proofs
 from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.reduction.objective import Objective, Units
 
@@ -30,7 +30,7 @@ class Effort:
     node_limit: int | None = None
     """Of the proof of one size; unlike time it stops every machine at the same place."""
     subtrees: bool = False
-    """Whether a share of the work is one of every proof, instead of some proofs."""
+    """Whether jobs split the search for every proof, instead of taking some proofs each."""
     jobs: int = 1
     """Threads that search for proofs."""
 
@@ -51,10 +51,12 @@ class SelectionTask:
     effort: Effort = Effort()
     previous: Proofs | None = None
     """What an earlier run has proven on the same data."""
-    share: Share = WHOLE
-    """Which of the proofs are to be found, of several jobs."""
-    incumbents: MutableMapping[int, IntArray] = field(default_factory=dict)
-    """Best subsets by size, which jobs tell each other."""
+    part: Part = WHOLE
+    """Which of the proofs are to be found, where several jobs find them."""
+    incumbents: MutableMapping[str, Any] = field(default_factory=dict)
+    """Best subsets that jobs of the same search exchange, by ``incumbent-SIZE``."""
+    keep: Callable[[Proofs], None] = lambda _: None
+    """Called with the proof of a size that took long, as soon as its search has ended."""
     progress: Callable[[Progress], None] = lambda _: None
     interrupted: Callable[[], None] = _passed_on
     """Told that a KeyboardInterrupt was met; raises it again where nothing is worth keeping."""

@@ -15,7 +15,7 @@ from paramreduce_cli.records import (
     Trajectories,
 )
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 
 _BIBTEX = {
     "Atkeson1986": ("article", "C. G. Atkeson and C. H. An and J. M. Hollerbach",
@@ -173,13 +173,15 @@ def _result(data: ReportData) -> Iterator[str]:
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
-    errors = [f"{share(float(result.torque_error_estimation[row]))} on the estimation set"]
+    errors = [f"{format_percent(float(result.torque_error_estimation[row]))} on the estimation set"]
     if "validation" in data.rms_torque:
-        errors.append(f"{share(float(result.torque_error_validation[row]))} on the validation set")
+        errors.append(
+            f"{format_percent(float(result.torque_error_validation[row]))} on the validation set"
+        )
     test = result.torque_error_test[row]
     if test.size:
         errors.append(
-            f"{format_share_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
+            f"{format_percent_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
         )
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
     if data.known_model is not None:
@@ -203,11 +205,13 @@ def _terms(found: TermReduction) -> Iterator[str]:
     for name, term in found.functions.items():
         acceleration = ""
         if name == "direct" and isfinite(found.acceleration_budget):
-            acceleration = f" and an acceleration error of {share(found.acceleration_budget)}"
+            acceleration = (
+                f" and an acceleration error of {format_percent(found.acceleration_budget)}"
+            )
         yield (
             f"Terms of the {name} dynamics that hardly matter were left out or replaced by multiples of others, and the "
             f"{term.values.size} parameters fitted again "
-            f"within a torque error of {share(found.torque_budget)}{acceleration}: {term.operations} operations instead of "
+            f"within a torque error of {format_percent(found.torque_budget)}{acceleration}: {term.operations} operations instead of "
             f"the {term.operations_start} of {term.heuristic} with {term.n_start} parameters, from which it began."
         )
 
@@ -222,13 +226,13 @@ _ESTIMATORS = {
 def _identification(found: Identification) -> Iterator[str]:
     yield (
         f"Values were identified from the measured torques by {_ESTIMATORS[found.estimator]}, with standard deviations for "
-        f"noise as coloured as the residuals; {share(found.reduced.held_out)} of the torques held out stay unexplained, "
-        f"{share(found.full.held_out)} with all base parameters."
+        f"noise as coloured as the residuals; {format_percent(found.reduced.held_out)} of the torques held out stay unexplained, "
+        f"{format_percent(found.full.held_out)} with all base parameters."
     )
     if found.consistency is not None:
         yield (
             "Standard parameters that a machine can have were found under constraints on the bodies' pseudo-inertia "
-            f"matrices and leave {share(found.consistency.held_out)}."
+            f"matrices and leave {format_percent(found.consistency.held_out)}."
         )
 
 

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from paramreduce_cli.records import NO_MOTIONS, ErrorRange
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
@@ -61,7 +61,7 @@ def function_cells(
 
     Without a mechanism nothing is counted, and accelerations are not known.
     """
-    errors = share(estimation), share(validation), format_share_range(*test)
+    errors = format_percent(estimation), format_percent(validation), format_percent_range(*test)
     if full is None or reduced is None:
         return "-", "-", "-", *(errors if name == "inverse" else ("-", "-", "-"))
     saved = f"{100 * (1 - reduced / full):.0f} %" if full else "-"

@@ -20,7 +20,7 @@ from paramreduce_cli.report.methods import methods
 from paramreduce_cli.report.sections import PageSection, place_of
 from paramreduce_cli.report.symbols import explained
 from paramreduce_cli.report.tables import tables
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 _FIGURE_MIME = "image/svg+xml"
@@ -59,7 +59,7 @@ def render_page(
         code: Files of the selected model as code, by name; empty where there is none.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
-    environment.filters["percent"] = share
+    environment.filters["percent"] = format_percent
     model = data.known_model
     loops = model is not None and model.mechanism.loops is not None
     context = {"s": summary, "loops": loops, "answer": answer(data, provenance.asked)}

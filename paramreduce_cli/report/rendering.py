@@ -1,9 +1,11 @@
 """All figures of a report, drawn in this process or in several."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
-from paramreduce_cli.processes import as_done, workers
+from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.style import render
@@ -36,34 +38,20 @@ def rendered(
     """
     found: dict[str, Encoded] = {}
     jobs = min(jobs, len(names) // _AT_LEAST)
-    for name, encoded in _drawn(names, data, formats, jobs):
-        found[name] = encoded
-        told(len(found), name)
+    shown = replace(data, animation=None)  # the page's alone, and large
+    with worker_pool(jobs, partial(_Drawn, shown, formats)) as pool:
+        for name, encoded in pool.as_done(_draw, names):
+            found[name] = encoded
+            told(len(found), name)
     return {name: found[name] for name in names if found[name]}
 
 
-def _drawn(
-    names: Sequence[str], data: ReportData, formats: list[str], jobs: int
-) -> Iterator[tuple[str, Encoded]]:
-    """In any order."""
-    if jobs < 2:
-        yield from ((name, render(figures[name], data, formats)) for name in names)
-        return
-    data = replace(data, animation=None)  # the page's alone, and large
-    with workers(jobs, _start_worker, data, formats) as pool:
-        yield from as_done(pool, _in_worker, names)
-
-
-class _Worker:
-    """What a worker process knows; set once when it starts."""
+class _Drawn(NamedTuple):
+    """What figures show, and the formats in which they are encoded."""
 
     data: ReportData
     formats: list[str]
 
 
-def _start_worker(data: ReportData, formats: list[str]) -> None:
-    _Worker.data, _Worker.formats = data, formats
-
-
-def _in_worker(name: str) -> Encoded:
-    return render(figures[name], _Worker.data, _Worker.formats)
+def _draw(drawn: _Drawn, name: str) -> Encoded:
+    return render(figures[name], drawn.data, drawn.formats)

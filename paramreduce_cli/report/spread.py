@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 Summary = Mapping[str, Any]
@@ -81,12 +81,12 @@ def spread(records: Sequence[Mapping[str, Any]]) -> Table:
             for key, text in (
                 ("kappa_best", _number),
                 ("n", _number),
-                ("torque_error_estimation", share),
-                ("torque_error_validation", share),
-                ("torque_error_test", share),
-                ("acceleration_error_estimation", share),
-                ("acceleration_error_validation", share),
-                ("acceleration_error_test", share),
+                ("torque_error_estimation", format_percent),
+                ("torque_error_validation", format_percent),
+                ("torque_error_test", format_percent),
+                ("acceleration_error_estimation", format_percent),
+                ("acceleration_error_validation", format_percent),
+                ("acceleration_error_test", format_percent),
                 ("operations_inverse", _number),
                 ("operations_direct", _number),
             )

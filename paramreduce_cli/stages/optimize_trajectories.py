@@ -14,15 +14,14 @@ from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, op
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import (
     SETS,
-    WHOLE,
     Coefficients,
     Constraint,
     FloatArray,
+    Items,
     JointLimits,
     Model,
     PointToPoint,
     Run,
-    Share,
     Trajectories,
     Trajectory,
 )
@@ -36,20 +35,20 @@ def optimize_trajectories(
     model: Model,
     coefficients: Coefficients | None,
     run: Run,
-    share: Share = WHOLE,
+    items: Items,
 ) -> Trajectories:
     """Find exciting trajectories, or take the Fourier coefficients that the config names.
 
-    Finished trajectories are kept at once: an interrupted run goes on with what is missing.
+    Each trajectory is an item, which is kept at once: an interrupted run goes on with what is missing.
     """
     wanted = trajectories
     period = wanted.period if coefficients is None else coefficients.period
     task = excitation_task(wanted, model, period)
     if coefficients is None:
-        sets = _optimised(wanted, task, share, run)
+        sets = _optimised(wanted, task, items, run)
     else:
         sets = _measured(wanted, model, task, coefficients)
-    motions = _find_point_to_point(wanted, task, model, period, sets) if share.whole else ()
+    motions = _find_point_to_point(wanted, task, model, period, sets)
     return Trajectories(
         period=period,
         points=wanted.points,
@@ -111,16 +110,15 @@ def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonic
 
 
 def _optimised(
-    wanted: TrajectoriesSection, task: ExcitationTask, share: Share, run: Run
+    wanted: TrajectoriesSection, task: ExcitationTask, items: Items, run: Run
 ) -> dict[str, tuple[Trajectory, ...]]:
     counts = (wanted.count, wanted.validation_count, wanted.test_count)
     keys = {
         name: [f"{name}-{k:04d}" for k in range(count)]
         for name, count in zip(SETS, counts, strict=True)
     }
-    own = share.dealt([key for some in keys.values() for key in some])
-    found = optimise_all(task, own, run)
-    return {name: tuple(found[key] for key in keys[name] if key in found) for name in SETS}
+    found = optimise_all(task, [key for some in keys.values() for key in some], run, items)
+    return {name: tuple(found[key] for key in keys[name]) for name in SETS}
 
 
 def _find_point_to_point(

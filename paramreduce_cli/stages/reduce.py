@@ -3,8 +3,9 @@
 import time
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import NoReturn
 
 import numpy as np
 
@@ -21,13 +22,13 @@ from paramreduce_cli.multibody.observation import (
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import (
     PROVING,
-    UNSHARED,
-    WHOLE,
     Columns,
     CountedDynamics,
     FloatArray,
     IntArray,
+    Items,
     Model,
+    PartFinished,
     Progress,
     Proofs,
     ProofStatus,
@@ -35,11 +36,10 @@ from paramreduce_cli.records import (
     Run,
     Samples,
     SelectionMethod,
-    Share,
-    Shares,
     Subsets,
 )
-from paramreduce_cli.reduction.best_subset.merging import joined, merged
+from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
+from paramreduce_cli.reduction.best_subset.merging import merged
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
@@ -58,15 +58,14 @@ def reduce(
     samples: Samples,
     previous: Reduction | None,
     run: Run,
-    share: Share = WHOLE,
-    shares: Shares = UNSHARED,
+    items: Items,
 ) -> Reduction:
     """Select parameters with each heuristic, for every number of them.
 
     Works on any samples.h5, also one that a user brings: without a model all columns that
     are not zero take part. Ctrl-C ends the search for proofs, and what is proven is kept; the
-    same command goes on from there. A share of the work are the proofs of some sizes, or a part of
-    every proof.
+    same command goes on from there. The items are the proofs of the sizes; jobs may also split the
+    search for every size.
     """
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
@@ -85,60 +84,62 @@ def reduce(
         )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
-    proven = _proofs_on(factor, [] if previous is None else [previous])
-    proven += _of_jobs(factor, shares.found)
+    kept = KeptProofs(items, factor, by_subtrees=reduction.best_subset.parts == "subtrees")
+    if not items.part.is_whole:
+        _check_proves(reduction.heuristics)
+        sizes = range(1, (reduction.stop.parameters or len(problem.columns)) + 1)
+        if kept.is_finished(sizes):
+            raise PartFinished
+    proven = kept.load()
+    if previous is not None and previous.proofs and np.array_equal(previous.factor, factor):
+        proven.insert(0, previous.proofs)
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
+    if not items.part.is_whole:
+        objective = criteria[SelectionMethod.criterion](problem, inputs)
+        _prove_part(_task(objective, reduction, proven, items, kept, run), kept)
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
     proofs = None
-    names = _wanted(reduction.heuristics, share)
+    names = reduction.heuristics
     for k, name in enumerate(names):
         run.progress(Progress("heuristics", k, len(names), name))
         method = SelectionMethod.parse(name)
         if method.criterion not in tasks:
             objective = criteria[method.criterion](problem, inputs)
-            tasks[method.criterion] = _task(objective, reduction, proven, share, run)
+            tasks[method.criterion] = _task(objective, reduction, proven, items, kept, run)
         found[name], made = _selected(tasks[method.criterion], method, reduction.stop)
         proofs = made if made is not None else proofs
     run.progress(Progress("heuristics", len(names), len(names)))
-    _remark_on_proofs(proofs, share)
+    _remark_on_proofs(proofs)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)
 
 
-def _proofs_on(factor: FloatArray, found: Sequence[Reduction]) -> list[Proofs]:
-    """Proofs that hold, as they are of the same data."""
-    return [one.proofs for one in found if one.proofs and np.array_equal(one.factor, factor)]
-
-
-def _of_jobs(factor: FloatArray, found: Sequence[Reduction]) -> list[Proofs]:
-    """Proofs of several jobs; those of which each job has done a share hold together alone.
-
-    Raises:
-        DataError: Shares of one proof are of other numbers.
-    """
-    usable = _proofs_on(factor, found)
-    if not any(one.proofs is not None and one.proofs.dealt.any() for one in found):
-        return usable
-    if len(usable) < len(found):
-        raise DataError(
-            f"{len(found) - len(usable)} of the {len(found)} parts are of samples that were added up to other last "
-            "digits, as machines do that calculate differently. Make them again on machines of the kind of this one, or "
-            "do without them with --force."
-        )
-    return [joined(usable)]
-
-
-def _wanted(heuristics: Sequence[str], share: Share) -> Sequence[str]:
-    """What is run: of a share of the work what proves alone, as the others take seconds."""
-    if share.whole:
-        return heuristics
+def _check_proves(heuristics: Sequence[str]) -> None:
+    """Raise ConfigError unless best subsets are proven, as all else takes seconds."""
     if PROVING not in heuristics:
         raise ConfigError(
             f"has no {PROVING}, and proofs are all that is done in parts. Leave --part out.",
             ("reduction", "heuristics"),
         )
-    return [PROVING]
+
+
+def _prove_part(task: SelectionTask, kept: KeptProofs) -> NoReturn:
+    """Search for this job's part of the proofs, and keep what is proven.
+
+    Raises:
+        PartFinished: The search has ended.
+    """
+    cut_short: list[bool] = []
+
+    def interrupted() -> None:
+        task.interrupted()
+        cut_short.append(True)
+
+    proofs = run_heuristic(PROVING, replace(task, interrupted=interrupted)).proofs
+    assert proofs is not None
+    kept.keep(proofs, cut_short=bool(cut_short))
+    raise PartFinished
 
 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
@@ -216,9 +217,9 @@ def _criterion_inputs(
     return CriterionInputs(wanted.operations.torque_error, accelerations, cost)
 
 
-def _remark_on_proofs(proofs: Proofs | None, share: Share) -> None:
+def _remark_on_proofs(proofs: Proofs | None) -> None:
     """Say what is not proven."""
-    if not share.whole or proofs is None or proofs.n_proven == proofs.n_provable:
+    if proofs is None or proofs.n_proven == proofs.n_provable:
         return
     counts = {status: proofs.status.count(status) for status in ProofStatus}
     text = f"best-subset: {proofs.n_proven} of {proofs.n_provable} sizes are proven"
@@ -245,15 +246,21 @@ class _Selected:
 
 
 def _task(
-    objective: Objective, wanted: ReductionSection, proven: Sequence[Proofs], share: Share, run: Run
+    objective: Objective,
+    wanted: ReductionSection,
+    proven: Sequence[Proofs],
+    items: Items,
+    kept: KeptProofs,
+    run: Run,
 ) -> SelectionTask:
     return SelectionTask(
         objective=objective,
         largest=wanted.stop.parameters,
         effort=effort(wanted, run),
         previous=merged(proven) if proven else None,
-        share=share,
-        incumbents=run.incumbents,
+        part=items.part,
+        incumbents={} if items.part.is_whole else items.kept,
+        keep=kept.keep_size,
         progress=run.progress,
         interrupted=run.interrupted,
     )

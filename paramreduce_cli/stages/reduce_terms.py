@@ -10,19 +10,17 @@ import numpy as np
 from paramreduce_cli.config.schema import SamplingSection, TrajectoriesSection
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
+from paramreduce_cli.item_completion import complete_items
 from paramreduce_cli.lean.formulations import formulations_for
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
-    UNSHARED,
-    WHOLE,
     CountedDynamics,
+    Items,
     Model,
     Progress,
     Reduction,
     Run,
     Samples,
-    Share,
-    Shares,
     TermFront,
     TermModel,
     TermReduction,
@@ -33,7 +31,7 @@ from paramreduce_cli.terms.judging import Errors, Judge
 from paramreduce_cli.terms.searching import LookedAt, Searcher
 from paramreduce_cli.terms.simplify import simplified
 from paramreduce_cli.terms.starts import starts_within
-from paramreduce_cli.texts import share as share_of
+from paramreduce_cli.texts import format_percent
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
 """Samples of the estimation and the validation set that are looked at while terms are left out, at first and
@@ -59,15 +57,14 @@ def reduce_terms(
     samples: Samples,
     reduction: Reduction,
     run: Run,
-    share: Share = WHOLE,
-    shares: Shares = UNSHARED,
+    items: Items,
 ) -> TermReduction:
     """Leave terms out of the functions of reduced models, and fit what is left.
 
     Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
     within 80 % of the budget there and on the validation set, so that those on the test set, which
     is not looked at, are likely within it on the median. Measured ones are kept within it on the training part. A function for which nothing
-    is found is left out, with a warning. A share of the work are some of the functions.
+    is found is left out, with a warning. The items are the functions.
     """
     if section is None:
         raise ConfigError(
@@ -77,50 +74,40 @@ def reduce_terms(
     allowed = Budget(section.torque_error, section.acceleration_error or np.inf)
     budget = allowed if sampling.measured else allowed.scaled(_MARGIN)
     names = list(dict.fromkeys(section.functions))
-    if shares.found:
-        functions = {name: one for found in shares.found for name, one in found.functions.items()}
-    else:
-        functions = {}
-        for name in share.dealt(names):
-            found = _searched(
-                name,
-                section,
-                budget,
-                trajectories,
-                sampling,
-                counted,
-                model,
-                samples,
-                reduction,
-                run,
-            )
-            functions |= {} if found is None else {name: found}
-    functions = {name: functions[name] for name in names if name in functions}
-    if share.whole:
-        part = (
-            "it"
-            if sampling.measured
-            else f"{share_of(_MARGIN)} of it, which leaves room for other motions,"
-        )
-        _say_missing([name for name in names if name not in functions], bool(functions), part)
+    task = _Task(section, budget, trajectories, sampling, counted, model, samples, reduction, run)
+    found = complete_items(run, items, names, lambda: task, _search, task="functions")
+    functions = {name: one for name, one in found.items() if one is not None}
+    allowance = (
+        "it"
+        if sampling.measured
+        else f"{format_percent(_MARGIN)} of it, which leaves room for other motions,"
+    )
+    _say_missing([name for name in names if name not in functions], bool(functions), allowance)
     alone = sampling.measured or samples.validation is None
     return TermReduction(allowed.torque, allowed.acceleration, alone, functions)
 
 
-def _searched(
-    name: str,
-    section: TermsSection,
-    budget: Budget,
-    trajectories: TrajectoriesSection,
-    sampling: SamplingSection,
-    counted: CountedDynamics,
-    model: Model,
-    samples: Samples,
-    reduction: Reduction,
-    run: Run,
-) -> TermModel | None:
-    """A function with terms left out, None where nothing is found within the budget."""
-    projected = model.mechanism.loops is not None and counted is CountedDynamics.INDEPENDENT
+@dataclass(frozen=True)
+class _Task:
+    """What is asked of every function."""
+
+    section: TermsSection
+    budget: Budget
+    trajectories: TrajectoriesSection
+    sampling: SamplingSection
+    counted: CountedDynamics
+    model: Model
+    samples: Samples
+    reduction: Reduction
+    run: Run
+
+
+def _search(task: _Task, name: str) -> TermModel | None:
+    """Leave terms out of a function; None where nothing is found within the budget."""
+    section, budget, trajectories = task.section, task.budget, task.trajectories
+    sampling, samples, run = task.sampling, task.samples, task.run
+    model, reduction = task.model, task.reduction
+    projected = model.mechanism.loops is not None and task.counted is CountedDynamics.INDEPENDENT
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
     starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
@@ -227,7 +214,7 @@ def _say_unfit(term: TermModel) -> None:
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
-            f"terms: accelerations from the direct dynamics are off by {share_of(np.nanmax(errors))}, as nothing "
+            f"terms: accelerations from the direct dynamics are off by {format_percent(np.nanmax(errors))}, as nothing "
             "asks for more than a positive definite M. Give terms.acceleration_error",
             ParamreduceWarning,
             stacklevel=3,

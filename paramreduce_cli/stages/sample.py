@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -23,6 +24,7 @@ from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simula
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.identification.samples import LoggedSet
+from paramreduce_cli.item_completion import complete_items
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -37,21 +39,20 @@ from paramreduce_cli.multibody.observation import (
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.told import ToldSet
 from paramreduce_cli.records import (
+    NO_ITEMS,
     SETS,
-    UNSHARED,
-    WHOLE,
     Block,
     FloatArray,
     IntArray,
+    Items,
     MeasuredLog,
     Model,
     Progress,
     Recording,
     Recordings,
+    Run,
     Samples,
     SampleSet,
-    Share,
-    Shares,
     Tell,
     Trajectories,
 )
@@ -69,17 +70,14 @@ def sample(
     recordings: Recordings,
     log: MeasuredLog | None = None,
     tell: Tell = lambda _: None,
-    share: Share = WHOLE,
-    shares: Shares = UNSHARED,
+    items: Items = NO_ITEMS,
 ) -> Samples:
     """Sample the estimation, the validation and the test set: states, torques and observation matrices.
 
-    From the optimised trajectories, or from a log or recorded states where the config names them. A
-    share of the work are some trajectories, or a part of a recording.
+    From the optimised trajectories, or from a log or recorded states where the config names them. The
+    items are trajectories, or pieces of a recording.
     """
-    if shares.found:
-        return _put_together(sampling, model, shares)
-    if sampling.log is not None and not share.whole:
+    if sampling.log is not None and not items.part.is_whole:
         raise ConfigError(
             "is sampled as a whole, as its low-pass runs on across parts. Leave --part out.",
             ("sampling", "log"),
@@ -104,16 +102,41 @@ def sample(
     points = {"estimation": sampling.points, "validation": sampling.validation_points}
     tested = _is_tested(sampling, trajectories, recordings)
     names = SETS if tested else SETS[:2]
-    sets = {name: observed(name, points.get(name)) for name in names}
-    for name, computed in sets.items():
-        if isinstance(computed, ObservedSet):
-            sets[name] = computed.restricted(share)
-    scales: tuple[FloatArray | None, FloatArray | None] = (None, None)
-    if share.whole:
-        torque = _nominal_torque(model, sets["estimation"])
-        scales = torque, _nominal_acceleration(sampling, model, sets["estimation"])
-    said = {name: ToldSet(computed, f"{name} set", tell) for name, computed in sets.items()}
-    return _samples(model, *scales, said)
+    computed = {name: observed(name, points.get(name)) for name in names}
+    stored = _combined_items(computed, items, tell)
+    if stored is not None:
+        return _samples(sampling, model, stored["estimation"], stored)
+    told = {name: ToldSet(one, f"{name} set", tell) for name, one in computed.items()}
+    return _samples(sampling, model, computed["estimation"], told)
+
+
+def _combined_items(
+    computed: Mapping[str, ComputedSet], items: Items, tell: Tell
+) -> dict[str, JoinedSet] | None:
+    """Return the sets as their items, all of them kept; None where no item is kept and none has to be.
+
+    Raises:
+        PartFinished: This job does only a part of the items, and that is done.
+    """
+    pieces: dict[str, ObservedSet] = {}
+    for name, one in computed.items():
+        if isinstance(one, ObservedSet):
+            pieces |= {f"{name}-{k:06d}": piece for k, piece in enumerate(one.pieces())}
+    if items.part.is_whole and not any(key in items.kept for key in pieces):
+        return None
+
+    run = Run(progress=tell)
+    found: dict[str, Any] = complete_items(
+        run, items, list(pieces), lambda: pieces, _piece, task="samples"
+    )
+    return {
+        name: JoinedSet([one for key, one in found.items() if key.startswith(f"{name}-")])
+        for name in computed
+    }
+
+
+def _piece(pieces: Mapping[str, ObservedSet], key: str) -> SampleSet:
+    return pieces[key]
 
 
 def _is_tested(
@@ -130,31 +153,23 @@ def _is_tested(
 
 
 def _samples(
+    sampling: SamplingSection,
     model: Model,
-    nominal_torque: FloatArray | None,
-    nominal_acceleration: FloatArray | None,
+    estimation: ComputedSet | JoinedSet,
     sets: Mapping[str, SampleSet],
 ) -> Samples:
+    """Return the sets with the scales of the estimation set."""
     parameters = model.mechanism.parameters
     return Samples(
         names=model.mechanism.parameter_names,
         preference=np.array([parameter.preference for parameter in parameters]),
         values=model.values,
-        nominal_torque=nominal_torque,
-        nominal_acceleration=nominal_acceleration,
+        nominal_torque=_nominal_torque(model, estimation),
+        nominal_acceleration=_nominal_acceleration(sampling, model, estimation),
         estimation=sets["estimation"],
         validation=sets.get("validation"),
         test=sets.get("test"),
     )
-
-
-def _put_together(sampling: SamplingSection, model: Model, shares: Shares) -> Samples:
-    """The samples that several jobs have made; scales are those of all of them."""
-    parts = {name: [getattr(found, name) for found in shares.found] for name in SETS}
-    sets = {name: JoinedSet(some) for name, some in parts.items() if None not in some}
-    estimation = sets["estimation"]
-    scales = _nominal_torque(model, estimation), _nominal_acceleration(sampling, model, estimation)
-    return _samples(model, *scales, sets)
 
 
 def _completed(

@@ -6,7 +6,6 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from functools import partial
 from typing import NamedTuple
@@ -14,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.processes import Item, Result, as_done, workers
+from paramreduce_cli.processes import Item, WorkerPool, worker_pool
 from paramreduce_cli.terms.descent import Descent, Way, gone_on
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
@@ -121,21 +120,15 @@ class Hands:
     """What does the work of a searcher, here or in other processes.
 
     Args:
-        searcher: What works.
         told: Of what is found on an item, as soon as it is.
         deadline: After which nothing is begun, on the clock of `time.monotonic`, which processes share, s.
-        pool: Of processes that know the searcher; without them it is done here.
+        pool: Workers that hold the searcher.
     """
 
     def __init__(
-        self,
-        searcher: Searcher,
-        told: Callable[[Way | None], None],
-        deadline: float = math.inf,
-        pool: ProcessPoolExecutor | None = None,
+        self, told: Callable[[Way | None], None], deadline: float, pool: WorkerPool[Searcher]
     ) -> None:
-        self._searcher, self._told, self._pool = searcher, told, pool
-        self._deadline = deadline
+        self._told, self._deadline, self._pool = told, deadline, pool
         self.cut_short = False
         """Whether anything was not begun for the deadline."""
 
@@ -154,23 +147,12 @@ class Hands:
         """What is found on items, in their order; on one of them at least, and no others when it is too late."""
         in_time = partial(_begun, work, math.inf if however_late else self._deadline)
         found: dict[int, Way] = {}
-        for number, (begun, way) in self._done(in_time, items):
+        for (number, _), (begun, way) in self._pool.as_done(in_time, enumerate(items)):
             self.cut_short |= not begun
             self._told(way)
             if way is not None:
                 found[number] = way
         return [found[number] for number in sorted(found)]
-
-    def _done(
-        self, work: Callable[[Searcher, tuple[int, Item]], Result], items: Iterable[Item]
-    ) -> Iterator[tuple[int, Result]]:
-        """What comes of them in any order, with the numbers of the items."""
-        numbered = enumerate(items)
-        if self._pool is None:
-            yield from ((item[0], work(self._searcher, item)) for item in numbered)
-            return
-        for (k, _), result in as_done(self._pool, partial(_in_worker, work), numbered):
-            yield k, result
 
 
 def _begun(
@@ -191,24 +173,9 @@ def hands(
     searcher: Searcher, jobs: int, told: Callable[[Way | None], None], deadline: float = math.inf
 ) -> Iterator[Hands]:
     """Work here, or in so many other processes; what is found by no deadline does not depend on how many."""
-    if jobs < 2:
-        yield Hands(searcher, told, deadline)
-        return
-    with workers(jobs, _start_worker, searcher) as pool:
-        yield Hands(searcher, told, deadline, pool)
+    with worker_pool(jobs, partial(_same, searcher)) as pool:
+        yield Hands(told, deadline, pool)
 
 
-class _Worker:
-    """What a worker process knows; set once when it starts."""
-
-    searcher: Searcher
-
-
-def _start_worker(searcher: Searcher) -> None:
-    _Worker.searcher = searcher
-
-
-def _in_worker(
-    work: Callable[[Searcher, tuple[int, Item]], Result], numbered: tuple[int, Item]
-) -> Result:
-    return work(_Worker.searcher, numbered)
+def _same(searcher: Searcher) -> Searcher:
+    return searcher

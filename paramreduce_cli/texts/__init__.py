@@ -13,8 +13,8 @@ _ESCAPES = {
 }  # fmt: skip
 
 
-def share(value: float | None) -> str:
-    """A share in per cent; None stands for an infinite one."""
+def format_percent(value: float | None) -> str:
+    """Format a fraction in per cent; None stands for infinity."""
     if value is None or not math.isfinite(value):
         return "∞"
     if value >= _FAR_OFF:
@@ -22,13 +22,13 @@ def share(value: float | None) -> str:
     return f"{100 * value:.3g} %" if value >= EXACT else "0 %"
 
 
-def format_share_range(median: float | None, least: float | None, worst: float | None) -> str:
+def format_percent_range(median: float | None, least: float | None, worst: float | None) -> str:
     """Format the median of errors over motions, with the smallest and the largest in brackets; a dash for no motions."""
     if median is not None and math.isnan(median):
         return "-"
-    if share(least) == share(worst):
-        return share(median)
-    return f"{share(median)} ({share(least).removesuffix(' %')} to {share(worst)})"
+    if format_percent(least) == format_percent(worst):
+        return format_percent(median)
+    return f"{format_percent(median)} ({format_percent(least).removesuffix(' %')} to {format_percent(worst)})"
 
 
 def latex(text: str, symbols: Mapping[str, str]) -> str:

@@ -20,9 +20,9 @@ from hypothesis import strategies as st
 from paramreduce_cli.artifacts import hdf5, sample_files
 from paramreduce_cli.artifacts.atomic import atomically, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, reading, write
-from paramreduce_cli.artifacts.parts import Parts
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
+from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import (
@@ -145,8 +145,8 @@ def test_a_disk_that_fills_up(two_link_copy):
     assert not list(two_link_copy.glob(".*.tmp"))
 
 
-def test_temporary_files_of_kills_go_but_not_those_that_a_share_may_be_writing(tmp_path):
-    shares = tmp_path / "samples.h5.parts"
+def test_temporary_files_of_kills_go_but_not_those_that_a_job_may_be_writing(tmp_path):
+    shares = tmp_path / "samples.h5.items"
     shares.mkdir()
     new, old = shares / ".new.h5.abcd1234.tmp", shares / ".old.h5.abcd1234.tmp"
     left = tmp_path / ".samples.h5.abcd1234.tmp"
@@ -267,18 +267,22 @@ def test_a_run_can_be_waited_for(tmp_path):
     assert order == ["first", "second"]
 
 
-def test_parts_belong_to_one_origin(two_link_results, tmp_path):
+def test_items_belong_to_one_origin(two_link_results, tmp_path):
     path = Store(two_link_results).path(Trajectories)
     trajectories, _ = load_file(path, Trajectories, "two_link", "")
-    parts = Parts(tmp_path / "parts", STAMP)
-    parts["a"] = trajectories.estimation[0]
-    assert same(parts["a"], trajectories.estimation[0])
+    items = StoredItems(tmp_path / "x.h5", lambda seconds: STAMP)
+    items["a"], items["b"], items["c"] = trajectories.estimation[0], None, np.arange(3)
+    assert same(items["a"], trajectories.estimation[0])
+    assert items["b"] is None
+    assert items["c"].tolist() == [0, 1, 2]
+    assert list(items) == ["a", "b", "c"]
     other = dataclasses.replace(STAMP, sections={"model": "changed"})
-    assert "a" not in Parts(tmp_path / "parts", other)
-    (tmp_path / "parts" / "a.h5").write_bytes(b"cut off")
-    assert "a" not in parts
-    parts.clear()
-    assert not (tmp_path / "parts").exists()
+    assert "a" not in StoredItems(tmp_path / "x.h5", lambda seconds: other)
+    assert "a" not in StoredItems(tmp_path / "x.h5", lambda seconds: STAMP, from_start=True)
+    (tmp_path / "x.h5.items" / "a.h5").write_bytes(b"cut off")
+    assert "a" not in items
+    items.clear()
+    assert not (tmp_path / "x.h5.items").exists()
 
 
 def test_stamp_survives(tmp_path):

@@ -14,7 +14,7 @@ import numpy as np
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.workers import excitation_of, optimise_all
-from paramreduce_cli.records import Run
+from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import excitation_task
 from tests.oracles import capsules, pinocchio_model
@@ -69,7 +69,7 @@ def main(count=100, jobs=2):
         model = build_model(config, config.model, Run())
         task = excitation_task(config.trajectories, model)
         keys = [f"estimation-{k:04d}" for k in range(count)]
-        found = optimise_all(task, keys, Run(jobs=jobs))
+        found = optimise_all(task, keys, Run(jobs=jobs), Items())
         measured = [worst(config, model, task, found[key]) for key in keys]
         good = [
             m["distance"] > 0
@@ -92,7 +92,7 @@ def main(count=100, jobs=2):
         moving = dataclasses.replace(
             task, settings=dataclasses.replace(task.settings, rest_to_rest=False)
         )
-        free = optimise_all(moving, some, Run(jobs=jobs))
+        free = optimise_all(moving, some, Run(jobs=jobs), Items())
         excitation = excitation_of(task)
         rest, other = (
             [log_determinant(excitation, config, where[key]) for key in some]

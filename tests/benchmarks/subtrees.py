@@ -6,7 +6,7 @@ find, go on in turns, and tell each other what is better.
 
 import numpy as np
 
-from paramreduce_cli.records import Share
+from paramreduce_cli.records import Part
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
@@ -43,7 +43,7 @@ def jobs_of(seed, n, count):
     for number in range(1, count + 1):
         job = PartedSearch(search, np.zeros(0, np.int64))
         if count > 1:
-            job.deal(Share(number, count))
+            job.deal(Part(number, count))
         yield job
 
 

@@ -34,7 +34,7 @@ def wait_until(condition, seconds=60):
 
 
 def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(arguments, tmp_path):
-    parts = tmp_path / "r" / "trajectories.h5.parts"
+    parts = tmp_path / "r" / "trajectories.h5.items"
     with started(["run", *arguments, "--jobs", "1"]) as process:
         wait_until(lambda: len(list(parts.glob("*.h5"))) >= 2)
         os.killpg(process.pid, signal.SIGINT)
@@ -54,7 +54,7 @@ def test_interrupted_with_ctrl_c_it_goes_on_with_what_is_missing(arguments, tmp_
 
 def test_a_polite_kill_leaves_no_process_behind(arguments, tmp_path):
     with started(["run", *arguments]) as process:
-        wait_until(lambda: list((tmp_path / "r" / "trajectories.h5.parts").glob("*.h5")))
+        wait_until(lambda: list((tmp_path / "r" / "trajectories.h5.items").glob("*.h5")))
         process.terminate()
         _, err = process.communicate(timeout=30)
     assert process.returncode == 130, err

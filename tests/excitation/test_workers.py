@@ -4,14 +4,18 @@ import numpy as np
 import pytest
 from conftest import config_and_model
 
-from paramreduce_cli.records import Run
+from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.optimize_trajectories import optimize_trajectories
 
 
 @pytest.fixture(scope="module")
 def optimise():
     config, model = config_and_model("two_link", "trajectories.starts=2")
-    return partial(optimize_trajectories, config.trajectories, model, None)
+    return partial(_optimise, config.trajectories, model)
+
+
+def _optimise(section, model, run, items=None):
+    return optimize_trajectories(section, model, None, run, items or Items())
 
 
 def test_results_do_not_depend_on_the_number_of_processes(optimise):
@@ -24,13 +28,13 @@ def test_results_do_not_depend_on_the_number_of_processes(optimise):
         assert np.array_equal(a.coefficients, b.coefficients)
 
 
-def test_finished_parts_are_not_made_again(optimise):
+def test_finished_items_are_not_made_again(optimise):
     seen = []
-    first = Run(2)
-    made = optimise(first)
-    del first.parts["estimation-0001"]
-    kept = first.parts["estimation-0000"]
-    again = optimise(Run(2, first.parts, progress=lambda p: seen.append((p.task, p.remark))))
+    items = Items()
+    made = optimise(Run(2), items)
+    del items.kept["estimation-0001"]
+    kept = items.kept["estimation-0000"]
+    again = optimise(Run(2, progress=lambda p: seen.append((p.task, p.remark))), items)
     assert again.estimation[0] is kept
     assert np.array_equal(again.estimation[1].coefficients, made.estimation[1].coefficients)
     others = len(made.estimation) + len(made.validation) + len(made.test) - 1

@@ -9,7 +9,7 @@ from oracles.selection import all_best_errors, error_by_definition
 from selecting import Effort, dependent_problem, found, problem
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import WHOLE, ProofStatus, Share
+from paramreduce_cli.records import WHOLE, Part, ProofStatus
 from paramreduce_cli.reduction.best_subset import kernel, parts
 from paramreduce_cli.reduction.best_subset.merging import joined
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
@@ -155,7 +155,7 @@ def test_subtrees_dealt_to_jobs_leave_nothing_out(monkeypatch, many):
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     jobs = [PartedSearch(lambda log: Search(p, 8, *start(p, 8), log=log), BEGINNING) for _ in "123"]
-    digests = {job.deal(Share(number, 3)) for number, job in enumerate(jobs, 1)}
+    digests = {job.deal(Part(number, 3)) for number, job in enumerate(jobs, 1)}
     assert len(digests) == 1
     logs = [set(map(bytes, parts.taken_apart(job.log))) - {b""} for job in jobs]
     assert not logs[0] & logs[1] | logs[1] & logs[2] | logs[0] & logs[2]
@@ -171,7 +171,7 @@ def shares_of(problem, count, **effort):
     """What jobs prove of the same, each of its subtrees."""
     wanted = Effort(subtrees=True, **effort)
     for number in range(1, count + 1):
-        yield found("best-subset", problem, share=Share(number, count), effort=wanted).proofs
+        yield found("best-subset", problem, part=Part(number, count), effort=wanted).proofs
 
 
 def tied_problem(seed):
@@ -210,13 +210,13 @@ def test_jobs_and_threads_find_the_same_of_subsets_as_good_as_each_other(monkeyp
 
     def proofs(share=WHOLE, **effort):
         search = ProofSearch(
-            SelectionTask(TorqueObjective(given), share=share, effort=Effort(**effort)), poor
+            SelectionTask(TorqueObjective(given), part=share, effort=Effort(**effort)), poor
         )
         search.run()
         return search.record()
 
     whole = proofs()
-    together = joined([proofs(Share(number, 3), subtrees=True) for number in (1, 2, 3)])
+    together = joined([proofs(Part(number, 3), subtrees=True) for number in (1, 2, 3)])
     for other in (together, proofs(jobs=2)):
         assert [kept.tolist() for kept in other.subsets] == [
             kept.tolist() for kept in whole.subsets
@@ -276,7 +276,7 @@ def test_a_job_that_knows_more_is_dealt_the_same(monkeypatch):
     dealt = []
     for previous in (None, known):
         task = SelectionTask(
-            TorqueObjective(given), share=Share(1, 2), previous=previous,
+            TorqueObjective(given), part=Part(1, 2), previous=previous,
             effort=Effort(subtrees=True, node_limit=5),
         )  # fmt: skip
         search = ProofSearch(task, [np.arange(n) for n in whole.n])
@@ -300,14 +300,14 @@ def test_jobs_tell_each_other_what_they_find():
     best = found("best-subset", given).proofs
     poor = [np.arange(n) for n in best.n]
     task = SelectionTask(TorqueObjective(given), effort=Effort(node_limit=3))
-    task.incumbents[8] = best.subsets[7]
+    task.incumbents["incumbent-0008"] = best.subsets[7]
     heard = ProofSearch(task, poor)
     heard.run()
     assert heard.record().torque_error[7] == pytest.approx(best.torque_error[7])
     assert heard.record().torque_error[8] > 1.01 * best.torque_error[8]
     task = SelectionTask(TorqueObjective(given))
     ProofSearch(task, poor).run()
-    assert sorted(task.incumbents[8]) == sorted(best.subsets[7])
+    assert sorted(task.incumbents["incumbent-0008"]) == sorted(best.subsets[7])
 
 
 def test_a_search_for_less_proves_a_lower_bound():

@@ -15,7 +15,7 @@ from conftest import CONFIGS
 from paramreduce_cli.cli.commands.run import run
 from paramreduce_cli.records import Block, Estimate
 from paramreduce_cli.report.data import first_motion
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 
 def paragraph(results):
@@ -47,8 +47,13 @@ def test_methods_tell_of_a_log(measured_results):
     summary = json.loads((results / "report" / "summary.json").read_text())
     found = summary["identification"]
     assert "identified from the measured torques by least squares weighted by the noise" in text
-    unexplained = f"{share(found['reduced']['held_out'])} of the torques held out stay unexplained"
-    assert f"{unexplained}, {share(found['full']['held_out'])} with all base parameters" in text
+    unexplained = (
+        f"{format_percent(found['reduced']['held_out'])} of the torques held out stay unexplained"
+    )
+    assert (
+        f"{unexplained}, {format_percent(found['full']['held_out'])} with all base parameters"
+        in text
+    )
     for term in summary["terms"]:
         assert f"Terms of the {term['function']} dynamics" in text
         assert f": {term['operations']} operations instead of" in text

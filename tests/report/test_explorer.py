@@ -16,7 +16,7 @@ from explored import explored
 
 import paramreduce_cli as pr
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 in_browser = pytest.mark.skipif(MISSING, reason="there is no Chromium with its driver")
 
@@ -197,7 +197,7 @@ def test_the_answer_comes_first_at_any_width(page, summary, width, dark):
         selected = summary["selected"]
         assert selected["verdict"] in header.text
         assert "paramreduce export" in header.text
-        assert share(selected["torque_error"]["validation"]) in header.text
+        assert format_percent(selected["torque_error"]["validation"]) in header.text
         assert str(selected["operations"]["inverse"]) in header.text
         assert all(name in header.text for name in selected["parameters"])
         assert width < 1000 or header.rect["y"] + header.rect["height"] < 800

@@ -13,7 +13,7 @@ from conftest import run_stages
 
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.tables import tables
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.texts.table import Table
 
@@ -160,7 +160,7 @@ def test_errors_joint_by_joint_are_those_of_the_samples(summary, two_link_result
             shares = rms / np.sqrt(np.mean(tau**2, axis=0))
             for row, error, relative in zip(rows, rms, shares, strict=True):
                 assert row[1 + 2 * k] == f"{error:.2g} N m"
-                assert row[2 + 2 * k] == share(relative)
+                assert row[2 + 2 * k] == format_percent(relative)
 
 
 def test_latex_escapes_what_latex_would_trip_over():

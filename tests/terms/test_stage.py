@@ -27,7 +27,7 @@ from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduc
 from paramreduce_cli.runner import Runner
 from paramreduce_cli.stages import reduce_terms
 from paramreduce_cli.terms import simplify
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
 STAGES = {stage.name: stage for stage in pipeline()}
@@ -428,20 +428,22 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
         assert f"{joint}: {largest:.3g} " in header
     for joint, (lower, upper) in zip(names, np.moveaxis(term.drawn, 2, 0), strict=True):
         assert f"{joint}: position {lower[0]:.4g} to {upper[0]:.4g} rad, velocity {lower[1]:.4g} to {upper[1]:.4g}" in header  # fmt: skip
-    said = f"Torque error on {term.random_states} of them: {share(term.random_torque_error)}."
+    said = (
+        f"Torque error on {term.random_states} of them: {format_percent(term.random_torque_error)}."
+    )
     assert said in header
     assert f"that of {names[term.worst_joint]}, at" in header
     for joint, state in zip(names, term.worst_state.T, strict=True):
         assert f"{joint}: position {state[0]:.4g} rad, velocity {state[1]:.4g} rad/s" in header
     eigenvalue = f"on {term.mass_states} random states: {term.smallest_eigenvalue:.3g}."
-    error = f"accelerations on these: {share(term.random_acceleration_error)}."
+    error = f"accelerations on these: {format_percent(term.random_acceleration_error)}."
     assert (eigenvalue in header) == (error in header) == (name == "direct")
     assert "allowed 5 %" in header
     values = values_file(chosen, title, "", model.mechanism, term)["parameters.json"].decode()
     for line in json.loads(values)["holds"]:
         assert " ".join(line.split()) in header
     errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
-    assert (" / ".join(map(share, errors)) in header) == (name == "direct")
+    assert (" / ".join(map(format_percent, errors)) in header) == (name == "direct")
 
 
 def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypatch):

@@ -12,7 +12,7 @@ from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 
 _MOST_JOINTS = 60
 _MOST_SHOWN = 12
@@ -71,9 +71,9 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         z = m.z[:, j]
         table.add_row(
             name, f"{z.min():.3g} to {z.max():.3g}", f"{abs(m.dz[:, j]).max():.3g}", f"{rms:.3g}",
-            f"{log.noise[j]:.2g}", share(float(log.noise[j]) / rms if rms else None),
+            f"{log.noise[j]:.2g}", format_percent(float(log.noise[j]) / rms if rms else None),
         )  # fmt: skip
-    table.add_row("all", "", "", "", "", share(log.noise_share))
+    table.add_row("all", "", "", "", "", format_percent(log.noise_share))
     say_table(table, _TABLE_WIDTH)
     if found is not None:
         say(

@@ -36,7 +36,7 @@ from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.pipeline import absent_files, stages_to_run
 from paramreduce_cli.records import Report
 from paramreduce_cli.runner import Runner, asked
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 
 _TABLE_WIDTH = 110
 _MOST_PLACES = 8
@@ -199,7 +199,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
         say(found["comparison"])
         if found["consistent"] is not None:
             say(
-                f"Physically consistent parameters: {share(found['consistent']['held_out'])} held out"
+                f"Physically consistent parameters: {format_percent(found['consistent']['held_out'])} held out"
             )
 
 
@@ -212,12 +212,12 @@ def _summary_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
             error, keys = error["test"] or {}, ("median", "worst")
         else:
             keys = ("estimation", "validation")
-        cells += [share(error.get(key)) for key in keys]
+        cells += [format_percent(error.get(key)) for key in keys]
     return [*cells, str(row["operations"]["inverse"]), str(row["operations"]["direct"])]
 
 
 def _said(error: dict[str, Any]) -> str:
     """Return the errors of a function on the test set, or on the sets that there are; empty where none are known."""
     if error["test"] is not None:
-        return format_share_range(**error["test"])
-    return " / ".join(share(one) for one in error.values() if one is not None)
+        return format_percent_range(**error["test"])
+    return " / ".join(format_percent(one) for one in error.values() if one is not None)

@@ -1,6 +1,8 @@
 """Proofs of several jobs as one."""
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -79,44 +81,50 @@ def _of_all(found: Sequence[ProofStatus]) -> ProofStatus:
 
 
 def merged(proofs: Sequence[Proofs]) -> Proofs:
-    """What is known of each size by any of several searches on the same data.
+    """Return what several searches on the same data know of each size.
 
     Args:
-        proofs: Those of other units or sizes than the last are left out.
+        proofs: Proofs of any sizes; those of other units than the last are left out.
 
     Returns:
         For every size the entry that says most: what is proven, else the smaller error; with the
         largest bound of all, and all nodes.
     """
-    first = proofs[-1]
-    proofs = [one for one in proofs if _alike(one, first)]
-    rows = range(first.n.size)
+    units = proofs[-1].units
+    usable = [one for one in proofs if _same_units(one.units, units)]
+    sizes = sorted({n for one in usable for n in one.n.tolist()})
+    return _stacked([_merged_size([one.of_size(n) for one in usable if n in one.n]) for n in sizes])
 
-    def worth(one: Proofs, k: int) -> tuple[bool, float, float]:
-        return (
-            one.status[k] is ProofStatus.BEST_FOUND,
-            float(one.torque_error[k]),
-            -float(one.lower_bound[k]),
-        )
 
-    best = [min(proofs, key=lambda one: worth(one, k)) for k in rows]
-    return Proofs(
-        units=first.units,
-        n=first.n,
-        subsets=tuple(one.subsets[k] for k, one in enumerate(best)),
-        torque_error=np.array([one.torque_error[k] for k, one in enumerate(best)]),
+def _merged_size(proofs: Sequence[Proofs]) -> Proofs:
+    """Return the proof of one size that says most."""
+
+    def worth(one: Proofs) -> tuple[bool, float, float]:
+        unfinished = one.status[0] is ProofStatus.BEST_FOUND
+        return unfinished, float(one.torque_error[0]), -float(one.lower_bound[0])
+
+    return replace(
+        min(proofs, key=worth),
         lower_bound=np.max([one.lower_bound for one in proofs], axis=0),
-        status=tuple(one.status[k] for k, one in enumerate(best)),
         seconds=np.sum([one.seconds for one in proofs], axis=0),
         nodes=np.sum([one.nodes for one in proofs], axis=0),
-        logs=tuple(one.logs[k] for k, one in enumerate(best)),
-        dealt=np.array([one.dealt[k] for k, one in enumerate(best)], dtype=np.int64),
     )
+
+
+def _stacked(proofs: Sequence[Proofs]) -> Proofs:
+    """Return proofs of one size each as one record."""
+    arrays = ("n", "torque_error", "lower_bound", "seconds", "nodes", "dealt")
+    tuples = ("subsets", "status", "logs")
+    columns: dict[str, Any] = {
+        name: np.concatenate([getattr(one, name) for one in proofs]) for name in arrays
+    }
+    columns |= {name: tuple(getattr(one, name)[0] for one in proofs) for name in tuples}
+    return Proofs(units=proofs[0].units, **columns)
 
 
 def _alike(one: Proofs, other: Proofs) -> bool:
-    return (
-        np.array_equal(one.n, other.n)
-        and len(one.units) == len(other.units)
-        and all(map(np.array_equal, one.units, other.units))
-    )
+    return np.array_equal(one.n, other.n) and _same_units(one.units, other.units)
+
+
+def _same_units(one: Sequence[IntArray], other: Sequence[IntArray]) -> bool:
+    return len(one) == len(other) and all(map(np.array_equal, one, other))

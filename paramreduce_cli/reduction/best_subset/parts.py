@@ -8,7 +8,7 @@ from itertools import count, pairwise
 
 import numpy as np
 
-from paramreduce_cli.records import IntArray, Share
+from paramreduce_cli.records import IntArray, Part
 from paramreduce_cli.reduction.best_subset.search import Search
 
 _NEXT = np.iinfo(np.int64).max
@@ -54,7 +54,7 @@ class PartedSearch:
     def _split(self) -> Search | None:
         return next((new for part in self._open if (new := part.split()) is not None), None)
 
-    def deal(self, share: Share) -> int:
+    def deal(self, job: Part) -> int:
         """Keep some of the subtrees that the search is split into, for other jobs to take the others.
 
         Those nearest to the root are split first, until there are many; what is done on the way is done
@@ -68,7 +68,7 @@ class PartedSearch:
         if whole.finished:
             self._ended, self._open = [whole], []
             return 0
-        many = min(_SUBTREES * share.count, _MOST_SUBTREES)
+        many = min(_SUBTREES * job.count, _MOST_SUBTREES)
         number = count()  # older ones first where depths are equal
         heap = [(0, next(number), part) for part in self._open]
         while 0 < len(heap) < many:
@@ -85,7 +85,7 @@ class PartedSearch:
         cards = [part for _, _, part in sorted(heap, key=lambda card: (card[2].bound, card[1]))]
         self._best = min([*cards, *self._ended], key=lambda part: part.squared_error)
         self._glances = sum(part.nodes for part in cards)
-        self._open = cards[share.number - 1 :: share.count]
+        self._open = job.select(cards)
         self._glances -= sum(part.nodes for part in self._open)
         self.learn(self.squared_error, self.subset)
         return zlib.crc32(b"".join(part.log.tobytes() for part in cards))

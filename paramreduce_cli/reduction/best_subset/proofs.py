@@ -1,13 +1,16 @@
 """Searches for the best subsets of all sizes, and what they prove."""
 
+import contextlib
 import threading
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
+from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
@@ -31,6 +34,8 @@ _PATIENCE = 0.5
 _FIRST_ROUND, _GROWTH = 30_000, 8
 """Nodes for each size in the first round, and how many times more in each further one."""
 _UNLIMITED = 10**15
+_WORTH_KEEPING = 1.0
+"""Seconds of a search from which on its end is kept at once."""
 _LONG = 3.0
 """Of a compilation, s: longer than to load what has been compiled before."""
 _SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
@@ -81,7 +86,7 @@ class ProofSearch:
         self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._proofs: dict[int, _Proof] = {}
         self._spent: dict[int, int] = {}
-        self._by_subtrees: bool = task.effort.subtrees and not task.share.whole
+        self._by_subtrees: bool = task.effort.subtrees and not task.part.is_whole
         for columns in starts:
             self._start(self._numbered(columns))
         if task.previous is not None:
@@ -166,7 +171,7 @@ class ProofSearch:
         sizes = sorted(self._proofs)
         return [
             proof
-            for n in (sizes if self._by_subtrees else self._task.share.dealt(sizes))
+            for n in (sizes if self._by_subtrees else self._task.part.select(sizes))
             if (proof := self._proofs[n]).status == ProofStatus.BEST_FOUND
             and proof.squared_error > FULL_PRECISION**2
         ]
@@ -187,6 +192,8 @@ class ProofSearch:
                 self._exchange(proof, search)
             self._spent[proof.n] = before + search.nodes
             self._take_over(proof, search)
+            if proof.status != ProofStatus.BEST_FOUND and proof.seconds > _WORTH_KEEPING:
+                self._task.keep(self._record([proof]))
             waiting.remove(proof)
 
         shown = -1
@@ -215,20 +222,22 @@ class ProofSearch:
 
         search = PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
         if dealing:
-            proof.dealt = search.deal(self._task.share)
+            proof.dealt = search.deal(self._task.part)
             search.learn(proof.squared_error, proof.subset)
         return search
 
     def _exchange(self, proof: _Proof, search: PartedSearch) -> None:
         """Tell other jobs of a better subset, or hear of one; what is heard is calculated anew."""
-        told = self._task.incumbents.get(proof.n, proof.subset[:0])
+        key = f"incumbent-{proof.n:04d}"
+        told = self._task.incumbents.get(key, proof.subset[:0])
         usable = 0 < told.size <= proof.n and set(told.tolist()) <= self._place.keys()
         subset = self._numbered(told) if usable else proof.subset
         known = self._squared_error(subset) if usable else proof.squared_error
         if known < search.squared_error * (1 - RESOLUTION):
             search.learn(known, subset)
         elif search.squared_error < known * (1 - RESOLUTION):
-            self._task.incumbents[proof.n] = self._problem.columns[search.subset]
+            with contextlib.suppress(ParamreduceError):  # nothing is lost but time of other jobs
+                self._task.incumbents[key] = self._problem.columns[search.subset]
 
     def _slices(
         self, proof: _Proof, search: PartedSearch, nodes: int, deadline: float,
@@ -270,6 +279,7 @@ class ProofSearch:
         clear = self._objective.problem.certifiable and self._problem.certifiable
         return clear and not search.doubtful
 
+    @cached_property
     def _rank(self) -> int:
         problem = self._objective.problem
         return len(independent_columns(problem.W, problem.candidates_by_preference))
@@ -322,9 +332,11 @@ class ProofSearch:
         return [self._units(proof.exact) for proof in self._proofs.values()]
 
     def record(self) -> Proofs:
-        """All proofs by size."""
-        proofs = [self._proofs[n] for n in sorted(self._proofs)]
-        rank = self._rank()
+        """Return all proofs by size."""
+        return self._record([self._proofs[n] for n in sorted(self._proofs)])
+
+    def _record(self, proofs: Sequence[_Proof]) -> Proofs:
+        rank = self._rank
 
         def status(proof: _Proof) -> ProofStatus:
             done = proof.status == ProofStatus.OPTIMAL and proof.n > rank

@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
@@ -30,8 +30,8 @@ def identified_errors(data: ReportData) -> Table:
                     "-" if data.log is None else f"{data.log.noise[j]:.3g}",
                     f"{found.full.joint_held_out[j]:.3g}",
                     f"{error:.3g}",
-                    share(error / float(found.torque_size[j])),
-                    "-" if nominal is None else share(error / float(nominal[j])),
+                    format_percent(error / float(found.torque_size[j])),
+                    "-" if nominal is None else format_percent(error / float(nominal[j])),
                     f"{found.residuals.lag_one[j]:.2f}",
                     f"{found.residuals.white[j]:.2g}",
                     f"{found.residuals.effective_samples[j]:.0f}",
@@ -39,7 +39,7 @@ def identified_errors(data: ReportData) -> Table:
             )
         worst = f"{np.nanmax(found.reduced.joint_held_out):.3g}"
         rows.append(
-            ("all", "", share(found.full.held_out), share(found.reduced.held_out), f"worst {worst}",
+            ("all", "", format_percent(found.full.held_out), format_percent(found.reduced.held_out), f"worst {worst}",
              "", "", "", "")
         )  # fmt: skip
     return Table("Errors on measured torques", header, tuple(rows))

@@ -4,7 +4,7 @@ import numpy as np
 
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
@@ -21,7 +21,7 @@ def joint_errors(data: ReportData) -> Table:
             relative = float(getattr(result, f"torque_error_joint_{which}")[row][j])
             unit = data.force_unit(j)
             cells.append(f"{relative * rms[j]:.2g} {unit}" if unit else "")
-            cells.append(share(relative) if rms[j] > NO_TORQUE else "no torque")
+            cells.append(format_percent(relative) if rms[j] > NO_TORQUE else "no torque")
         rows.append(tuple(cells))
     header = ("joint", *(f"{which}{end}" for which in data.rms_torque for end in ("", ", share")))
     return Table("Errors joint by joint", header, tuple(rows))

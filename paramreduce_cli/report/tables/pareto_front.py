@@ -3,7 +3,7 @@
 from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
 
@@ -19,9 +19,9 @@ def pareto_front(data: ReportData) -> Table:
             text
             for what in ("torque", "acceleration")
             for text in (
-                share(float(getattr(r, f"{what}_error_estimation")[k])),
-                share(float(getattr(r, f"{what}_error_validation")[k])),
-                format_share_range(*ErrorRange.of(getattr(r, f"{what}_error_test")[k])),
+                format_percent(float(getattr(r, f"{what}_error_estimation")[k])),
+                format_percent(float(getattr(r, f"{what}_error_validation")[k])),
+                format_percent_range(*ErrorRange.of(getattr(r, f"{what}_error_test")[k])),
             )
         ]
         counts = (r.operations_inverse, r.operations_direct)

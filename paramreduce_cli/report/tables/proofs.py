@@ -3,7 +3,7 @@
 from paramreduce_cli.records import ProofStatus
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
@@ -18,10 +18,10 @@ def proofs(data: ReportData) -> Table:
     for k, n in enumerate(found.n):
         error, bound = float(found.torque_error[k]), float(found.lower_bound[k])
         closed = found.status[k] in (ProofStatus.OPTIMAL, ProofStatus.BEYOND_RANK)
-        gap = "0" if closed else share(1 - bound / error if error else 0.0)
+        gap = "0" if closed else format_percent(1 - bound / error if error else 0.0)
         rows.append(
             (
-                str(n), share(error), share(bound), gap, str(found.status[k]),
+                str(n), format_percent(error), format_percent(bound), gap, str(found.status[k]),
                 str(found.nodes[k]), f"{found.seconds[k]:.2f}",
             )
         )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
@@ -15,5 +15,5 @@ def selected_subsets(data: ReportData) -> Table:
         row = found.row(n)
         if row is not None:
             kept = " ".join(names[k] for k in sorted(found.subsets[row]))
-            rows.append((name, share(float(found.torque_error[row])), kept))
+            rows.append((name, format_percent(float(found.torque_error[row])), kept))
     return Table(f"Subsets of {n} parameters", ("heuristic", "ε_τ E", "parameters"), tuple(rows))

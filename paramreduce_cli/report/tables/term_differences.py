@@ -5,7 +5,7 @@ import numpy as np
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS
-from paramreduce_cli.texts import share
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
@@ -21,7 +21,7 @@ def term_differences(data: ReportData) -> Table:
             largest, nominal = one.largest_difference[j], data.reduction.nominal_torque[j]
             star = " *" if j == one.worst_joint else ""
             sizes = (
-                (f"{largest:.3g}", share(largest / nominal))
+                (f"{largest:.3g}", format_percent(largest / nominal))
                 if not np.isnan(largest)
                 else ("-", "-")
             )

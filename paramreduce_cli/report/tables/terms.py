@@ -6,7 +6,7 @@ from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS
-from paramreduce_cli.texts import format_share_range, share
+from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 
 
@@ -22,9 +22,9 @@ def terms(data: ReportData) -> Table:
     for name, one in (data.terms.functions if data.terms is not None else {}).items():
         shown = (
             _known(one.torque_error_estimation), _known(one.torque_error_validation),
-            format_share_range(*ErrorRange.of(one.torque_error_test)),
+            format_percent_range(*ErrorRange.of(one.torque_error_test)),
             _known(one.acceleration_error_estimation), _known(one.acceleration_error_validation),
-            format_share_range(*ErrorRange.of(one.acceleration_error_test)),
+            format_percent_range(*ErrorRange.of(one.acceleration_error_test)),
             _known(one.random_torque_error), _known(one.random_acceleration_error),
         )  # fmt: skip
         eigenvalue = one.smallest_eigenvalue
@@ -43,4 +43,4 @@ def terms(data: ReportData) -> Table:
 
 def _known(error: float) -> str:
     """A share; a dash where it is not known."""
-    return "-" if np.isnan(error) else share(error)
+    return "-" if np.isnan(error) else format_percent(error)

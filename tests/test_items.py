@@ -1,7 +1,6 @@
-"""Stages as several jobs: what they make is what one job makes, and what is missing is named."""
+"""Items of stages: whatever jobs do them, and whenever, what is combined is what one job makes."""
 
 import shutil
-from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -9,19 +8,22 @@ import pytest
 from conftest import ONE_FORMAT, TWO_LINK, config_of
 
 from paramreduce_cli.artifacts.store import Store
-from paramreduce_cli.errors import ArtifactError, DataError, ParamreduceWarning
+from paramreduce_cli.errors import DataError, ParamreduceWarning
+from paramreduce_cli.multibody import observation
 from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import (
+    Items,
+    Part,
+    ProofItem,
     Proofs,
     ProofStatus,
     Reduction,
     Samples,
-    Share,
     TermReduction,
     Trajectories,
 )
+from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
 from paramreduce_cli.runner import Runner
-from paramreduce_cli.stages.reduce import _of_jobs
 
 STAGES = {stage.name: stage for stage in pipeline()}
 SHARED = ("optimize-trajectories", "sample", "reduce", "reduce-terms")
@@ -36,14 +38,14 @@ def run_in_parts(folder, count):
     """Run everything, the stages that can be as several jobs, the last of them first."""
     runner = Runner(config_of("two_link", ONE_FORMAT), Store(folder))
     for stage in stages_to_run(runner.config)[:-1]:  # the page tells nothing new
-        if stage.in_shares:
+        if stage.has_items:
             for number in range(count, 0, -1):
-                runner.run(stage, share=Share(number, count))
+                runner.run(stage, part=Part(number, count))
         runner.run(stage)
 
 
 def test_stages_that_are_done_in_parts():
-    assert tuple(name for name, stage in STAGES.items() if stage.in_shares) == SHARED
+    assert tuple(name for name, stage in STAGES.items() if stage.has_items) == SHARED
 
 
 def test_parts_make_what_one_job_makes(two_link_results, tmp_path):
@@ -51,7 +53,7 @@ def test_parts_make_what_one_job_makes(two_link_results, tmp_path):
     run_in_parts(tmp_path, 3)
     for name in ("trajectories.h5", "samples.h5", "reduction.h5", "validation.h5"):
         assert digest(tmp_path, name) == digest(two_link_results, name)
-    assert not list(tmp_path.glob("*.parts"))
+    assert not list(tmp_path.glob("*.items"))
 
 
 def test_more_parts_than_trajectories_make_what_one_job_makes(two_link_results, tmp_path):
@@ -63,7 +65,7 @@ def test_more_parts_than_trajectories_make_what_one_job_makes(two_link_results, 
     whole = digest(tmp_path, "samples.h5")
     runner.store.path(Samples).unlink()
     for number in range(1, 6):
-        runner.run(STAGES["sample"], share=Share(number, 5))
+        runner.run(STAGES["sample"], part=Part(number, 5))
     runner.run(STAGES["sample"])
     assert digest(tmp_path, "samples.h5") == whole
 
@@ -77,13 +79,14 @@ def test_parts_of_loops_are_whole_trajectories(tmp_path):
     whole = digest(tmp_path, "samples.h5")
     runner.store.path(Samples).unlink()
     for number in (1, 2):
-        runner.run(STAGES["sample"], share=Share(number, 2))
+        runner.run(STAGES["sample"], part=Part(number, 2))
     runner.run(STAGES["sample"])
     assert digest(tmp_path, "samples.h5") == whole
 
 
-def test_parts_of_one_recording(two_link_results, tmp_path):
-    """A recording is cut anywhere; its triangular factor is put together from those of the parts."""
+def test_parts_of_one_recording(two_link_results, tmp_path, monkeypatch):
+    """A recording is cut anywhere; its triangular factor is combined from those of the pieces."""
+    monkeypatch.setattr(observation, "PIECE_SAMPLES", 2 * observation.BLOCK_SAMPLES)
     with h5py.File(two_link_results / "samples.h5") as file:
         found = file["estimation"]
         z, dz, ddz, tau = (np.tile(found[key][:], (9, 1)) for key in ("z", "dz", "ddz", "tau"))
@@ -101,7 +104,7 @@ def test_parts_of_one_recording(two_link_results, tmp_path):
         whole = {name: file[f"estimation/{name}"][:] for name in ("W", "tau", "factors", "time")}
     path.unlink()
     for number in range(1, 5):
-        runner.run(STAGES["sample"], share=Share(number, 4))
+        runner.run(STAGES["sample"], part=Part(number, 4))
     runner.run(STAGES["sample"])
     with h5py.File(path) as file:
         for name in ("W", "tau", "time"):
@@ -122,7 +125,7 @@ def test_functions_whose_terms_are_reduced_by_several_jobs(two_link_results, tmp
     whole = digest(tmp_path, "terms.h5")
     runner.store.path(TermReduction).unlink()
     for number in (1, 2, 3):  # one more than there are functions
-        runner.run(STAGES["reduce-terms"], share=Share(number, 3))
+        runner.run(STAGES["reduce-terms"], part=Part(number, 3))
     runner.run(STAGES["reduce-terms"])
     assert digest(tmp_path, "terms.h5") == whole
 
@@ -134,7 +137,7 @@ def test_what_jobs_were_warned_of_is_said_of_the_whole(two_link_results, tmp_pat
     told = []
     runner = Runner(config_of("two_link", ONE_FORMAT, *rough), Store(tmp_path), remark=told.append)
     with pytest.warns(ParamreduceWarning, match="time_limit"):
-        runner.run(STAGES["reduce-terms"], share=Share(1, 1))
+        runner.run(STAGES["reduce-terms"], part=Part(1, 2))
     assert not told
     runner.run(STAGES["reduce-terms"])
     (text,) = runner.store.stamp(TermReduction).warnings
@@ -150,7 +153,7 @@ def both_parts(tmp_path_factory):
     for name in ("build-model", "optimize-trajectories"):
         runner.run(STAGES[name])
     for number in (1, 2):
-        runner.run(STAGES["sample"], share=Share(number, 2))
+        runner.run(STAGES["sample"], part=Part(number, 2))
     return folder
 
 
@@ -158,36 +161,42 @@ def both_parts(tmp_path_factory):
 def sampled(both_parts, tmp_path):
     """Both parts of the samples, and a runner to put them together."""
     shutil.copytree(both_parts, tmp_path, dirs_exist_ok=True)
-    return Runner(config_of("two_link"), Store(tmp_path)), tmp_path / "samples.h5.parts"
+    return Runner(config_of("two_link"), Store(tmp_path)), tmp_path / "samples.h5.items"
 
 
 def test_a_part_that_is_done_is_not_done_again(sampled):
     runner, _ = sampled
-    assert runner.run(STAGES["sample"], share=Share(1, 2)).current
-    assert not runner.run(STAGES["sample"], share=Share(1, 2), force=True).current
+    assert runner.run(STAGES["sample"], part=Part(1, 2)).current
+    assert not runner.run(STAGES["sample"], part=Part(1, 2), force=True).current
 
 
-def test_a_missing_part_is_named(sampled):
+def test_what_is_missing_is_done_with_what_is_combined(sampled, both_parts):
     runner, folder = sampled
-    (folder / "share-0002-of-0002.h5").unlink()
-    with pytest.raises(ArtifactError, match=r"part 2/2 is missing .*sample --part 2/2"):
-        runner.run(STAGES["sample"])
-    assert not runner.store.path(Samples).exists()
-    assert not runner.run(STAGES["sample"], force=True).current
+    kept = sorted(path.name for path in folder.glob("*.h5"))
+    runner.run(STAGES["sample"])
+    whole = digest(folder.parent, "samples.h5")
+    runner.store.path(Samples).unlink()
+    shutil.copytree(both_parts / folder.name, folder)
+    for name in kept[:3]:
+        (folder / name).unlink()
+    runner.run(STAGES["sample"])
+    assert digest(folder.parent, "samples.h5") == whole
+    assert not folder.exists()
 
 
-def test_the_command_that_makes_a_missing_part_is_the_one_at_hand(sampled):
+def test_items_are_done_again_by_force_alone(sampled):
     runner, folder = sampled
-    runner.asked = "arm.yaml --results r --set robot=two_link"
-    (folder / "share-0002-of-0002.h5").unlink()
-    with pytest.raises(ArtifactError, match=f"`paramreduce sample {runner.asked} --part 2/2`"):
-        runner.run(STAGES["sample"])
+    path = folder / "estimation-000000.h5"
+    with h5py.File(path, "a") as file:
+        file.attrs["wall_seconds"] = 1000.0
+    runner.run(STAGES["sample"], force=True)
+    assert runner.store.stamp(Samples).seconds < 1000
 
 
 def test_what_is_put_together_has_taken_as_long_as_its_parts(sampled):
     runner, folder = sampled
     parts = 0.0
-    for path in folder.glob("share-*.h5"):
+    for path in folder.glob("*.h5"):
         with h5py.File(path, "a") as file:
             file.attrs["wall_seconds"] = 100.0
             parts += 100.0
@@ -195,17 +204,16 @@ def test_what_is_put_together_has_taken_as_long_as_its_parts(sampled):
     assert parts < runner.store.stamp(Samples).seconds < parts + 60
 
 
-def test_a_damaged_part_is_named_and_made_again(sampled):
+def test_a_damaged_item_is_done_again(sampled):
     runner, folder = sampled
-    path = folder / "share-0001-of-0002.h5"
+    path = folder / "estimation-000000.h5"
     with h5py.File(path) as file:
-        first = file["estimation/tau"][0].tobytes()
+        first = file["item/tau"][0].tobytes()
     content = bytearray(path.read_bytes())
     content[content.index(first)] ^= 1
     path.write_bytes(content)
-    with pytest.raises(ArtifactError, match="part 1/2 is damaged"):
-        runner.run(STAGES["sample"])
-    assert not runner.run(STAGES["sample"], share=Share(1, 2)).current
+    assert not runner.run(STAGES["sample"], part=Part(1, 2)).current
+    assert runner.run(STAGES["sample"], part=Part(1, 2)).current
     runner.run(STAGES["sample"])
     assert runner.store.path(Samples).exists()
     assert not folder.exists()
@@ -225,12 +233,14 @@ def test_proofs_of_parts_are_those_of_their_sizes(tmp_path):
     runner = Runner(config_of("two_link"), Store(tmp_path))
     for name in ("build-model", "optimize-trajectories", "sample"):
         runner.run(STAGES[name])
-    nodes = []
+    folder = tmp_path / "reduction.h5.items"
     for number in (1, 2):
-        outcome = runner.run(STAGES["reduce"], share=Share(number, 2))
-        nodes.append(outcome.record.proofs.nodes)
-    assert not ((nodes[0] > 0) & (nodes[1] > 0)).any()
-    assert set(runner.run(STAGES["reduce"]).record.proofs.status) == {"optimal"}
+        assert not runner.run(STAGES["reduce"], part=Part(number, 2)).current
+        own = {f"n-{n:04d}.h5" for n in range(number, 8, 2)}
+        assert {path.name for path in folder.glob("n-*.h5")} >= own
+    assert runner.run(STAGES["reduce"], part=Part(3, 4)).current, "whoever has done the sizes"
+    assert {path.name for path in folder.glob("n-*.h5")} == {f"n-{n:04d}.h5" for n in range(1, 8)}
+    assert set(runner.run(STAGES["reduce"]).record.proofs.status) == {"optimal", "beyond-rank"}
     assert runner.store.path(Reduction).exists()
     assert runner.store.path(Trajectories).exists()
 
@@ -241,21 +251,27 @@ def test_proofs_of_subtrees_make_what_one_job_makes(two_link_results, tmp_path):
     for name in ("build-model", "optimize-trajectories", "sample"):
         runner.run(STAGES[name])
     for number in (1, 2):
-        runner.run(STAGES["reduce"], share=Share(number, 2))
+        runner.run(STAGES["reduce"], part=Part(number, 2))
     runner.run(STAGES["reduce"])
     assert digest(tmp_path, "reduction.h5") == digest(two_link_results, "reduction.h5")
-    assert not list(tmp_path.glob("*.parts"))
+    assert not list(tmp_path.glob("*.items"))
 
 
 def test_shares_of_a_proof_hold_together_alone():
     """Parts of other last digits are left out where they are proofs of their own sizes, and missed else."""
     factor = np.eye(3)
     both = [shared_proofs(factor), shared_proofs(factor * (1 + 1e-16) + 1e-16)]
+
+    def load(*found, key="subtrees-{:04d}-of-0002"):
+        kept = {key.format(k): one for k, one in enumerate(found, 1)}
+        return KeptProofs(Items(kept), factor, by_subtrees=True).load()
+
     with pytest.raises(DataError, match=r"1 of the 2 parts are of samples .* other last digits"):
-        _of_jobs(factor, both)
-    assert len(_of_jobs(factor, [shared_proofs(factor), shared_proofs(factor)])) == 1
-    alone = [shared_proofs(found.factor, dealt=0) for found in both]
-    assert _of_jobs(factor, alone) == [alone[0].proofs]
+        load(*both)
+    with pytest.raises(DataError, match=r"1 of the 2 parts .* missing. .*--part \(2/2\)"):
+        load(both[0])
+    assert len(load(both[0], both[0])) == 1
+    assert load(*both, key="n-{:04d}") == [both[0].proofs]
 
 
 def shared_proofs(factor, dealt=5):
@@ -265,7 +281,7 @@ def shared_proofs(factor, dealt=5):
         lower_bound=one, status=(ProofStatus.OPTIMAL,), seconds=one, nodes=np.array([1]),
         logs=(np.zeros(0, int),), dealt=np.array([dealt]),
     )  # fmt: skip
-    return SimpleNamespace(factor=factor, proofs=proofs)
+    return ProofItem(factor, proofs)
 
 
 @pytest.mark.parametrize(
@@ -285,9 +301,8 @@ def test_what_cannot_be_done_in_parts(invoke, tmp_path, measured_copy):
 
 
 @pytest.mark.parametrize("count", [1, 3, 7, 12])
-def test_shares_are_everything_once(count):
+def test_parts_are_everything_once(count):
     items = list(range(10))
-    shares = [Share(number, count) for number in range(1, count + 1)]
-    assert [item for share in shares for item in share.cut(items)] == items
-    assert sorted(item for share in shares for item in share.dealt(items)) == items
-    assert all(Share.parse(str(share)) == share for share in shares)
+    parts = [Part(number, count) for number in range(1, count + 1)]
+    assert sorted(item for part in parts for item in part.select(items)) == items
+    assert all(Part.parse(str(part)) == part for part in parts)

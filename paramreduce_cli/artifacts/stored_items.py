@@ -1,0 +1,150 @@
+"""Finished items of an artifact that is not whole yet, a file each."""
+
+import contextlib
+import time
+from collections.abc import Callable, Iterator, MutableMapping
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.hdf5 import Reader, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.places import ITEMS
+from paramreduce_cli.artifacts.sample_files import load_item_set, save_sample_set
+from paramreduce_cli.errors import ArtifactError
+from paramreduce_cli.records import ProofItem, TermModel, Trajectory
+
+_KIND = "kind"
+"""Attribute that names the kind of record in a file."""
+_RECORDS = {record.__name__: record for record in (Trajectory, TermModel, ProofItem)}
+_NOTHING, _ARRAY, _SET = "nothing", "array", "samples"
+_GROUP = "item"
+
+
+class StoredItems(MutableMapping[str, Any]):
+    """Records of finished items by key.
+
+    Each carries the digests of what it was made from; an item that is damaged, or made from anything else, counts as
+    absent.
+
+    Args:
+        path: The artifact that they are items of.
+        stamp: Returns the provenance of an item, given the seconds that it took.
+        from_start: Whether items of earlier runs count as absent.
+    """
+
+    def __init__(
+        self, path: Path, stamp: Callable[[float], Stamp], *, from_start: bool = False
+    ) -> None:
+        self._folder = path.with_name(f"{path.name}{ITEMS}")
+        self._stamp = stamp
+        self._since = time.perf_counter()
+        self._read: dict[str, tuple[int, Any]] = {}
+        self._from_start = from_start
+        self.written: set[str] = set()
+        """Keys of the items that this run has finished."""
+
+    def _path(self, key: str) -> Path:
+        return self._folder / f"{key}.h5"
+
+    def __getitem__(self, key: str) -> Any:
+        path = self._path(key)
+        if self._from_start and key not in self.written:
+            raise KeyError(key)
+        try:
+            written = path.stat().st_mtime_ns
+        except OSError as error:
+            raise KeyError(key) from error
+        if self._read.get(key, (0, None))[0] != written:
+            self._read[key] = written, self._load(key)
+        record = self._read[key][1]
+        if isinstance(record, _Absent):
+            raise KeyError(key)
+        return record
+
+    def _load(self, key: str) -> Any:
+        path = self._path(key)
+        try:
+            stamp = read_stamp(path)
+            if stamp is None or _origin(stamp) != self._own_origin:
+                return _Absent()
+            with reading(path) as reader:
+                reader.verify()
+                return _load_record(reader)
+        except ArtifactError:
+            return _Absent()
+
+    @cached_property
+    def _own_origin(self) -> tuple[Any, ...]:
+        return _origin(self._stamp(0.0))
+
+    def __setitem__(self, key: str, record: Any) -> None:
+        now = time.perf_counter()
+        stamp = self._stamp(now - self._since)
+        self._since = now
+        write(self._path(key), stamp, lambda writer: _save_record(writer, record))
+        self.written.add(key)
+
+    def __delitem__(self, key: str) -> None:
+        self._path(key).unlink()
+
+    def __iter__(self) -> Iterator[str]:
+        names = (path.stem for path in self._folder.glob("*.h5"))
+        return iter(sorted(name for name in names if not name.startswith(".")))
+
+    def __len__(self) -> int:
+        return sum(1 for _ in self)
+
+    def stamps(self) -> list[Stamp]:
+        """Return the provenance of the items that were made from the same as the artifact."""
+        found: list[Stamp] = []
+        for key in [] if self._from_start else self:
+            with contextlib.suppress(ArtifactError):
+                stamp = read_stamp(self._path(key))
+                if stamp is not None and _origin(stamp) == self._own_origin:
+                    found.append(stamp)
+        return found
+
+    def clear(self) -> None:
+        """Remove all items, what killed jobs have left, and the folder."""
+        for path in self._folder.glob("*"):
+            path.unlink(missing_ok=True)
+        with contextlib.suppress(OSError):
+            self._folder.rmdir()
+
+
+class _Absent:
+    """Stands for an item that is damaged or of another origin."""
+
+
+def _origin(stamp: Stamp) -> tuple[Any, ...]:
+    """Return what an artifact was made from, and by what."""
+    return (stamp.schema, stamp.robot, stamp.versions, stamp.sections, stamp.inputs)
+
+
+def _save_record(writer: Writer, record: Any) -> None:
+    kind = type(record).__name__
+    if record is None:
+        writer.attribute(_KIND, _NOTHING)
+    elif isinstance(record, np.ndarray):
+        writer.attribute(_KIND, _ARRAY)
+        writer.dataset(_GROUP, record)
+    elif kind in _RECORDS:
+        writer.attribute(_KIND, kind)
+        layouts.save(writer, record, _GROUP)
+    else:
+        writer.attribute(_KIND, _SET)
+        save_sample_set(writer, _GROUP, record)
+
+
+def _load_record(reader: Reader) -> Any:
+    kind = reader.attribute(_KIND)
+    if kind == _NOTHING:
+        return None
+    if kind == _ARRAY:
+        return reader.array(_GROUP)
+    if kind in _RECORDS:
+        return layouts.load(reader, _RECORDS[kind], _GROUP)
+    return load_item_set(reader, _GROUP)

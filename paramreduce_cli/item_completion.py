@@ -1,0 +1,60 @@
+"""The items of a stage: each is done once, and kept until all of them are combined."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, TypeVar
+
+from paramreduce_cli.processes import State, worker_pool
+from paramreduce_cli.records import Items, PartFinished, Progress, Run
+
+Record = TypeVar("Record")
+
+
+def complete_items(
+    run: Run,
+    items: Items,
+    keys: Sequence[str],
+    state: Callable[[], State],
+    work: Callable[[State, str], Record],
+    *,
+    task: str,
+    jobs: int = 1,
+    describe: Callable[[Any], str] = lambda _: "",
+    prepare: Callable[[], None] = lambda: None,
+) -> dict[str, Record]:
+    """Do the items that are not kept yet, and keep each when it is done.
+
+    Args:
+        run: Progress callback.
+        items: Items that are kept, and the part of this job.
+        keys: Keys of all items, in their order.
+        state: Returns what the work on every item needs; picklable where there are several processes.
+        work: Does the item of a key; picklable as well.
+        task: Name of the work for the progress.
+        jobs: Number of processes.
+        describe: Returns a remark on a finished item for the progress.
+        prepare: Called in this process before others start, where an item is missing.
+
+    Returns:
+        Records of all items by key.
+
+    Raises:
+        PartFinished: This job does only a part of the items, and that is done.
+        KeyboardInterrupt: After all processes have been stopped; finished items are kept.
+    """
+    own = items.part.select(keys)
+    found: dict[str, Record] = {key: items.kept[key] for key in own if key in items.kept}
+    missing = [key for key in own if key not in found]
+    kept = f"{len(found)} kept from before" if found else ""
+    run.progress(Progress(task, len(found), len(own), kept))
+    if missing:
+        if jobs > 1:
+            prepare()
+        with worker_pool(min(jobs, len(missing)), state) as pool:
+            for key, record in pool.as_done(work, missing):
+                items.kept[key] = record
+                found[key] = items.kept[key]  # a large one is read from where it is kept
+                remark = f"{key}{describe(record)}"
+                run.progress(Progress(task, len(found), len(own), remark))
+    if not items.part.is_whole:
+        raise PartFinished
+    return {key: found[key] for key in keys}

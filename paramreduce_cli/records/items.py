@@ -1,0 +1,67 @@
+"""The items of a stage: what is done once, kept, and combined in the end; and the part of them that a job does."""
+
+from __future__ import annotations
+
+from collections.abc import MutableMapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Part:
+    """Every so many of a stage's items, written ``3/8``; all items as it stands."""
+
+    number: int = 1
+    """Number of the job, from 1 on."""
+    count: int = 1
+    """Number of jobs."""
+
+    @classmethod
+    def parse(cls, text: str) -> Part:
+        """Read ``NUMBER/COUNT``.
+
+        Raises:
+            ValueError: The text is no such part.
+        """
+        number, slash, count = text.partition("/")
+        if not (slash and number.isdecimal() and count.isdecimal()):
+            raise ValueError(f"{text!r} is not of the form 3/8.")
+        if not 1 <= int(number) <= int(count):
+            raise ValueError(f"{text!r} is none of {count} parts, which count from 1.")
+        return cls(int(number), int(count))
+
+    def __str__(self) -> str:
+        return f"{self.number}/{self.count}"
+
+    @property
+    def is_whole(self) -> bool:
+        """Whether the part is all items."""
+        return self.count == 1
+
+    def select(self, items: Sequence[T]) -> list[T]:
+        """Return the items of this part: neighbours, which are alike, go to different jobs."""
+        return list(items[self.number - 1 :: self.count])
+
+
+WHOLE = Part()
+"""All items."""
+
+
+@dataclass(frozen=True)
+class Items:
+    """The items of a stage."""
+
+    kept: MutableMapping[str, Any] = field(default_factory=dict)
+    """Finished items by key, which outlive an interrupted run."""
+    part: Part = WHOLE
+    """Which items this job does."""
+
+
+NO_ITEMS = Items()
+"""Where a stage is run without items that are kept."""
+
+
+class PartFinished(Exception):  # noqa: N818 - no error
+    """Raised when a job has finished its part, so that nothing is combined."""
