@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import ROOT, config_and_model
 
-from paramreduce_cli.records import Recordings, Run, Trajectories, Trajectory
+from paramreduce_cli.records import Items, Recordings, Run, Trajectories, Trajectory
 from paramreduce_cli.stages.reduce import reduce
 from paramreduce_cli.stages.sample import sample
 
@@ -40,7 +40,7 @@ def test_selection_on_the_committed_trajectories(robot):
     )  # fmt: skip
     samples = sample(config.sampling, model, trajectories, Recordings(None, None, None))
     counted = config.validation.operations
-    reduction = reduce(config.reduction, counted, model, samples, None, Run(jobs=2))
+    reduction = reduce(config.reduction, counted, model, samples, None, Run(jobs=2), Items())
     found = reduction.heuristics
     *full, greedy, optimal, missed = TARGETS[robot]
 

@@ -5,7 +5,7 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 """
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
-from paramreduce_cli.records.items import NO_ITEMS, WHOLE, Items, Part, PartFinished
+from paramreduce_cli.records.items import WHOLE, Items, Part, PartFinished
 from paramreduce_cli.records.logs import (
     Consistency,
     Estimate,

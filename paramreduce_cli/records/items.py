@@ -59,9 +59,5 @@ class Items:
     """Which items this job does."""
 
 
-NO_ITEMS = Items()
-"""Where a stage is run without items that are kept."""
-
-
 class PartFinished(Exception):  # noqa: N818 - no error
     """Raised when a job has finished its part, so that nothing is combined."""

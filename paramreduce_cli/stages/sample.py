@@ -39,7 +39,6 @@ from paramreduce_cli.multibody.observation import (
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.told import ToldSet
 from paramreduce_cli.records import (
-    NO_ITEMS,
     SETS,
     Block,
     FloatArray,
@@ -70,13 +69,14 @@ def sample(
     recordings: Recordings,
     log: MeasuredLog | None = None,
     tell: Tell = lambda _: None,
-    items: Items = NO_ITEMS,
+    items: Items | None = None,
 ) -> Samples:
     """Sample the estimation, the validation and the test set: states, torques and observation matrices.
 
     From the optimised trajectories, or from a log or recorded states where the config names them. The
     items are trajectories, or pieces of a recording.
     """
+    items = items or Items()
     if sampling.log is not None and not items.part.is_whole:
         raise ConfigError(
             "is sampled as a whole, as its low-pass runs on across parts. Leave --part out.",

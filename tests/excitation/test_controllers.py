@@ -25,7 +25,7 @@ from paramreduce_cli.export.ways import Ways, at_rest
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.records import Run
+from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.optimize_trajectories import excitation_task, optimize_trajectories
 
 ASKED = [
@@ -47,7 +47,7 @@ CEILING = 1.1
 def made():
     """The two-link arm, which hangs down."""
     config, model = config_and_model("two_link", *ASKED)
-    return config, model, optimize_trajectories(config.trajectories, model, None, Run())
+    return config, model, optimize_trajectories(config.trajectories, model, None, Run(), Items())
 
 
 def states(trajectories, trajectory, finer=10):
@@ -79,7 +79,7 @@ def test_rest_costs_little(made):
     _, model, trajectories = made
     asked = [text for text in ASKED if "rest_to_rest" not in text]
     moving, _ = config_and_model("two_link", *asked)
-    free = optimize_trajectories(moving.trajectories, model, None, Run())
+    free = optimize_trajectories(moving.trajectories, model, None, Run(), Items())
     kappa = [min(t.kappa for t in found.estimation) for found in (trajectories, free)]
     assert kappa[0] < 1.5 * kappa[1]
 
@@ -127,7 +127,7 @@ def test_noise_of_torques_weights_the_rows():
     assert found != pytest.approx(usual.condition_numbers(z, dz, ddz), rel=0.05)
     np.testing.assert_allclose(weighted.peak_torques(z, dz, ddz), usual.peak_torques(z, dz, ddz))
     assert weighted.load_share(z, dz, ddz) == pytest.approx(usual.load_share(z, dz, ddz), rel=1e-9)
-    made = optimize_trajectories(config.trajectories, model, None, Run())
+    made = optimize_trajectories(config.trajectories, model, None, Run(), Items())
     for trajectory in made.estimation:
         own = weighted.condition_numbers(*states(made, trajectory, finer=1))
         assert own["column-normalised"] == pytest.approx(trajectory.kappa, rel=1e-6)

@@ -15,7 +15,7 @@ from paramreduce_cli.excitation.point_to_point import (
     sample_point_to_point_times,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.records import Run
+from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.optimize_trajectories import optimize_trajectories
 
 QUICK = ("trajectories.starts=1", "trajectories.polished=1", "trajectories.max_iterations=30")
@@ -130,7 +130,7 @@ def test_brought_coefficients_with_and_without_one(two_link_results, tmp_path):
         path.write_text(json.dumps({"trajectories": own}))
         coefficients = load_coefficients(path)
         config, model = config_and_model("two_link")
-        found = optimize_trajectories(config.trajectories, model, coefficients, Run())
+        found = optimize_trajectories(config.trajectories, model, coefficients, Run(), Items())
         assert len(found.test) == (4 if with_one else 0)
         assert len(found.test_point_to_point) == 10
         known = summary["trajectories"]["test_point_to_point"]
@@ -158,7 +158,7 @@ def test_motions_keep_to_torque_limits_and_too_few_are_said(monkeypatch):
         "trajectories.test_count=1",
         f"trajectories.torque_limits={limits.tolist()}",
     )
-    found = optimize_trajectories(config.trajectories, model, None, Run())
+    found = optimize_trajectories(config.trajectories, model, None, Run(), Items())
     dynamics = Dynamics(model.mechanism)
     assert len(found.test_point_to_point) == 10
     for motion in found.test_point_to_point:
@@ -166,4 +166,4 @@ def test_motions_keep_to_torque_limits_and_too_few_are_said(monkeypatch):
         assert (np.abs(dynamics.inverse(*states, model.values)) <= 1.01 * limits).all()
     monkeypatch.setattr("paramreduce_cli.excitation.point_to_point._TRIES", 0)
     with pytest.warns(ParamreduceWarning, match="^0 of 10 point-to-point motions of the test set"):
-        optimize_trajectories(config.trajectories, model, None, Run())
+        optimize_trajectories(config.trajectories, model, None, Run(), Items())
