@@ -5,7 +5,9 @@ what of it stands in their way they name as a :class:`Concern`, and
 :mod:`paramreduce_cli.config.concerns` says which key that is.
 """
 
+from collections.abc import Sequence
 from enum import Enum, auto
+from typing import Any
 
 Key = tuple[str | int, ...]
 """Where something stands in a config: names of keys, and numbers of items in lists."""
@@ -41,9 +43,46 @@ class Concern(Enum):
 
 
 class ParamreduceError(Exception):
-    """Something the user can mend: cause and remedy in one message."""
+    """Something the user can mend.
+
+    Args:
+        message: What is wrong and what would be right, complete as it stands but for the remedy.
+        rejected: Word of the call that is wrong, as it was given: a path, an option's value, a setting.
+        choices: Words that would be right in its place; the default first where it is written out.
+        command: Stage, or ``run``, that mends it with the config of the call.
+        remedy: Sentence on what to do, with the command where that is another one.
+        options: Option and value that the call lacks, or has wrong.
+    """
 
     exit_code = 2
+
+    def __init__(
+        self,
+        message: str,
+        *,
+        rejected: str = "",
+        choices: Sequence[str] = (),
+        command: str = "",
+        remedy: str = "",
+        options: tuple[str, ...] = (),
+    ) -> None:
+        super().__init__(message)
+        self.rejected, self.choices = rejected, tuple(choices)
+        self.command, self.remedy, self.options = command, remedy, options
+
+    def describe(self, arguments: str = "CONFIG") -> str:
+        """Return the message with its remedy.
+
+        Args:
+            arguments: Config and options of the call, which the command takes.
+        """
+        parts = [str(self.args[0]), self.remedy]
+        if self.command:
+            parts.append(f"Run `paramreduce {self.command} {arguments}`.")
+        return " ".join(part for part in parts if part)
+
+    def __str__(self) -> str:
+        return self.describe()
 
 
 class ConfigError(ParamreduceError):
@@ -52,14 +91,22 @@ class ConfigError(ParamreduceError):
     Args:
         message: Of the key's value, if there is a key: ``is ...``, ``has ...`` or a sentence.
         key: Where it stands; the line is looked up from it.
+        in_file: Whether a line of a file is wrong, not the call.
+        fields: As for :class:`ParamreduceError`.
     """
 
-    def __init__(self, message: str, key: Key = ()) -> None:
-        self.key = key
-        super().__init__(message, key)
+    def __init__(
+        self, message: str, key: Key = (), *, in_file: bool = False, **fields: Any
+    ) -> None:
+        super().__init__(message, **fields)
+        self.key, self.in_file = key, in_file
+        self.place = ""
+        """File and line, or setting, in which the key stands, once that is known."""
 
-    def __str__(self) -> str:
-        return keyed(self.key, self.args[0])
+    def describe(self, arguments: str = "CONFIG") -> str:
+        """Return place, key, message and remedy."""
+        text = keyed(self.key, super().describe(arguments))
+        return f"{self.place}: {text}" if self.place else text
 
 
 def keyed(key: Key, message: str) -> str:
@@ -68,6 +115,10 @@ def keyed(key: Key, message: str) -> str:
         return message
     separator = " " if message.startswith(("is ", "has ")) else ": "
     return f"{'.'.join(map(str, key))}{separator}{message}"
+
+
+class MissingConfigError(ConfigError):
+    """A call that names no config where one is needed."""
 
 
 class ArtifactError(ParamreduceError):
@@ -87,11 +138,9 @@ class ConcernError(ParamreduceError):
     """
 
     def __init__(self, message: str, concern: Concern) -> None:
+        super().__init__(message)
         self.concern = concern
-        super().__init__(message, concern)
-
-    def __str__(self) -> str:
-        return str(self.args[0])
+        self.args = (message, concern)
 
 
 class FormulationError(ParamreduceError):

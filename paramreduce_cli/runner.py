@@ -9,7 +9,7 @@ import importlib.metadata
 import json
 import shlex
 import time
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
@@ -285,8 +285,10 @@ class Runner:
     def _look_at_inputs(self, stage: Stage) -> None:
         """Refuse inputs of another layout; say which ones, or what these were made from, do not fit."""
         for record in self._upstream(stage):
-            for text in self.remarks_on(record):
-                self.remark(text)
+            if text := self.describe_mismatch(record):
+                run = f"`paramreduce run {self.asked}`".replace(" `", "`")
+                again = f"{run} rebuilds it" if self.config is not None else "make it again"
+                self.remark(f"{text}; {again}")
 
     def _upstream(self, stage: Stage) -> list[type]:
         """Records of files that a stage's artifact comes from, each after those that it is made from."""
@@ -298,24 +300,22 @@ class Runner:
                 records[entry.type] = None
         return list(records)
 
-    def remarks_on(self, record: type) -> Iterator[str]:
-        """What a record's file does not fit that it was made from; nothing where there is none.
+    def describe_mismatch(self, record: type) -> str:
+        """Return from what else a record's file was made than the config and the files here; empty if from these.
 
         Raises:
-            ArtifactError: It is of another layout.
+            ArtifactError: The file is of another layout.
         """
         stamp = self.store.stamp(record)
         if stamp is None:
-            return
+            return ""
         path = self.store.path(record)
         check_schema(path, stamp)
         changed = []
         if self.config is not None:
             changed += [f"another {name} section" for name in self._changed_sections(stamp)]
         changed += [f"another {name}" for name in self._changed_artifacts(record, stamp)]
-        if changed:
-            again = "`paramreduce run` rebuilds it" if self.config is not None else "make it again"
-            yield f"{path} was made with {' and '.join(changed)}; {again}"
+        return f"{path} was made with {' and '.join(changed)}" if changed else ""
 
     def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
         """Files of the folder that are not those a record was made from."""

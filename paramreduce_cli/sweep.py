@@ -18,7 +18,7 @@ from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.config.loading import load_section
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import UnknownNameError
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.pipeline import Stage, pipeline, stages_to_run
 from paramreduce_cli.records import PROVING, Part, Reduction, Report, Samples, Validation
@@ -49,7 +49,7 @@ def _known(parts: dict[str, int]) -> dict[str, int]:
     names = [stage.name for stage in pipeline() if stage.has_items]
     for name in parts:
         if name not in names:
-            raise ValueError(unknown("stage that is done in parts", name, names))
+            raise UnknownNameError("stage that is done in parts", name, names)
     return parts
 
 

@@ -54,13 +54,22 @@ def check_is_file(path: Path) -> None:
         raise ArtifactError(f"{path}: is no file.")
 
 
-def missing(path: Path, hint: str = "") -> ArtifactError:
-    """That a file is not there, with a remedy if there is one, else with what may have been meant."""
+def missing(path: Path, *, command: str = "", remedy: str = "") -> ArtifactError:
+    """Return the error that a file is not there, with its remedy, or with the file that is called nearly the same.
+
+    Args:
+        path: Path of the file.
+        command: Stage that makes the file.
+        remedy: Sentence on where the file comes from.
+    """
     beside = [other.name for other in path.parent.iterdir()] if path.parent.is_dir() else []
-    near = difflib.get_close_matches(path.name, beside, n=1)
-    meant = f"Did you mean {path.with_name(near[0])}?" if near else ""
-    remedy = hint or meant
-    return ArtifactError(f"{path}: there is no such file.{' ' + remedy if remedy else ''}")
+    near = [] if command or remedy else difflib.get_close_matches(path.name, beside, n=1)
+    choices = [str(path.with_name(name)) for name in near]
+    meant = f" Did you mean {choices[0]}?" if choices else ""
+    return ArtifactError(
+        f"{path}: there is no such file.{meant}",
+        rejected=str(path), choices=choices, command=command, remedy=remedy,
+    )  # fmt: skip
 
 
 _LEFT = re.compile(r"\..+\.\w{8}\.tmp")

@@ -396,31 +396,33 @@ class StoredRows:
 
 
 @contextlib.contextmanager
-def reading(path: Path, hint: str = "") -> Iterator[Reader]:
+def reading(path: Path, *, command: str = "", remedy: str = "") -> Iterator[Reader]:
     """Open an HDF5 file to read.
 
     Args:
         path: The file.
-        hint: Remedy that is added when it is not there.
+        command: Stage that makes it, for messages.
+        remedy: Sentence on what it is needed for.
 
     Raises:
         ArtifactError: It is missing, truncated or no HDF5 file.
     """
     if not path.exists():
-        raise missing(path, hint)
+        raise missing(path, command=command, remedy=remedy)
     check_is_file(path)
     try:
         file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)
     except OSError as error:
         raise ArtifactError(
-            f"{path}: is not a readable HDF5 file (truncated, or of another kind).{' ' + hint if hint else ''}"
-        ) from error
+            f"{path}: is not a readable HDF5 file (truncated, or of another kind).",
+            rejected=str(path), command=command, remedy=remedy,
+        ) from error  # fmt: skip
     with file:
         try:
             yield Reader(path, file)
         except (OSError, KeyError, RuntimeError, ValueError, TypeError, MemoryError) as error:
             raise ArtifactError(
-                f"{path}: is damaged: {error}.{' ' + hint if hint else ''}"
+                f"{path}: is damaged: {error}.", rejected=str(path), command=command, remedy=remedy
             ) from error
 
 

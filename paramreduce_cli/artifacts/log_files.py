@@ -172,7 +172,8 @@ def _bag(path: Path) -> RawLog:
         from rosbags.typesys import Stores, get_typestore
     except ImportError as error:
         raise ArtifactError(
-            f"{path}: ROS bags are read by rosbags; install it with `pip install 'paramreduce[rosbag]'`."
+            f"{path}: ROS bags are read by rosbags.",
+            remedy="Install it with `pip install 'paramreduce[rosbag]'`.",
         ) from error
     if not path.exists():
         raise missing(path)

@@ -14,7 +14,6 @@ from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 
 _LISTING = ".exported.json"
-_AGAIN = "Make it again with `paramreduce run`."
 
 
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
@@ -100,8 +99,9 @@ def load_summary(path: Path) -> dict[str, Any]:
         raise ArtifactError(f"{path}: is no summary.json.")
     if not _is_whole(summary):
         raise ArtifactError(
-            f"{path}: is damaged or was changed: its digest does not fit. Make it again with "
-            "`paramreduce report`."
+            f"{path}: is damaged or was changed: its digest does not fit.",
+            rejected=str(path),
+            command="report",
         )
     return summary
 
@@ -138,17 +138,27 @@ def verify_report(path: Path) -> None:
     """
     listed = load_summary(path).get("files")
     if not isinstance(listed, dict):
-        raise ArtifactError(f"{path}: lists no files, so it is no report's summary. {_AGAIN}")
+        raise ArtifactError(
+            f"{path}: lists no files, so it is no report's summary.",
+            rejected=str(path),
+            command="run",
+        )
     for name, digest in listed.items():
         check_is_file(path.parent / name)
         try:
             found = hashlib.sha256((path.parent / name).read_bytes()).hexdigest()
         except OSError as error:
             raise ArtifactError(
-                f"{path.parent / name}: cannot be read: {error.strerror}. {_AGAIN}"
+                f"{path.parent / name}: cannot be read: {error.strerror}.",
+                rejected=str(path),
+                command="run",
             ) from error
         if found != digest:
-            raise ArtifactError(f"{path.parent / name}: is damaged or was changed. {_AGAIN}")
+            raise ArtifactError(
+                f"{path.parent / name}: is damaged or was changed.",
+                rejected=str(path),
+                command="run",
+            )
 
 
 def load_json(path: Path) -> Any:

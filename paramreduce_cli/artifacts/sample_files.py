@@ -162,14 +162,14 @@ class StoredSet:
         if self._path.parent.suffix == ITEMS:
             path = self._path.parent.with_name(_MODEL)
         own = read_stamp(self._path)
-        with reading(
-            path, f"The observation matrix of {self._path} is computed from it."
-        ) as reader:
+        needed = f"The observation matrix of {self._path} is computed from it."
+        with reading(path, remedy=needed) as reader:
             stamp = read_stamp(path)
             if own is None or stamp is None or own.inputs.get(_MODEL) != stamp.digest:
                 raise ArtifactError(
-                    f"{path}: is not the model that {self._path} was computed with. Rebuild both with "
-                    "`paramreduce run`."
+                    f"{path}: is not the model that {self._path} was computed with. Rebuild both.",
+                    rejected=str(path),
+                    command="run",
                 )
             # Late: CasADi and all kinds of robots, of which looking at a file needs nothing.
             from paramreduce_cli.multibody.dynamics import Dynamics

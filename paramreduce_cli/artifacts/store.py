@@ -196,13 +196,14 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
     Raises:
         ArtifactError: It is missing, damaged, of another robot or of another schema.
     """
-    hint = f"Make it with `paramreduce {maker}`." if maker else ""
-    with reading(path, hint) as reader:
+    with reading(path, command=maker) as reader:
         stamp = stamp_of(reader)
         if stamp is not None:
             check_schema(path, stamp)
         if stamp is None and robot is not None:
-            raise ArtifactError(f"{path}: was not made by paramreduce. {hint}".rstrip())
+            raise ArtifactError(
+                f"{path}: was not made by paramreduce.", rejected=str(path), command=maker
+            )
         if stamp is not None and robot is not None and stamp.robot != robot:
             raise ArtifactError(
                 f"{path}: belongs to the robot {stamp.robot}, not to {robot}. Choose another folder "
@@ -221,7 +222,9 @@ def check_schema(path: Path, stamp: Stamp) -> None:
         age = "an older" if stamp.schema < SCHEMA else "a newer"
         raise ArtifactError(
             f"{path}: was written in {age} layout (schema {stamp.schema}, this version reads "
-            f"{SCHEMA}). Rebuild it with `paramreduce run`."
+            f"{SCHEMA}).",
+            rejected=str(path),
+            command="run",
         )
 
 

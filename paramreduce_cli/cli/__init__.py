@@ -3,15 +3,23 @@
 import os
 import sys
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.hints import after, after_usage, meant_command, of_usage, with_arguments
 from paramreduce_cli.cli.next_step import next_steps
+from paramreduce_cli.cli.suggestions import (
+    Call,
+    UnknownCommandError,
+    describe_error,
+    describe_usage_error,
+    suggest_after_error,
+    suggest_after_usage_error,
+)
 from paramreduce_cli.cli.terminal import (
     complain,
     interruption,
@@ -37,14 +45,13 @@ def main() -> None:
     try:
         code = _called()
     except ParamreduceError as error:
-        message = _hint(with_arguments, str(error)) or str(error)
-        show_errors(message)
-        if further := _hint(after, message, _command()):
+        show_errors(describe_error(error, _call()))
+        if further := _suggest(suggest_after_error, error):
             complain(further)
         code = error.exit_code
     except click.ClickException as error:
-        show_errors(of_usage(error))
-        complain(_hint(after_usage, error))
+        show_errors(describe_usage_error(error))
+        complain(_suggest(suggest_after_usage_error, error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(
@@ -69,20 +76,18 @@ def main() -> None:
     sys.exit(code if isinstance(code, int) else 0)
 
 
-def _hint(made: Callable[..., str], *arguments: object) -> str:
-    """What is made, or nothing: what cannot be looked at here must not hide the error itself."""
+def _suggest(suggest: Callable[[Any, Call], str], error: Exception) -> str:
+    """Return a suggestion; nothing where the folder cannot be looked at."""
     try:
-        return made(*arguments)
-    except Exception:
-        if os.environ.get("PARAMREDUCE_DEBUG"):
-            raise
+        return suggest(error, _call())
+    except OSError:
         return ""
 
 
-def _command() -> click.Command | None:
-    """The one that was called; None where there is no such command."""
-    name = next((word for word in sys.argv[1:] if not word.startswith("-")), "")
-    return cli.get_command(click.Context(cli), name)
+def _call() -> Call:
+    """Return the words of this call, and the command that they name."""
+    name = next((word for word in cli.words if not word.startswith("-")), "")
+    return Call(cli.words, cli.get_command(click.Context(cli), name))
 
 
 def _called() -> object:
@@ -100,6 +105,20 @@ def _called() -> object:
 
 class _Commands(click.Group):
     """The stages and the other commands, each imported when it is called."""
+
+    words: Sequence[str] = ()
+    """Words of the call after the name of the program."""
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """Note the words of the call before click takes them apart."""
+        self.words = tuple(args)
+        return super().make_context(info_name, args, parent, **extra)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names, in alphabetical order."""
@@ -122,7 +141,7 @@ class _Commands(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command that is asked for, or the one that was meant."""
         if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
-            raise click.UsageError(meant_command(args[0], self.list_commands(ctx)), ctx)
+            raise UnknownCommandError(args[0], self.list_commands(ctx), ctx)
         return super().resolve_command(ctx, args)
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

@@ -17,6 +17,7 @@ def up_to_date(config: Config | None, store: Store, record: type) -> Any:
     """
     robot = config.robot if config is not None else None
     found = load_file(store.path(record), record, robot, maker_of(record).name)[0]
-    for remark in Runner(config, store, jobs=1).remarks_on(record):
-        raise ArtifactError(f"{remark}.")
+    if mismatch := Runner(config, store, jobs=1).describe_mismatch(record):
+        fields = {"remedy": "Make it again."} if config is None else {"command": "run"}
+        raise ArtifactError(f"{mismatch}.", rejected=str(store.path(record)), **fields)
     return found

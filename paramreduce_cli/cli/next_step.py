@@ -3,7 +3,7 @@
 import shlex
 from pathlib import Path
 
-from paramreduce_cli.cli.here import configs_in, has_report, project_above, results_of
+from paramreduce_cli.cli.project_state import configs_in, has_report, project_above, results_of
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.texts import format_percent, format_percent_range
 

@@ -8,13 +8,27 @@ import click
 
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.config import Config
-from paramreduce_cli.errors import ConfigError
+from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.records import Part
 
-CONFIG = click.argument("config", type=click.Path(path_type=Path, dir_okay=False))
-OPTIONAL_CONFIG = click.argument(
-    "config", type=click.Path(path_type=Path, dir_okay=False), required=False
-)
+
+class FilePath(click.Path):
+    """Path of a file; an error of click knows the path that it rejects."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path, dir_okay=False)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Check the path."""
+        try:
+            return super().convert(value, param, ctx)
+        except click.BadParameter as error:
+            error.rejected = str(value)  # type: ignore[attr-defined]
+            raise
+
+
+CONFIG = click.argument("config", type=FilePath())
+OPTIONAL_CONFIG = click.argument("config", type=FilePath(), required=False)
 RESULTS = click.option(
     "--results",
     type=click.Path(path_type=Path, file_okay=False),
@@ -66,7 +80,8 @@ def results_store(config: Config | None, results: Path | None) -> Store:
     if results is not None:
         return Store(results)
     if config is None:
-        raise ConfigError(
-            "--results: without a config, say where the results go or are, such as --results results/my_samples."
+        raise MissingConfigError(
+            "--results: without a config, say where the results go or are, such as --results results/my_samples.",
+            options=("--results", "results/my_samples"),
         )
     return Store(Path("results") / config.robot)

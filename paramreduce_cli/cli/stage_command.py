@@ -7,6 +7,7 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import file_of, load_file
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import (
     FORCE,
     JOBS,
@@ -15,6 +16,7 @@ from paramreduce_cli.cli.options import (
     RESULTS,
     SET,
     WAIT,
+    FilePath,
     cores,
     results_store,
 )
@@ -22,6 +24,7 @@ from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, remark, show_progress
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
+from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.pipeline import Stage, check_is_asked_for, describe_stage
 from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
 from paramreduce_cli.runner import Outcome, Runner, asked
@@ -48,7 +51,7 @@ def stage_command(name: str) -> click.Command:
         part: Part | None = None,
     ) -> int:
         if config is None and samples is None:
-            raise click.UsageError("Give a CONFIG, or --samples FILE and --results DIR.")
+            raise MissingConfigError("Give a CONFIG, or --samples FILE and --results DIR.")
         robot = config is not None and (samples is None or has_robot(config))
         loaded = load_config(config, overrides) if config is not None and robot else None
         settings = None if loaded is not None else load_settings(config, overrides)
@@ -87,27 +90,24 @@ def stage_command(name: str) -> click.Command:
                 help="A samples.h5 of your own; then CONFIG may be left out, or hold settings without a robot.",
             )
         )  # fmt: skip
-    params.append(
-        click.argument(
-            "config", type=click.Path(path_type=Path, dir_okay=False), required=not config_optional
-        )
-    )
+    params.append(click.argument("config", type=FilePath(), required=not config_optional))
     decorated: Callable[..., Any] = command
     for parameter in params:
         decorated = parameter(decorated)
-    return click.command(stage.name, help=_stage_help(stage, config_optional))(decorated)
+    robot = "ur10" if stage.output in _OF_LOGS else "puma560"
+    example = f"{stage.name} {{config}}"
+    decorator = click.command(
+        stage.name, cls=ExampleCommand, help=_stage_help(stage), example=example, robot=robot
+    )
+    return decorator(decorated)
 
 
-def _stage_help(stage: Stage, config_optional: bool) -> str:
+def _stage_help(stage: Stage) -> str:
     reads = [file_of(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
     flow = f"Reads {source or 'the config'}; writes {file_of(stage.output)}."
-    robot = "configs/ur10.yaml" if stage.output in _OF_LOGS else "configs/puma560.yaml"
-    example = f"Example: paramreduce {stage.name} {robot}"
-    if config_optional:
-        example += f", or: paramreduce {stage.name} --samples my_samples.h5 --results my_results"
     text = (stage.function.__doc__ or "").strip().replace("\n    ", "\n")
-    return f"{text}\n\n{flow}\n\n{example}"
+    return f"{text}\n\n{flow}"
 
 
 def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:

@@ -12,14 +12,13 @@ from paramreduce_cli.config.plausibility import (
 )
 from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 
-Problem = tuple[Key, str]
 _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
 
@@ -56,9 +55,11 @@ def _bodies(config: Config) -> Iterator[Problem]:
             yield (*path, k, "name"), f"{name!r} is taken; every body needs a name of its own"
         if parent is not None and parent not in {"base", *seen}:
             if parent in names:
-                message = f"{parent!r} is not above {name!r}; put parents above children"
+                message: str | UnknownNameError = (
+                    f"{parent!r} is not above {name!r}; put parents above children"
+                )
             else:
-                message = unknown("body", parent, ["base", *seen])
+                message = UnknownNameError("body", parent, ["base", *seen])
             yield (*path, k, "parent"), message
         seen.add(name)
 
@@ -97,14 +98,17 @@ def _constraints(config: Config) -> Iterator[Problem]:
             yield (*path, "name"), f"{entry.name!r} is taken; every constraint needs its own name"
         seen.add(entry.name)
         if entry.coordinate is not None and entry.coordinate not in coordinates:
-            yield (*path, "coordinate"), unknown("coordinate", entry.coordinate, coordinates)
+            yield (
+                (*path, "coordinate"),
+                UnknownNameError("coordinate", entry.coordinate, coordinates),
+            )
         for key in ("body", "axis_body"):
             name = getattr(entry, key)
             if name is not None and name not in bodies:
-                yield (*path, key), unknown("body", name, bodies)
+                yield (*path, key), UnknownNameError("body", name, bodies)
         for j, name in enumerate(entry.bodies or []):
             if name not in bodies:
-                yield (*path, "bodies", j), unknown("body", name, bodies)
+                yield (*path, "bodies", j), UnknownNameError("body", name, bodies)
         if entry.quantity == "singularity" and not description.bodies.closed:
             yield (*path, "quantity"), "singularity is of loops, but there is no closure"
 
@@ -122,11 +126,11 @@ def _groups(config: Config) -> Iterator[Problem]:
             if body not in config.description.bodies.inertial_names():
                 yield (
                     (*path, "bodies", j),
-                    unknown("body", body, config.description.bodies.inertial_names()),
+                    UnknownNameError("body", body, config.description.bodies.inertial_names()),
                 )
         for j, name in enumerate(entry.parameters or []):
             if name not in known:
-                yield (*path, "parameters", j), unknown("parameter", name, known)
+                yield (*path, "parameters", j), UnknownNameError("parameter", name, known)
         for group, members in entry.groups().items():
             if group in known or group in owner.values():
                 yield (*path, "name"), f"the name {group!r} is taken"
@@ -159,7 +163,7 @@ def _simulation(config: Config) -> Iterator[Problem]:
     for key, given in (("inputs", wanted.inputs), ("start", wanted.start)):
         for name in given:
             if name not in names:
-                yield (*path, key, name), unknown("independent coordinate", name, names)
+                yield (*path, key, name), UnknownNameError("independent coordinate", name, names)
     for name, (lower, upper) in wanted.start.items():
         if lower > upper:
             yield (*path, "start", name), f"the range crosses: {lower:g} is above {upper:g}"
@@ -185,7 +189,7 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
     for label, bodies in config.parameter_sets.items():
         for body in bodies:
             if body not in names:
-                yield ("parameter_sets", label, body), unknown("body", body, names)
+                yield ("parameter_sets", label, body), UnknownNameError("body", body, names)
         for name in names:
             if name not in bodies:
                 yield (
@@ -193,7 +197,10 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
                     f"has no body {name}; write `{name}: {{}}` if it has no mass",
                 )
     if config.parameters is not None and config.parameters not in config.parameter_sets:
-        yield ("parameters",), unknown("parameter set", config.parameters, config.parameter_sets)
+        yield (
+            ("parameters",),
+            UnknownNameError("parameter set", config.parameters, config.parameter_sets),
+        )
 
 
 def _per_joint(config: Config) -> Iterator[Problem]:
@@ -266,7 +273,7 @@ def _unmeasured(config: Config) -> Iterator[Problem]:
     names = config.description.bodies.independent_names()
     for k, name in enumerate(config.unmeasured):
         if name not in names:
-            yield ("unmeasured", k), unknown("independent coordinate", name, names)
+            yield ("unmeasured", k), UnknownNameError("independent coordinate", name, names)
     for key in ("torque_limits", "power_limits"):
         given = getattr(config.trajectories, key) or [np.inf]
         if len(given) in (1, len(names)):
@@ -285,7 +292,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
     known = _known_parameters(config)
     for k, name in enumerate(config.model.base_columns or []):
         if name not in known:
-            yield ("model", "base_columns", k), unknown("parameter", name, known)
+            yield ("model", "base_columns", k), UnknownNameError("parameter", name, known)
         elif name in (config.model.base_columns or [])[:k]:
             yield ("model", "base_columns", k), f"{name} stands there twice"
 

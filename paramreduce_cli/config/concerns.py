@@ -38,4 +38,4 @@ _KEYS: dict[Concern, tuple[Key, str]] = {
 def explained(error: ConcernError) -> ConfigError:
     """A numerical error as one about a key, with the remedy that the key offers."""
     key, remedy = _KEYS[error.concern]
-    return ConfigError(f"{error} {remedy}".rstrip(), key)
+    return ConfigError(str(error), key, remedy=remedy)

@@ -1,5 +1,6 @@
 """The configs that come along: beside the package in its repository, or as data of its distribution."""
 
+import difflib
 import importlib.metadata
 import re
 import shutil
@@ -8,6 +9,8 @@ from pathlib import Path
 from paramreduce_cli.errors import ConfigError
 
 _LOGS = (".csv", ".csv.gz", ".gz", ".h5", ".npz")
+_LIKE = 0.5
+"""How alike an unknown name must be to an example's."""
 _INSTALLED = "share/paramreduce/configs/"
 
 
@@ -21,6 +24,16 @@ def examples() -> dict[str, Path]:
         found = [entry for entry in listed if _INSTALLED in entry.as_posix()]
         files = [Path(str(entry.locate())) for entry in found if entry.suffix == ".yaml"]
     return {path.stem: path for path in sorted(files)}
+
+
+def exists_already(path: Path) -> ConfigError:
+    """Return the error that a config would replace a file, with a path that is free."""
+    names = (path.with_stem(f"{path.stem}_{k}") for k in range(2, 1000))
+    free = next((other for other in names if not other.exists()), path)
+    return ConfigError(
+        f"{path}: exists already; choose another place with --output.",
+        rejected=str(path), options=("--output", str(free)),
+    )  # fmt: skip
 
 
 def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
@@ -38,7 +51,10 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     """
     known = examples()
     if name not in known:
-        raise ConfigError(f"--example {name}: there is {', '.join(known)}.")
+        near = difflib.get_close_matches(name, known, n=1, cutoff=_LIKE)
+        raise ConfigError(
+            f"--example {name}: there is {', '.join(known)}.", rejected=name, choices=near
+        )
     source = known[name]
     named = re.findall(r"[\w./-]+/[\w.-]+\.\w+", source.read_text(encoding="utf-8"))
     beside = [entry for entry in dict.fromkeys(named) if (source.parent / entry).is_file()]
@@ -46,7 +62,7 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
     taken = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
     if taken:
-        raise ConfigError(f"{taken[0]}: exists already; choose another place with --output.")
+        raise exists_already(taken[0])
     try:
         for original, target in pairs:
             target.parent.mkdir(parents=True, exist_ok=True)

@@ -2,6 +2,7 @@
 
 import copy
 import difflib
+import operator
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -17,12 +18,12 @@ from paramreduce_cli.config.checks import check, remarks
 from paramreduce_cli.config.cutting import cut_to_independent
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
+from paramreduce_cli.config.sections import keys_named
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, keyed
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import read_constants
 from paramreduce_cli.fields.section import Section
 
-Problem = tuple[Key, str]
 S = TypeVar("S", bound=Section)
 _ROBOT_FILES = (".urdf", ".xml", ".xacro")
 _MOST_PROBLEMS = 30
@@ -42,7 +43,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     """
     document = _read(path)
     if not isinstance(document.data, dict):
-        raise ConfigError(_no_mapping(path))
+        raise _no_mapping(path)
     for text in overrides:
         try:
             reading.apply_override(document, text)
@@ -52,13 +53,18 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
     lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
     lines += [_line(document, problem) for problem in problems if problem[0] not in document.unread]
     if lines or config is None:
-        lines = list(dict.fromkeys(lines))
+        lines, remedy = list(dict.fromkeys(lines)), ""
         if "description" not in document.data:
-            lines.append(f"{path}: `paramreduce init --dh NAME` writes a whole one to begin with.")
+            remedy = "`paramreduce init --dh NAME` writes a whole config to begin with."
         more = len(lines) - _MOST_PROBLEMS
         if more > 0:
             lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]
-        raise ConfigError("\n".join(lines))
+        rejected, choices = _correction(document, problems) if len(lines) == 1 else ("", [])
+        raise ConfigError(
+            "\n".join(lines),
+            rejected=rejected, choices=choices, remedy=remedy,
+            in_file=any(line.startswith(f"{document.source}, line ") for line in lines),
+        )  # fmt: skip
     for text in remarks(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
     return _with_paths(_without_unused_tests(config), path.parent)
@@ -134,7 +140,9 @@ def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
         document = _read(path)
         for text in overrides:
             reading.apply_override(document, text)
-        raise ConfigError(f"{document.place(error.key)}: {error}") from error
+        error.place = document.place(error.key)
+        error.in_file = error.place.startswith(f"{document.source}, line ")
+        raise
 
 
 def config_schema() -> dict[str, Any]:
@@ -146,41 +154,82 @@ def _read(path: Path) -> Document:
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise ConfigError(f"{path}: there is no such file.{_similar(path)}") from error
+        raise _missing(path) from error
     except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read as text ({error}).") from error
+        raise ConfigError(
+            f"{path}: cannot be read as text ({error}).", rejected=str(path)
+        ) from error
     try:
         return reading.read_yaml(text, str(path))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f", line {mark.line + 1}" if mark else ""
-        raise ConfigError(f"{path}{line}: this is not YAML: {error.problem}.") from error
+        raise ConfigError(
+            f"{path}{line}: this is not YAML: {error.problem}.", in_file=True
+        ) from error
     except yaml.YAMLError as error:
         raise ConfigError(f"{path}: this is not YAML: {error}.") from error
 
 
-def _similar(path: Path) -> str:
-    """What may have been meant instead of a file that there is not."""
+def _missing(path: Path) -> ConfigError:
+    """Return the error that a config is not there, with the one that may be meant or a way to make it."""
+    message = f"{path}: there is no such file."
     below = Path("configs") / path.with_suffix(".yaml").name
-    for meant in (path.with_suffix(".yaml"), below):
-        if meant != path and meant.is_file():
-            return f" Did you mean {meant}?"
-    beside = (
+    meant = [m for m in (path.with_suffix(".yaml"), below) if m != path and m.is_file()]
+    names = (
         sorted(other.name for other in path.parent.glob("*.yaml")) if path.parent.is_dir() else []
     )
-    near = difflib.get_close_matches(path.name, beside, n=1)
-    if near:
-        return f" Did you mean {path.with_name(near[0])}?"
-    if beside:
-        return f" {path.parent} holds {', '.join(beside)}."
-    return f" `paramreduce init --dh {path.stem}` writes one, or `paramreduce init ROBOT.urdf` from a robot's file."
+    near = difflib.get_close_matches(path.name, names, n=1)
+    choices = [str(m) for m in [*meant, *(path.with_name(name) for name in near)]][:1]
+    remedy = ""
+    if choices:
+        message += f" Did you mean {choices[0]}?"
+    elif names:
+        message += f" {path.parent} holds {', '.join(names)}."
+    else:
+        remedy = f"`paramreduce init --dh {path.stem}` writes one, or `paramreduce init ROBOT.urdf` from a robot's file."
+    return ConfigError(message, rejected=str(path), choices=choices, remedy=remedy)
 
 
-def _no_mapping(path: Path) -> str:
-    """What is said of a file that is no config at all."""
+def _no_mapping(path: Path) -> ConfigError:
+    """Return the error that a file is no config at all."""
     if path.suffix in _ROBOT_FILES:
-        return f"{path}: is a robot's file; `paramreduce init {path}` makes a config of it."
-    return f"{path}: a config is a mapping that starts with robot: NAME; `paramreduce init --dh NAME` writes one."
+        remedy = f"`paramreduce init {path}` makes a config of it."
+        return ConfigError(f"{path}: is a robot's file.", remedy=remedy)
+    message = f"{path}: a config is a mapping that starts with robot: NAME."
+    return ConfigError(message, remedy="`paramreduce init --dh NAME` writes one.")
+
+
+def _correction(document: Document, problems: list[Problem]) -> tuple[str, list[str]]:
+    """Return the setting of the call that has an unknown name, and what it should be; nothing where no name is near."""
+    ((path, error),) = problems or [((), "")]
+    typed = document.overrides.items()
+    text = next((t for key, t in typed if all(map(operator.eq, key, path))), "")
+    if not text or not isinstance(error, UnknownNameError):
+        return "", []
+    key, _, value = text.partition("=")
+    names = key.split(".")
+    if error.is_key:
+        names[len(path) - 1 : len(path)] = [error.nearest] if error.nearest else []
+        places = keys_named(error.name) if len(path) == 1 and not error.nearest else []
+        if error.nearest or len(places) == 1:
+            return text, [f"{'.'.join(names) or places[0]}={value}"]
+    elif error.nearest:
+        depth = len(names)
+        return text, [f"{key}={_exchanged_item(value, path[depth:], error.nearest)}"]
+    return "", []
+
+
+def _exchanged_item(value: str, place: Key, name: str) -> str:
+    """Return a value as it was typed with another name in its place; the place is empty for the value itself."""
+    if not place:
+        return name
+    items = yaml.safe_load(value)
+    where = items
+    for step in place[:-1]:
+        where = where[step]
+    where[place[-1]] = name
+    return str(yaml.safe_dump(items, default_flow_style=True, width=10**6)).strip()
 
 
 def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
@@ -211,11 +260,14 @@ def _parse(data: dict[str, Any], constants: dict[str, float]) -> Config:
 
 def _one_per_key(problems: list[Problem]) -> list[Problem]:
     """A value that fits no member of a union is one problem, not one per member."""
-    found: dict[Key, list[str]] = {}
+    found: dict[Key, list[str | UnknownNameError]] = {}
     for path, message in problems:
         found.setdefault(path, []).append(message)
     return [
-        (path, messages[0] if len(messages) == 1 else " Or: ".join(dict.fromkeys(messages)))
+        (
+            path,
+            messages[0] if len(messages) == 1 else " Or: ".join(dict.fromkeys(map(str, messages))),
+        )
         for path, messages in found.items()
     ]
 
@@ -239,12 +291,15 @@ def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     path = _real_path(entry["loc"], data, kind)
     owner, key = _model_at(path[:-1], kind), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
-        return path, unknown("key", str(key), owner.model_fields)
+        return path, UnknownNameError("key", str(key), owner.model_fields)
     meaning = ""
     if owner is not None and isinstance(key, str) and key in owner.model_fields:
         meaning = owner.model_fields[key].description or ""
     if entry["type"] == "missing":
         return path, f"is missing. It says: {meaning}"
+    cause = entry.get("ctx", {}).get("error")
+    if isinstance(cause, UnknownNameError):
+        return path, cause
     message = entry["msg"].removeprefix("Value error, ").replace(" after validation", "")
     if entry["type"] == "model_type":
         message = "input should be a section with keys of its own"
@@ -253,8 +308,6 @@ def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     given = entry["input"]
     if not isinstance(given, dict | list) and entry["type"] != "value_error":
         message = f"{message[0].lower()}{message[1:]}, not {given!r}"
-    if message.endswith("?"):
-        return path, message
     return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
@@ -304,7 +357,7 @@ def _unwrap(annotation: Any) -> Any:
 
 
 def _line(document: Document, problem: Problem) -> str:
-    path, message = problem
+    path, message = problem[0], str(problem[1])
     end = "" if message.rstrip().endswith((".", "?")) else "."
     return f"{document.place(path)}: {keyed(path, message)}{end}"
 

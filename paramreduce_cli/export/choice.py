@@ -57,13 +57,15 @@ def chosen_model(
         choice = ModelChoice.parse(text)
     row = choice.row(reduction)
     if row is None:
-        others = f"{FULL}, {BASE}, " if model is not None else ""
-        chosen = (
-            validation and f"; {validation.selected.heuristic}:{validation.selected.n} is selected"
-        )
+        others = [FULL, BASE] if model is not None else []
+        choices = [*others, *known_choices(reduction)]
+        default = [f"{validation.selected.heuristic}:{validation.selected.n}"] if validation else []
+        selected = f"; {default[0]} is selected" if default else ""
         raise ConfigError(
-            f"--model {text}: there is {others}{known_choices(reduction)}{chosen or ''}; with a config and a "
-            f"log also {IDENTIFIED} and {CONSISTENT}, with terms left out {TERMS}."
+            f"--model {text}: there is {', '.join(choices)}{selected}; with a config and a "
+            f"log also {IDENTIFIED} and {CONSISTENT}, with terms left out {TERMS}.",
+            rejected=text or "",
+            choices=[*default, *choices],
         )
     error = float(reduction.heuristics[choice.heuristic].torque_error[row])
     worth = "exact" if error < EXACT else f"torque error {format_percent(error)}"
@@ -91,7 +93,8 @@ def _identified(
     if consistency is None:
         raise ConfigError(
             f"--model {CONSISTENT}: identification.h5 holds none; set identification.consistency, or install "
-            "cvxpy with `pip install 'paramreduce[identify]'`, and run `paramreduce identify` again."
+            "cvxpy with `pip install 'paramreduce[identify]'`.",
+            command="identify",
         )
     worth = f"physically consistent parameters, {format_percent(consistency.held_out)} held out"
     return full_model(replace(model, values=consistency.standard)), worth
@@ -111,7 +114,8 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
     if term is None:
         raise ConfigError(
             f"--model {TERMS}: terms.h5 has no {name} dynamics; it has to stand under terms.functions, and "
-            "`paramreduce reduce-terms` to find something within the budget."
+            "something must be found within the budget.",
+            command="reduce-terms",
         )
     errors = [term.torque_error_estimation, term.torque_error_validation]
     known = " / ".join(format_percent(error) for error in errors if error == error)

@@ -41,8 +41,8 @@ def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) ->
     """
     if config.source is None:
         raise ConfigError(
-            "the config names no robot file to write into; one that `paramreduce init ROBOT.urdf` "
-            "writes has a source section."
+            "the config names no robot file to write into: it has no source section.",
+            remedy="`paramreduce init ROBOT.urdf` writes a config that has one.",
         )
     file = config.source.file
     if kind_of(file) != kind:
@@ -78,8 +78,8 @@ def _check_same(
     )
     if not same:
         raise ConfigError(
-            f"{source.file}: its bodies are not those of the config, one of them was changed; import "
-            "it anew with `paramreduce init`."
+            f"{source.file}: its bodies are not those of the config, one of them was changed.",
+            remedy="`paramreduce init` imports it again.",
         )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, core_schema
 
+from paramreduce_cli.errors import Key
 from paramreduce_cli.records import SelectionMethod
 from paramreduce_cli.registry import offered
 
@@ -24,12 +25,27 @@ def nearest(name: str, known: Iterable[str]) -> str | None:
     return folded[close[0]] if close else None
 
 
-def unknown(what: str, name: str, known: Iterable[str]) -> str:
-    """A sentence that refuses a name and offers what there is."""
-    names = list(known)
-    guess = nearest(name, names)
-    hint = f"did you mean {guess}?" if guess else f"there is {', '.join(names) or 'none'}."
-    return f"{what} {name!r} is not known; {hint}"
+class UnknownNameError(ValueError):
+    """A name that is not known.
+
+    Args:
+        what: Kind of thing that the name is of.
+        name: The name.
+        known: Names that there are.
+    """
+
+    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
+        names = list(known)
+        self.name, self.is_key = name, what == "key"
+        self.nearest = nearest(name, names)
+        hint = f"there is {', '.join(names) or 'none'}."
+        if self.nearest:
+            hint = f"did you mean {self.nearest}?"
+        super().__init__(f"{what} {name!r} is not known; {hint}")
+
+
+Problem = tuple[Key, str | UnknownNameError]
+"""What is wrong with a value of a config, and its key."""
 
 
 class OneOf:
@@ -64,7 +80,7 @@ class OneOf:
             ValueError: It is not known.
         """
         if name not in self.names():
-            raise ValueError(unknown(self._kind, name, self.names()))
+            raise UnknownNameError(self._kind, name, self.names())
         return name
 
 
@@ -99,7 +115,7 @@ class OneMethod(OneOf):
                 )
             criteria = [known for known in offered(_CRITERIA) if known != "torque"]
             if method.criterion not in criteria:
-                raise ValueError(unknown("criterion", method.criterion, criteria))
+                raise UnknownNameError("criterion", method.criterion, criteria)
             if method.heuristic in offered(_TORQUE_ONLY):
                 raise ValueError(
                     f"{method.heuristic} takes no criterion; it is of the torques alone"

@@ -46,7 +46,8 @@ def read_mjcf(path: Path) -> ImportedRobot:
     """
     if importlib.util.find_spec("mujoco") is None:
         raise ConfigError(
-            f"{path}: is an MJCF, which takes MuJoCo to read: `pip install 'paramreduce[mjcf]'`."
+            f"{path}: is an MJCF, which takes MuJoCo to read.",
+            remedy="Install it with `pip install 'paramreduce[mjcf]'`.",
         )
     reader = compiled(path)
     remarks = [*reader.found.remarks, *(f"MuJoCo says: {text}" for text in reader.said)]

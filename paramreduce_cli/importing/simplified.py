@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import UnknownNameError
 from paramreduce_cli.importing.doubts import doubts
 from paramreduce_cli.importing.imported import (
     CLOSED_KINDS,
@@ -158,7 +158,7 @@ class _Simplification:
         for option, name, known in asked:
             if name is not None and name not in known:
                 kind = "joint" if option in ("--lock", "--independent") else "link"
-                raise ConfigError(f"{option} {name}: {unknown(kind, name, known)}")
+                raise ConfigError(f"{option} {name}: {UnknownNameError(kind, name, known)}")
 
     def _found_root(self) -> str:
         if self._choice.root is not None:
@@ -214,7 +214,8 @@ class _Simplification:
         if not bodies:
             raise ConfigError(
                 f"{self._robot.source}: no joint is left that moves; give --floating if "
-                "the root moves freely."
+                "the root moves freely.",
+                options=("--floating",),
             )
         filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
         couplings = () if self._choice.uncoupled else self._couplings(filled)

@@ -49,9 +49,7 @@ def select(
     """
     if wanted.heuristic is not None:
         if wanted.heuristic not in results:
-            raise DataError(
-                f"reduction.h5 has no {wanted.heuristic}; run `paramreduce reduce` with this config."
-            )
+            raise DataError(f"reduction.h5 has no {wanted.heuristic}.", command="reduce")
         results = {wanted.heuristic: results[wanted.heuristic]}
     missed = ""
     if cross_validation is not None:

@@ -19,12 +19,12 @@ _STIFF = 1e-6
 """Size of a large change of a drive's parameter: much less than that of a body's."""
 
 
-def known_choices(reduction: Reduction) -> str:
-    """What :class:`ModelChoice` may be, for messages; all sizes where groups leave some out."""
-    return ", ".join(
+def known_choices(reduction: Reduction) -> list[str]:
+    """List what :class:`ModelChoice` may be, a word for each heuristic; all sizes where groups leave some out."""
+    return [
         f"{name}:{f'1...{found.n[-1]}' if found.n[-1] == found.n.size else '|'.join(map(str, found.n))}"
         for name, found in reduction.heuristics.items()
-    )
+    ]
 
 
 def full_model(model: Model) -> ReducedModel:

@@ -4,7 +4,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from typing import ClassVar, Self
 
-from paramreduce_cli.errors import Key
+from paramreduce_cli.fields.names import Problem
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.records import Body, Length, Loops
 
@@ -69,6 +69,6 @@ class BodiesDescription(Section, ABC):
         """The same structure with other lengths, as far as these have names."""
         return self
 
-    def problems(self) -> Iterator[tuple[Key, str]]:
+    def problems(self) -> Iterator[Problem]:
         """What does not fit together, by the keys below this section."""
         yield from ()

@@ -8,8 +8,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from paramreduce_cli.errors import Key
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.records import DRIVE, Drive, Kind
@@ -99,18 +98,19 @@ def by_drive(
     return {name: section for name, section in found.items() if section.effects()}
 
 
-def problems(
-    sections: Mapping[str, DriveSection], coordinates: Sequence[str]
-) -> Iterator[tuple[Key, str]]:
+def problems(sections: Mapping[str, DriveSection], coordinates: Sequence[str]) -> Iterator[Problem]:
     """What does not fit the mechanism, by the keys below ``drives``."""
     for name, section in sections.items():
         if name == ALL and section.motion is not None:
             yield (ALL, "motion"), "is for one drive; give that a name of its own"
         elif name != ALL and section.motion is None and name not in coordinates:
-            message = unknown("coordinate", name, coordinates)
+            message = UnknownNameError("coordinate", name, coordinates)
             yield (name,), f"{message} A drive of another name needs a motion"
         for coordinate, weight in (section.motion or {}).items():
             if coordinate not in coordinates:
-                yield ((name, "motion", coordinate), unknown("coordinate", coordinate, coordinates))
+                yield (
+                    (name, "motion", coordinate),
+                    UnknownNameError("coordinate", coordinate, coordinates),
+                )
             elif weight == 0:
                 yield (name, "motion", coordinate), "has the weight zero; leave it out"

@@ -2,8 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from paramreduce_cli.errors import Key
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.section import Name
 from paramreduce_cli.records import Payload
 from paramreduce_cli.robots.inertia import BodyParameters
@@ -28,12 +27,10 @@ class PayloadSection(BodyParameters):
         return Payload(name, bodies[self.body], transform(self.at))
 
 
-def problems(
-    sections: Mapping[str, PayloadSection], bodies: Sequence[str]
-) -> Iterator[tuple[Key, str]]:
+def problems(sections: Mapping[str, PayloadSection], bodies: Sequence[str]) -> Iterator[Problem]:
     """What does not fit the mechanism, by the keys below ``payloads``."""
     for name, section in sections.items():
         if name in bodies:
             yield (name,), f"{name!r} is taken by a body; give the payload a name of its own"
         if section.body not in bodies:
-            yield (name, "body"), unknown("body", section.body, bodies)
+            yield (name, "body"), UnknownNameError("body", section.body, bodies)

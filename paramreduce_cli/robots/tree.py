@@ -11,8 +11,7 @@ from typing import Annotated, Any, ClassVar, Literal
 import numpy as np
 from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
-from paramreduce_cli.errors import Key
-from paramreduce_cli.fields.names import unknown
+from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import ONE_OR_MORE_NAMES, Name, Positive, Section, as_list
 from paramreduce_cli.records import (
@@ -291,7 +290,7 @@ class TreeDescription(BodiesDescription):
             np.array([float(self.guess.get(name, 0.0)) for name in names]),
         )
 
-    def problems(self) -> Iterator[tuple[Key, str]]:
+    def problems(self) -> Iterator[Problem]:
         """What does not fit together, by the keys below this section."""
         bodies, coordinates = ["base", *self.body_names()], self.generalised_names()
         for k, body in enumerate(self.bodies):
@@ -302,7 +301,7 @@ class TreeDescription(BodiesDescription):
         for k, closure in enumerate(self.closures):
             for j, name in enumerate(closure.bodies):
                 if name not in bodies:
-                    yield ("closures", k, "bodies", j), unknown("body", name, bodies)
+                    yield ("closures", k, "bodies", j), UnknownNameError("body", name, bodies)
             if closure.name is not None and closure.name in {c.name for c in self.closures[:k]}:
                 yield ("closures", k, "name"), f"{closure.name!r} is taken"
             if closure.bodies[0] == closure.bodies[1]:
@@ -312,12 +311,12 @@ class TreeDescription(BodiesDescription):
                     yield ("closures", k, "bodies", j), f"{name!r} has not just one coordinate"
         for k, name in enumerate(self.independent):
             if name not in coordinates:
-                yield ("independent", k), unknown("coordinate", name, coordinates)
+                yield ("independent", k), UnknownNameError("coordinate", name, coordinates)
             elif name in self.independent[:k]:
                 yield ("independent", k), f"{name} stands there twice"
         for name in self.guess:
             if name not in coordinates:
-                yield ("guess", name), unknown("coordinate", name, coordinates)
+                yield ("guess", name), UnknownNameError("coordinate", name, coordinates)
 
     @property
     def frames(self) -> str:

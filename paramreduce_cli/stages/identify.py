@@ -48,7 +48,7 @@ def identify(
     Also physically consistent standard parameters, and hints where residuals are not noise.
     """
     if samples.validation is None:
-        raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
+        raise DataError("samples.h5 holds no validation set.", command="sample")
     training, held_out = samples.estimation, samples.validation
     factors, n_samples = training.factors(), training.n_samples
     scale = np.where(np.isfinite(model.nominal_torque), _sizes(training), np.inf)

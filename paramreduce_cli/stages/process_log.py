@@ -13,8 +13,9 @@ from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
 def no_log() -> ConfigError:
     """What is said where there is no log."""
     return ConfigError(
-        "is missing: it says where the logs are; `paramreduce init ROBOT.urdf --log FILE` writes it.",
+        "is missing: it says where the logs are.",
         ("sampling", "log"),
+        remedy="`paramreduce init ROBOT.urdf --log FILE` writes it.",
     )
 
 

@@ -254,7 +254,7 @@ def _recorded(
 
 def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str) -> LoggedSet:
     if log is None:
-        raise DataError("there is no log.h5; make it with `paramreduce process-log`.")
+        raise DataError("there is no log.h5.", command="process-log")
     motions = log.training if name == "estimation" else log.held_out
     measured = np.isfinite(model.nominal_torque)
     found = LoggedSet(motions, log, dynamics, f"{name} set", measured)

@@ -188,7 +188,7 @@ def _measured(
     model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, run: Run
 ) -> _Measured:
     if samples.validation is None:
-        raise DataError("samples.h5 holds no validation set; make one with `paramreduce sample`.")
+        raise DataError("samples.h5 holds no validation set.", command="sample")
     dynamics = Dynamics(model.mechanism)
     nominal = samples.nominal_acceleration
     if nominal is None:
@@ -271,8 +271,8 @@ def _check_coordinates(model: Model, samples: Samples) -> None:
     for part in (samples.estimation, samples.validation, samples.test):
         if part is not None and next(iter(part.blocks())).q.shape[1] != n_q:
             raise DataError(
-                f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need; make "
-                "it with `paramreduce sample`."
+                f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need.",
+                command="sample",
             )
 
 
@@ -286,9 +286,7 @@ class _Models:
 
     def __init__(self, reduction: Reduction, full: FloatArray | None) -> None:
         if full is not None and reduction.columns.column.size != full.size:
-            raise DataError(
-                "reduction.h5 has other parameters than model.h5; run `paramreduce run`."
-            )
+            raise DataError("reduction.h5 has other parameters than model.h5.", command="run")
         numbers: dict[bytes, int] = {}
         columns: list[FloatArray] = []
         self.rows: dict[str, IntArray] = {}

@@ -97,9 +97,7 @@ class Judge:
         self.measured = measured
         self._rng = np.random.default_rng(0)
         if samples.nominal_acceleration is None:
-            raise DataError(
-                "samples.h5 holds no /nominal_acceleration; make it with `paramreduce sample`."
-            )
+            raise DataError("samples.h5 holds no /nominal_acceleration.", command="sample")
         self._nominal_acceleration = samples.nominal_acceleration
         self._coordinates = Coordinates(model.mechanism, once=True)
         ranges = [

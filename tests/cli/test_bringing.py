@@ -147,7 +147,7 @@ def test_values_of_a_validation_of_another_reduction_are_not_written(invoke, noi
     invoke("validate", *brought, settings=["selected.n=3", "validation.stability=false"])
     invoke("reduce", *brought, settings=["reduction.heuristics=[swap]"])
     refused = invoke("export", "--results", results, "--format", "values", code=2)
-    assert "made with another reduction.h5; make it again" in refused.err
+    assert "made with another reduction.h5. Make it again" in refused.err
 
 
 @pytest.mark.parametrize(

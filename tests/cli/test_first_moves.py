@@ -32,7 +32,7 @@ MOVES = [
     (["run", "notes.txt"], "`paramreduce init --dh NAME` writes one"),
     (["run", "one.urdf"], "`paramreduce init one.urdf` makes a config of it"),
     (["run", "my_arm.urdf"], "`paramreduce init --dh my_arm` writes one"),
-    (["run", "configs/empty.yaml"], "`paramreduce init --dh NAME` writes a whole one"),
+    (["run", "configs/empty.yaml"], "`paramreduce init --dh NAME` writes a whole config"),
     (["run", "configs/nothing.yaml"], "`paramreduce init --dh NAME` writes one"),
     (["run", "configs/broken.yaml"], "Then again: paramreduce run configs/broken.yaml"),
     (["run", "configs/two_link.yaml", "--sett", "a=b"],
@@ -89,7 +89,7 @@ MOVES = [
      "Next: paramreduce inspect done/reduction.h5 --model best-subset:3"),
     (["compare", "done"], "paramreduce compare --help says more"),
     (["compare", "done", "dome"], "Did you mean done?"),
-    (["compare", "done", "summary.json"], "make it again with `paramreduce run CONFIG`"),
+    (["compare", "done", "summary.json"], "Run `paramreduce run CONFIG`"),
     (["inspect", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
     (["open", "configs/two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
     (["validate"], "Next: paramreduce validate configs/two_link.yaml"),
@@ -191,7 +191,7 @@ def test_a_hint_that_fails_hides_no_error(invoke, folder, monkeypatch):
     def broken(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("paramreduce_cli.cli.hints.misplaced", broken)
+    monkeypatch.setattr("paramreduce_cli.cli.suggestions.project_above", broken)
     assert "there is no such file" in invoke("run", "configs/two_lnik.yaml", code=2).err
     assert "there is no option" in invoke("run", "--nothing", code=2).err
 

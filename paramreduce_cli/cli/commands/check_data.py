@@ -6,7 +6,8 @@ import click
 import rich.box
 import rich.table
 
-from paramreduce_cli.cli.options import SET
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.options import SET, FilePath
 from paramreduce_cli.cli.terminal import LOG, remark, say, say_table
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
@@ -19,17 +20,17 @@ _MOST_SHOWN = 12
 _TABLE_WIDTH = 100
 
 
-@click.command("check-data")
+@click.command(
+    "check-data", cls=ExampleCommand, example="check-data recording.csv {config}", robot="ur10"
+)
 @click.argument("file", type=click.Path(path_type=Path))
-@click.argument("config", type=click.Path(path_type=Path, dir_okay=False), required=False)
+@click.argument("config", type=FilePath(), required=False)
 @SET
 @LOG
 def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:
     """Say what a log is good for: rate, gaps, noise, and with a CONFIG how well it excites the robot.
 
     Columns are those of the config's log, or found by their usual names.
-
-    Example: paramreduce check-data recording.csv configs/ur10.yaml
     """
     # Late: these load all numerics.
     from paramreduce_cli.artifacts.log_files import load_log
@@ -39,7 +40,8 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
 
     if file.suffix in (".yaml", ".yml"):
         raise ConfigError(
-            f"{file}: is a config, not a recording; write `paramreduce check-data RECORDING.csv {file}`."
+            f"{file}: is a config, not a recording.",
+            remedy=f"Write `paramreduce check-data RECORDING.csv {file}`.",
         )
     loaded = load_config(config, overrides) if config is not None else None
     raw = load_log(file)

@@ -5,6 +5,7 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
@@ -13,7 +14,7 @@ from paramreduce_cli.report.comparison import compare as compared
 DIFFERENT = 1
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="compare {results} {results_2}")
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))
 @click.option(
@@ -31,15 +32,13 @@ def compare(
     """Compare two summaries or results folders; exit code 1 if they differ too much.
 
     Orders are compared up to ties, trajectories by the best and the median condition number.
-
-    Example: paramreduce compare results/reference/puma560.json results/puma560
     """
     summaries = [load_summary(path) for path in (first, second)]
     for path, summary in zip((first, second), summaries, strict=True):
         reduction = summary.get("reduction")
         if not isinstance(reduction, dict) or "proofs" not in reduction:
             raise ConfigError(
-                f"{path}: is a summary of an older version; make it again with `paramreduce run`."
+                f"{path}: is a summary of an older version.", rejected=str(path), command="run"
             )
     tolerances = {**TOLERANCES, **dict(map(_tolerance, given))}
     try:

@@ -6,6 +6,7 @@ import click
 from click.shell_completion import get_completion_class
 
 from paramreduce_cli.artifacts.atomic import atomically
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
 
 _PLACES = {
@@ -16,14 +17,11 @@ _PLACES = {
 """Where shells look, below the home folder."""
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="completion bash --install")
 @click.argument("shell", type=click.Choice(list(_PLACES)))
 @click.option("--install", is_flag=True, help="Write it to where the shell looks.")
 def completion(shell: str, install: bool) -> None:
-    """Print what completes commands and options in a shell, or install it.
-
-    Example: paramreduce completion bash --install
-    """
+    """Print what completes commands and options in a shell, or install it."""
     made = get_completion_class(shell)
     assert made is not None  # the shells are those that click knows
     root = click.get_current_context().find_root().command

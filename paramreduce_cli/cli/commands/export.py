@@ -8,6 +8,7 @@ import click
 
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, say, show_progress
@@ -48,7 +49,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
 """Models that need more than an observation matrix."""
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="export {config} --format matlab --what idm")
 @OPTIONAL_CONFIG
 @RESULTS
 @SET
@@ -91,8 +92,6 @@ def export(
     mechanisms with loops it also solves positions, velocities and accelerations.
 
     Without a CONFIG, of samples that were brought, values alone can be written.
-
-    Example: paramreduce export configs/puma560.yaml --format matlab --what idm
     """
     loaded = load_config(config, overrides) if config is not None else None
     store = results_store(loaded, results)

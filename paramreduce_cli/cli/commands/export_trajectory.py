@@ -8,6 +8,7 @@ import numpy as np
 
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.exporting import up_to_date
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import LOG, say
@@ -23,7 +24,12 @@ _RUN = ("ros", "urscript")
 """Formats that a controller runs as they are."""
 
 
-@click.command("export-trajectory")
+@click.command(
+    "export-trajectory",
+    cls=ExampleCommand,
+    example="export-trajectory {config} --format urscript --rate 500",
+    robot="ur10",
+)
 @CONFIG
 @RESULTS
 @SET
@@ -58,8 +64,6 @@ def export_trajectory(
 
     With trajectories.start_pose in the config it begins and ends there, on ways that keep to half of the
     limits of speed and acceleration and to those of torque and distance.
-
-    Example: paramreduce export-trajectory configs/ur10.yaml --format urscript --rate 500
     """
     loaded = load_config(config, overrides)
     store = Store(results or Path("results") / loaded.robot)
@@ -111,6 +115,8 @@ def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
     sets = {name: getattr(trajectories, name) for name in SETS}
     found = sets.get(name, ())
     if not number.isdecimal() or not 1 <= int(number) <= len(found):
-        there = ", ".join(f"{key}:1...{len(own)}" for key, own in sets.items())
-        raise ConfigError(f"--which {which}: there is {there}.")
+        there = [f"{key}:1...{len(own)}" for key, own in sets.items()]
+        raise ConfigError(
+            f"--which {which}: there is {', '.join(there)}.", rejected=which, choices=there
+        )
     return found[int(number) - 1]

@@ -11,9 +11,10 @@ from shlex import quote
 
 import click
 
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.column_matching import guess_columns
-from paramreduce_cli.config.examples import copy_example
+from paramreduce_cli.config.examples import copy_example, exists_already
 from paramreduce_cli.config.loading import load_config
 from paramreduce_cli.config.log_template import log_text
 from paramreduce_cli.config.schema import CLOSED, Config, SourceSection
@@ -36,7 +37,9 @@ _FARTHEST = 1e6
 """Where a joint may be locked, rad or m."""
 
 
-@click.command()
+@click.command(
+    cls=ExampleCommand, example="init robot.urdf --log recording.csv --output configs/robot.yaml"
+)
 @click.argument("source", metavar="FILE|NAME", required=False)
 @click.option("--dh", "kind", flag_value="dh", help="An arm in Denavit-Hartenberg parameters.")
 @click.option("--tree", "kind", flag_value="tree", help="A tree of bodies.")
@@ -76,15 +79,14 @@ def init(
 
     Of a file links that cannot move against each other become one body, rounded angles are taken
     for what they were, limits and inertias are taken over. The config is the robot from then on.
-
-    Example: paramreduce init robot.urdf --log recording.csv --output configs/robot.yaml
     """
     if source is None:
         raise ConfigError(
-            "say what the robot is: `paramreduce init robot.urdf`; or, to describe it in a config, "
+            "say what the robot is.",
+            remedy="`paramreduce init robot.urdf` reads a robot's file; to describe a robot in a config there is "
             "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies), `--loop NAME` "
-            "(closed loops) or `--recorded NAME` (an arm with recorded motions); or to begin with one that works: "
-            "`paramreduce init --example puma560`."
+            "(closed loops) and `--recorded NAME` (an arm with recorded motions); `paramreduce init --example puma560` "
+            "copies a config that works.",
         )
     if kind == "example":
         copied, absent = copy_example(source, output or Path("configs") / f"{source}.yaml")
@@ -119,7 +121,7 @@ def init(
         for remark in robot.remarks:
             say(f"- {remark}.")
     if path.exists():
-        raise ConfigError(f"{path}: exists already; choose another with --output.")
+        raise exists_already(path)
     _check(text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)

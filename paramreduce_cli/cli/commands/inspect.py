@@ -17,7 +17,8 @@ import rich.table
 from paramreduce_cli.artifacts.inspection import contents
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
-from paramreduce_cli.cli.hints import results_below
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.project_state import no_results, results_below
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
@@ -27,7 +28,7 @@ if TYPE_CHECKING:
     from paramreduce_cli.records import ReducedModel
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="inspect {results} --model selected")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option(
     "--model",
@@ -42,15 +43,13 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
     """Show what is in an artifact and where it came from; of a results folder the selected model.
 
     `inspect selected` is that of the only results here.
-
-    Example: paramreduce inspect results/puma560 --model selected
     """
     if str(file) == "selected" and not file.exists():
         file = _only_results()
     folder = file if file.is_dir() else file.parent
     if file.is_dir() and chosen is None:
-        if not (file / "validation.h5").exists() and (meant := results_below(file, "inspect")):
-            raise ArtifactError(f"{file}: holds no results itself.{meant}")
+        if not (file / "validation.h5").exists() and results_below(file):
+            raise no_results(file, "inspect")
         chosen = "selected"
     if chosen == "selected":
         title, model = _selected(folder / "validation.h5")
@@ -77,8 +76,11 @@ def _only_results() -> Path:
     found = sorted(path.parent for path in Path("results").glob("*/validation.h5"))
     if len(found) == 1:
         return found[0]
-    meant = f"`paramreduce inspect {found[0]}`" if found else "`paramreduce run CONFIG` makes some"
-    raise ConfigError(f"selected: of which results? Here are {len(found)}; {meant}.")
+    meant = f"Try `paramreduce inspect {found[0]}`." if found else ""
+    raise ConfigError(
+        f"selected: of which results? Here are {len(found)}.",
+        remedy=meant, command="" if found else "run",
+    )  # fmt: skip
 
 
 def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
@@ -215,7 +217,10 @@ def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
     choice = ModelChoice.parse(chosen)
     row = choice.row(reduction)
     if row is None:
-        raise ConfigError(f"--model {chosen}: there is {known_choices(reduction)}.")
+        choices = known_choices(reduction)
+        raise ConfigError(
+            f"--model {chosen}: there is {', '.join(choices)}.", rejected=chosen, choices=choices
+        )
     found = reduction.heuristics[choice.heuristic]
     known = _beside(file.parent / "model.h5", Model)
     model = reduced_model(reduction, choice.heuristic, row, None if known is None else known.values)

@@ -6,26 +6,21 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.artifacts.report_files import newer_than_report, verify_report
-from paramreduce_cli.cli.hints import results_below
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.project_state import no_results
 from paramreduce_cli.cli.terminal import complain, say
-from paramreduce_cli.errors import ArtifactError
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="open {results}")
 @click.argument("results", type=click.Path(path_type=Path))
 def open(results: Path) -> None:  # the file's name is the command's
     """Open a report in the browser.
 
     RESULTS is a results folder. Where there is no browser the address is printed.
-
-    Example: paramreduce open results/puma560
     """
     folder = results if results.name == "report" else results / "report"
     if not folder.is_dir():
-        meant = results_below(results, "open")
-        raise ArtifactError(
-            f"{folder}: is not there.{meant or ' Make it with `paramreduce run CONFIG`.'}"
-        )
+        raise no_results(results, "open")
     verify_report(folder / "summary.json")
     newer = newer_than_report(folder.parent)
     if newer:

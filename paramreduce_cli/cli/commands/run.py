@@ -10,6 +10,7 @@ import rich.table
 
 from paramreduce_cli.artifacts.atomic import missing
 from paramreduce_cli.artifacts.report_files import load_summary
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import (
     CONFIG,
     FORCE,
@@ -43,7 +44,7 @@ _MOST_PLACES = 8
 """Lines that a remark names."""
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="run {config}")
 @CONFIG
 @RESULTS
 @SET
@@ -68,8 +69,6 @@ def run(
     model is not accepted.
 
     With --json every event is a line: stages, progress, and the verdict at last.
-
-    Example: paramreduce run configs/puma560.yaml
     """
     quiet = quiet or as_json
     loaded = load_config(config, overrides)
@@ -77,7 +76,8 @@ def run(
     _remark_on_what_is_to_do(config)
     for path, key in absent_files(loaded):
         raise missing(
-            path, f"It is named under {key} in {config}, whose comments may say where it is from."
+            path,
+            remedy=f"It is named under {key} in {config}, whose comments may say where it is from.",
         )
     with placed_errors(config, overrides), store.locked():
         words = asked(config, results, overrides)

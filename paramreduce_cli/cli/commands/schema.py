@@ -4,13 +4,11 @@ import json
 
 import click
 
+from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.config import config_schema
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="schema > paramreduce.schema.json")
 def schema() -> None:
-    """Print the JSON Schema of a config, for editors.
-
-    Example: paramreduce schema > paramreduce.schema.json
-    """
+    """Print the JSON Schema of a config, for editors."""
     click.echo(json.dumps(config_schema(), indent=2, default=str))

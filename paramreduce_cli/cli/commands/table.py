@@ -10,7 +10,8 @@ import click
 from paramreduce_cli.artifacts.atomic import atomically
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
-from paramreduce_cli.cli.hints import results_below
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.project_state import no_results
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, remark, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
@@ -22,7 +23,7 @@ from paramreduce_cli.texts.table import Table
 _MOST_NAMED = 12
 
 
-@click.command()
+@click.command(cls=ExampleCommand, example="table {results}")
 @click.argument("results", nargs=-1, type=click.Path(path_type=Path))
 @click.option(
     "--sweep", "listed", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
@@ -47,8 +48,6 @@ def table(
     RESULTS are results folders or summaries. Shows the selected model of each robot beside its
     full one; of several runs of a robot how they spread, and which parameters all of them select.
     PREFIX-runs.csv has a row of numbers for every run.
-
-    Example: paramreduce table results/sweep/*/
     """
     if (listed is not None) == bool(results):
         raise click.UsageError("Give RESULTS, or --sweep FILE.")
@@ -106,9 +105,7 @@ def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
 
 def _summary(path: Path) -> dict[str, Any]:
     if path.is_dir() and not (path / SUMMARY).exists():
-        raise ArtifactError(
-            f"{path}: holds no results itself.{results_below(path, 'table') or ' Make them with `paramreduce run`.'}"
-        )
+        raise no_results(path, "table")
     return load_summary(path)
 
 
@@ -151,7 +148,8 @@ def _write_parquet(path: Path, records: list[dict[str, Any]]) -> None:
         import pyarrow.parquet
     except ImportError as error:
         raise ConfigError(
-            "--parquet: needs pyarrow; install it with `pip install 'paramreduce[parquet]'`, or take the CSV."
+            "--parquet: needs pyarrow.",
+            remedy="Install it with `pip install 'paramreduce[parquet]'`, or take the CSV.",
         ) from error
     with atomically(path) as temporary:
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(records), temporary)

@@ -1,10 +1,12 @@
 """What is in a folder: configs of robots, and their results; told without reading more than beginnings."""
 
 import re
+import shlex
 from collections.abc import Callable
 from pathlib import Path
 
 from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.errors import ArtifactError
 
 _READ = 100_000
 """Characters of a file in which a config must have begun."""
@@ -90,3 +92,23 @@ def _robot(word: str) -> str:
     if len(parts) > 1 and parts[0] == _RESULTS.name:
         return parts[1]
     return Path(word).name.removesuffix(".yaml").replace("..", "")
+
+
+def results_below(folder: Path) -> list[str]:
+    """List the results folders in a folder."""
+    return [str(path.parents[1]) for path in sorted(folder.glob(f"*/{SUMMARY}"))]
+
+
+def no_results(folder: Path, command: str) -> ArtifactError:
+    """Return the error that a folder holds no results itself, with those below it.
+
+    Args:
+        folder: Folder that was named.
+        command: Command that takes results.
+    """
+    below = results_below(folder)
+    found = f"Did you mean `paramreduce {command} {shlex.quote(below[0])}`?" if below else ""
+    return ArtifactError(
+        f"{folder}: holds no results itself.",
+        rejected=str(folder), command="" if below else "run", remedy=found,
+    )  # fmt: skip

@@ -1,0 +1,274 @@
+"""What to type next after a call that does not work, from what the error and the folder hold."""
+
+import difflib
+import shlex
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.project_state import config_meant, configs_in, project_above, results_meant
+from paramreduce_cli.errors import ConfigError, MissingConfigError, ParamreduceError
+from paramreduce_cli.stages import stages
+
+_OF_CONFIGS = ("run", "export", "export-trajectory")
+"""Commands that take a config, beside the stages."""
+_OF_RESULTS = ("open", "inspect", "table")
+"""Commands that take results."""
+_LIKE_ROBOT, _LIKE_COMMAND, _LIKE_OPTION = 0.8, 0.6, 0.75
+"""How alike a name must be to the one that is suggested."""
+_RANGE = "..."
+"""Stands between the first and the last number of choices such as ``swap:1...7``."""
+
+
+@dataclass(frozen=True)
+class Call:
+    """A call of the program."""
+
+    words: Sequence[str]
+    """Words after ``paramreduce``."""
+    command: click.Command | None
+    """The command; None where there is no such command."""
+
+
+class UnknownCommandError(click.UsageError):
+    """A command that there is not.
+
+    Args:
+        name: Name that was typed.
+        known: Names of the commands.
+        context: Context of the program.
+    """
+
+    def __init__(self, name: str, known: Sequence[str], context: click.Context) -> None:
+        self.name = name
+        wanted = name.lower().replace("_", "-")
+        near = difflib.get_close_matches(wanted, known, n=1, cutoff=_LIKE_COMMAND)
+        hint = "`paramreduce --help` lists them."
+        if wanted in ("version", "help"):
+            hint = f"see `paramreduce --{wanted}`."
+        elif near:
+            hint = f"did you mean `paramreduce {near[0]}`?"
+        super().__init__(f"there is no command {name!r}; {hint}", context)
+
+
+def describe_error(error: ParamreduceError, call: Call) -> str:
+    """Return the message of an error, whose commands have the arguments of the call."""
+    return error.describe(_own_arguments(call.words) or _usual_config(error.rejected) or "CONFIG")
+
+
+def suggest_after_error(error: ParamreduceError, call: Call) -> str:
+    """Return lines that say what to type next; empty where the error says it."""
+    words = list(call.words)
+    if meant := _other_place(error, words):
+        return f"Next: {meant}"
+    if error.command or error.remedy:
+        return ""
+    corrected = _corrected(error, words)
+    if corrected is None:
+        return show_example(call)
+    return f"{'Then again' if corrected == words else 'Next'}: {_typed(corrected)}"
+
+
+def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
+    """Return lines that say what to type after a call that click cannot read."""
+    words = list(call.words)
+    meant = ""
+    if isinstance(error, click.NoSuchOption) and call.command is not None:
+        option = _meant_option(error.option_name, call.command, words)
+        changed = [_with_option(word, error.option_name, option) for word in words if option]
+        meant = _typed(changed) if option else ""
+    elif isinstance(error, click.MissingParameter) and _is_config(error.param):
+        meant = _with_config(words)
+    elif isinstance(error, UnknownCommandError):
+        meant = _meant_place(error.name, words)
+    elif rejected := getattr(error, "rejected", ""):
+        meant = _meant_place(rejected, words)
+    return f"Next: {meant}" if meant else show_example(call)
+
+
+def describe_usage_error(error: click.ClickException) -> str:
+    """Return the message of a call that click cannot read; click guesses options by their spelling alone."""
+    if isinstance(error, click.NoSuchOption) and error.ctx and error.ctx.parent:
+        return f"there is no option {error.option_name}."
+    return error.format_message()
+
+
+def show_example(call: Call) -> str:
+    """Return an example of the command with what is in this folder, and where to read more."""
+    command = call.command
+    if command is None:
+        return "paramreduce --help lists all commands; paramreduce alone says what to do next."
+    more = f"paramreduce {command.name} --help says more."
+    example = command.show_example(call.words) if isinstance(command, ExampleCommand) else ""
+    return f"Example: {example}\n{more}" if example else more
+
+
+def _is_config(parameter: click.Parameter | None) -> bool:
+    return parameter is not None and parameter.name == "config"
+
+
+def _typed(words: Sequence[str]) -> str:
+    return shlex.join(["paramreduce", *words])
+
+
+def _with_config(words: Sequence[str]) -> str:
+    """Return the call with the first config here; empty where there is none, or samples are given."""
+    here = configs_in(Path())
+    if not here or any(word.startswith("--samples") for word in words):
+        return ""
+    return _typed([words[0], str(here[0]), *words[1:]])
+
+
+def _other_place(error: ParamreduceError, words: list[str]) -> str:
+    """Return the call with what the user means by a path or a name that is rejected."""
+    if isinstance(error, MissingConfigError):
+        return _with_config(words)
+    if words[0] == "init" and len(words) == 2:
+        return _example_meant(words[1])
+    known = error.choices or error.options
+    return "" if known or not error.rejected else _meant_place(error.rejected, words)
+
+
+def _meant_place(rejected: str, words: list[str]) -> str:
+    """Return the call with the config, the results or the folder that a typed word stands for."""
+    word = next((w for w in words if rejected in (w, w.rstrip("/"))), None)
+    if word is None:
+        return ""
+    above = project_above(Path())
+    if above is not None and not Path(word).exists() and (above / word).exists():
+        return f"cd {above} && {_typed(words)}"
+    for meant in (_other_kind(word, words), _misspelt_robot(word, words)):
+        if meant is not None:
+            return _typed(meant) if meant != words else ""
+    return _example_meant(word) if config_meant(word) is None else ""
+
+
+def _other_kind(word: str, words: list[str]) -> list[str] | None:
+    """Return the call with a config for results, or results for a config, or a robot's name."""
+    config, results = config_meant(word), results_meant(word)
+    if word == words[0]:
+        return None if config is None or len(words) > 1 else ["run", str(config)]
+    if words[0] in (*stages, *_OF_CONFIGS):
+        return None if config is None else _exchanged(words, word, str(config))
+    if words[0] not in _OF_RESULTS:
+        return None
+    if results is not None and results.resolve() != Path(word).resolve():
+        return _exchanged(words, word, str(results))
+    return None if config is None else ["run", str(config)]
+
+
+def _misspelt_robot(word: str, words: list[str]) -> list[str] | None:
+    """Return the call with the config whose name is like a robot's name that was typed."""
+    if words[0] not in (*stages, *_OF_CONFIGS) or Path(word).name != word or Path(word).suffix:
+        return None
+    here = {path.stem: path for path in configs_in(Path())}
+    near = difflib.get_close_matches(word, here, n=1, cutoff=_LIKE_ROBOT)
+    return _exchanged(words, word, str(here[near[0]])) if near else None
+
+
+def _example_meant(word: str) -> str:
+    """Return the call that copies the example of a robot's name; empty where there is none."""
+    from paramreduce_cli.config.examples import examples  # late: it loads much
+
+    name = Path(word).name.removesuffix(".yaml")
+    return _typed(["init", "--example", name]) if name in examples() else ""
+
+
+def _corrected(error: ParamreduceError, words: list[str]) -> list[str] | None:
+    """Return the call with a choice or an option of the error; None where the error has none."""
+    if error.choices:
+        return _exchanged(words, error.rejected, nearest_choice(error.rejected, error.choices))
+    if error.options:
+        return _exchanged(words, error.rejected, error.options[-1]) or [*words, *error.options]
+    if error.rejected.startswith("results/") and (config := config_meant(error.rejected)):
+        return ["run", str(config)]
+    return words if isinstance(error, ConfigError) and error.in_file else None
+
+
+def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
+    """Return the choice most like a rejected word, with a number in range where the choices have numbers.
+
+    Args:
+        rejected: Word that was typed, such as ``swop:9`` or ``9``.
+        choices: Words such as ``full`` or ``swap:1...7``; one with a single number is the default.
+    """
+    default = next((c for c in choices if ":" in c and _RANGE not in c), "")
+    others = [choice for choice in choices if choice != default]
+    name, _, number = rejected.partition(":")
+    digits = "".join(c for c in rejected.lstrip(":") if c.isdecimal())
+    if digits and not name.strip(digits):
+        numbered = [choice.partition(":")[0] for choice in others if ":" in choice]
+        name, number = default.partition(":")[0] or (numbered or others)[0], digits
+    begun = [choice for choice in others if choice.partition(":")[0].startswith(name)]
+    near = begun or difflib.get_close_matches(name, others or choices, n=1, cutoff=0.0)
+    return _in_range(near[0], number or default.partition(":")[2])
+
+
+def _in_range(choice: str, number: str) -> str:
+    """Return ``swap:1...7`` with the nearest number that it has."""
+    name, colon, numbers = choice.partition(":")
+    first, dots, last = numbers.partition(_RANGE)
+    if not (colon and dots and first.isdecimal() and last.isdecimal()):
+        return choice
+    wanted = int(number) if number.isdecimal() else int(first)
+    return f"{name}:{min(max(wanted, int(first)), int(last))}"
+
+
+def _exchanged(words: Sequence[str], one: str, other: str) -> list[str] | None:
+    """Return the words with another word, or another value after ``--option=``; None where it is not there."""
+    changed = []
+    for word in words:
+        option, equals, value = word.partition("=")
+        joined = word.startswith("--") and equals and value == one
+        changed.append(f"{option}={other}" if joined else other if word == one else word)
+    return changed if changed != list(words) else None
+
+
+def _meant_option(name: str, command: click.Command, words: Sequence[str]) -> str | None:
+    """Return the option that takes the value, is spelt alike, or begins with the one letter that was typed."""
+    taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
+    value = " ".join(words).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
+    for parameter in taken:
+        if isinstance(parameter.type, click.Choice) and value in parameter.type.choices:
+            return parameter.opts[0]
+    options = [option for parameter in taken for option in parameter.opts]
+    if not name.startswith("--"):
+        begun = [option for option in options if option.startswith(f"-{name}")]
+        return begun[0] if len(begun) == 1 else None
+    near = difflib.get_close_matches(name, options, n=1, cutoff=_LIKE_OPTION)
+    return near[0] if near else None
+
+
+def _with_option(word: str, name: str, meant: str | None) -> str:
+    """Return a word, which may be joined to its value, with the option that is meant."""
+    option, equals, value = word.partition("=")
+    return f"{meant}{equals}{value}" if option == name else word
+
+
+def _usual_config(rejected: str) -> str:
+    """Return the config of the results in which a rejected file is; empty if there is none."""
+    path = Path(rejected)
+    if path.suffix not in (".h5", ".json", ".html"):
+        return ""
+    config = config_meant(str(path.parent))
+    return "" if config is None else shlex.quote(str(config))
+
+
+def _own_arguments(words: Sequence[str]) -> str:
+    """Return the config of a call, and the options that change it or say where its results are."""
+    kept: list[str] = []
+    following = False
+    for word in words[1:]:
+        if following or word.startswith(("--set=", "--results=", "--samples=")):
+            kept.append(word)
+            following = False
+        elif word in ("--set", "--results", "--samples"):
+            kept.append(word)
+            following = True
+        elif word.endswith((".yaml", ".yml")):
+            kept.insert(0, word)
+    named = any(word.endswith((".yaml", ".yml")) or word.startswith("--samples") for word in kept)
+    return shlex.join(kept) if named else ""
