@@ -19,53 +19,45 @@ class ExampleCommand(click.Command):
         arguments: As for click.
         example: Call without ``paramreduce``; ``{config}``, ``{results}`` and ``{results_2}`` stand for what is in the
             folder.
-        robot: Robot of the example in the help.
+        config: Config of the example in the help.
         options: As for click.
     """
 
     def __init__(
-        self, *arguments: Any, example: str, robot: str = "puma560", **options: Any
+        self, *arguments: Any, example: str, config: str = "configs/puma560.yaml", **options: Any
     ) -> None:
         super().__init__(*arguments, **options)
-        self._example, self._robot = example, robot
-        shown = self._filled(
-            {
-                "config": f"configs/{robot}.yaml",
-                "results": f"results/{robot}",
-                "results_2": "results/my_run",
-            }
-        )
-        self.help = f"{inspect.cleandoc(self.help or '')}\n\nExample: {shown}"
+        self._example, self._robot = example, Path(config).stem
+        self.help = f"{inspect.cleandoc(self.help or '')}\n\nExample: {self._fill({})}"
 
-    def _filled(self, names: dict[str, str]) -> str:
-        return f"paramreduce {self._example.format(**names)}"
+    def _fill(self, found: dict[str, str]) -> str:
+        """Return the example with what is found, and with the robot of the help for the rest."""
+        names = {
+            "config": f"configs/{self._robot}.yaml",
+            "results": f"results/{self._robot}",
+            "results_2": "results/my_run",
+        }
+        return f"paramreduce {self._example.format(**names | found)}"
 
     def show_example(self, words: Sequence[str]) -> str:
-        """Return the example with what is in this folder, or with what to do first; empty where too little is here."""
+        """Return the example with what is in this folder, or with what to do first; empty where too little is here.
+
+        Args:
+            words: Words of the call, whose configs come first.
+        """
         names = {name for _, name, _, _ in Formatter().parse(self._example) if name}
-        if not names:
-            return self._filled({})
         configs, results = _here(words)
-        if not configs and not results:
-            shown = self._filled(
-                {
-                    "config": f"configs/{self._robot}.yaml",
-                    "results": f"results/{self._robot}",
-                    "results_2": "results/my_run",
-                }
-            )
-            first = f"paramreduce init --example {self._robot} writes its config."
-            return f"{shown}\nFirst: {first}"
-        known = {"config": configs[:1], "results": results[:1], "results_2": results[1:2]}
-        found = {name: shlex.quote(str(path)) for name, paths in known.items() for path in paths}
+        if names and not configs and not results:
+            return f"{self._fill({})}\nFirst: paramreduce init --example {self._robot} writes its config."
+        paths = {"config": configs[:1], "results": results[:1], "results_2": results[1:2]}
+        found = {name: shlex.quote(str(path)) for name, some in paths.items() for path in some}
         if names <= found.keys():
-            return self._filled(found)
+            return self._fill(found)
         if results or "config" in names - found.keys():
             return ""
-        shown = self._filled(
-            {**found, "results": f"results/{configs[0].stem}", "results_2": "results/my_run"}
-        )
-        return f"{shown}\nFirst: paramreduce run {shlex.quote(str(configs[0]))} makes results."
+        first = shlex.quote(str(configs[0]))
+        found["results"] = f"results/{configs[0].stem}"
+        return f"{self._fill(found)}\nFirst: paramreduce run {first} makes results."
 
 
 def _here(words: Sequence[str]) -> tuple[list[Path], list[Path]]:

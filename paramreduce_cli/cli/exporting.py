@@ -18,6 +18,8 @@ def up_to_date(config: Config | None, store: Store, record: type) -> Any:
     robot = config.robot if config is not None else None
     found = load_file(store.path(record), record, robot, maker_of(record).name)[0]
     if mismatch := Runner(config, store, jobs=1).describe_mismatch(record):
-        fields = {"remedy": "Make it again."} if config is None else {"command": "run"}
-        raise ArtifactError(f"{mismatch}.", rejected=str(store.path(record)), **fields)
+        again, command = ("Make it again.", "") if config is None else ("", "run")
+        raise ArtifactError(
+            f"{mismatch}.", rejected=str(store.path(record)), remedy=again, command=command
+        )
     return found

@@ -94,10 +94,10 @@ def stage_command(name: str) -> click.Command:
     decorated: Callable[..., Any] = command
     for parameter in params:
         decorated = parameter(decorated)
-    robot = "ur10" if stage.output in _OF_LOGS else "puma560"
+    config = "configs/ur10.yaml" if stage.output in _OF_LOGS else "configs/puma560.yaml"
     example = f"{stage.name} {{config}}"
     decorator = click.command(
-        stage.name, cls=ExampleCommand, help=_stage_help(stage), example=example, robot=robot
+        stage.name, cls=ExampleCommand, help=_stage_help(stage), example=example, config=config
     )
     return decorator(decorated)
 

@@ -187,7 +187,8 @@ def test_selected_is_that_of_the_only_results(invoke, two_link_results, tmp_path
     assert invoke("inspect", "selected").out == invoke("inspect", "results/a").out
     shutil.copytree(two_link_results, tmp_path / "results" / "b")
     assert (
-        "Here are 2. Try `paramreduce inspect results/a`" in invoke("inspect", "selected", code=2).err
+        "Here are 2. Try `paramreduce inspect results/a`"
+        in invoke("inspect", "selected", code=2).err
     )
 
 

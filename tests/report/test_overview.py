@@ -31,7 +31,7 @@ def test_the_command_writes_text_csv_and_latex(invoke, two_link_results, tmp_pat
 
 def test_folders_without_a_report(invoke, tmp_path):
     assert (
-        "holds no results itself. Make them with `paramreduce run CONFIG`"
+        "holds no results itself. Run `paramreduce run CONFIG`"
         in invoke("table", tmp_path, code=2).err
     )
     assert not (tmp_path / "table.csv").exists()

@@ -21,7 +21,10 @@ _TABLE_WIDTH = 100
 
 
 @click.command(
-    "check-data", cls=ExampleCommand, example="check-data recording.csv {config}", robot="ur10"
+    "check-data",
+    cls=ExampleCommand,
+    example="check-data recording.csv {config}",
+    config="configs/ur10.yaml",
 )
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("config", type=FilePath(), required=False)
