@@ -382,5 +382,5 @@ def _odd_drives(config: Config) -> Iterator[str]:
         yield f"unknown, and so zero in the torques of the model: {', '.join(found)}"
     for name, drive in config.each_drive().items():
         for kind, value in drive.effects().items():
-            if value < 0 and kind is not Kind.OFFSET:
+            if value < 0 and not kind.is_signed:
                 yield f"drive {name} has the negative {Parameter(kind, name).name} {value:g}"

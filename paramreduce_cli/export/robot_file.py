@@ -6,24 +6,17 @@ import numpy as np
 
 from paramreduce_cli.config.schema import Config, SourceSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.importing import mjcf_writing, urdf_writing
+from paramreduce_cli.importing.formats import formats
 from paramreduce_cli.importing.imported import Inertial, matrix
 from paramreduce_cli.importing.reading import imported, kind_of
+from paramreduce_cli.importing.robot_format import RobotFormat
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, Kind, Mechanism, Model
-from paramreduce_cli.robots.drives import EFFECTS
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
 from paramreduce_cli.robots.placement import transform
 
-_HELD = {
-    "urdf": (Kind.VISCOUS, Kind.COULOMB),
-    "mjcf": (Kind.VISCOUS, Kind.COULOMB, Kind.ROTOR, Kind.STIFFNESS),
-}
-"""What of a drive the files have a place for."""
 _SAME = 1e-9
 """By which frames may differ, m or without unit."""
-
-FORMATS = ("urdf", "mjcf")
 
 
 def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) -> dict[str, bytes]:
@@ -33,7 +26,7 @@ def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) ->
         config: With the file that it was made from.
         model: Of the robot.
         standard: Standard parameters that are written, (n_parameters,).
-        kind: One of :data:`FORMATS`, which the file must be of.
+        kind: One of :data:`paramreduce_cli.importing.formats.formats`, which the file must be of.
 
     Raises:
         ConfigError: The file is unknown, or no longer the robot of the config, or has no form for
@@ -48,16 +41,13 @@ def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) ->
     if kind_of(file) != kind:
         raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
     robot = imported(config.source)
-    _check_same(config, config.source, robot, gravity=kind == "mjcf")
+    form = formats[kind]()
+    _check_same(config, config.source, robot, gravity=form.holds_gravity)
     bodies = _bodies(model.mechanism, standard)
-    _remark(model.mechanism, standard, bodies, kind)
+    _warn_of_losses(model.mechanism, standard, bodies, form)
     inertials = {name: _inertial(name, body) for name, body in bodies.items()}
     drives = _drives(model.mechanism, standard)
-    if kind == "mjcf":
-        content = mjcf_writing.with_parameters(file, robot, inertials, drives)
-    else:
-        content = urdf_writing.with_parameters(file.read_bytes(), robot, inertials, drives)
-    return {file.name: content}
+    return {file.name: form.write(file, robot, inertials, drives)}
 
 
 def _check_same(
@@ -122,24 +112,23 @@ def _drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, f
         weight = float(drive.weights[moved[0]])
         found = result.setdefault(mechanism.bodies[moved[0]].name, {})
         for kind, column in mechanism.drive_columns(drive).items():
-            scale = abs(weight) if kind is Kind.COULOMB else weight**2
-            key = EFFECTS[kind]
-            found[key] = found.get(key, 0.0) + scale * float(standard[column])
+            scale = abs(weight) if kind.order is None else weight**2
+            found[kind.key] = found.get(kind.key, 0.0) + scale * float(standard[column])
             if kind is Kind.STIFFNESS:
                 found["rest"] = drive.rest / weight
     return result
 
 
-def _remark(
-    mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray], kind: str
+def _warn_of_losses(
+    mechanism: Mechanism, standard: FloatArray, bodies: dict[str, FloatArray], form: RobotFormat
 ) -> None:
     """Warn of bodies that cannot exist, and of what the file cannot hold.
 
     Raises:
-        ConfigError: Bodies cannot exist, and MuJoCo would refuse them.
+        ConfigError: Bodies cannot exist, and the format refuses them.
     """
     unphysical = [name for name, body in bodies.items() if not physical(body)]
-    if unphysical and kind == "mjcf":
+    if unphysical and form.physical:
         raise ConfigError(
             f"MuJoCo takes physical bodies alone, and no distribution of mass has the inertia of "
             f"{', '.join(unphysical)} in this model; a URDF can hold them."
@@ -149,11 +138,11 @@ def _remark(
         f"{parameter.name} = {value:.12g}"
         for parameter, value in zip(mechanism.parameters, standard, strict=True)
         if parameter.kind in DRIVE
-        and not (parameter.owner in single and parameter.kind in _HELD[kind])
+        and not (parameter.owner in single and parameter.kind in form.held)
     ]
     for names, text in (
         (unphysical, "not physical, as no distribution of mass has their inertia"),
-        (left, f"left out, as {kind.upper()} has no place for it"),
+        (left, "left out, as the format has no place for it"),
     ):
         if names:
             warnings.warn(f"{text}: {', '.join(names)}", ParamreduceWarning, stacklevel=2)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, IntArray, Kind, Mechanism
+from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, IntArray, Mechanism
 from paramreduce_cli.robots.inertia import pseudo_inertia
 
 _MARGIN = 1e-3
@@ -59,7 +59,7 @@ def physical_parameters(mechanism: Mechanism, known: FloatArray, factor: FloatAr
     columns = np.array([[r.columns[kind] for kind in INERTIAL] for r in mechanism.rigid])
     names = tuple(mechanism.parameters[row[0]].owner for row in columns)
     drives = {k: p.kind for k, p in enumerate(mechanism.parameters) if p.kind in DRIVE}
-    positive = [k for k, kind in drives.items() if kind is not Kind.OFFSET]
+    positive = [k for k, kind in drives.items() if not kind.is_signed]
     # What drives have is left to the data, in units in which it explains all there is.
     lengths = np.linalg.norm(factor[:, :-1], axis=0)
     lengths[lengths == 0] = 1.0

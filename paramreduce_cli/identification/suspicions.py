@@ -15,6 +15,7 @@ from paramreduce_cli.identification.expectations import (
 from paramreduce_cli.identification.hints import hints, negative_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
+    DRIVE,
     INERTIAL,
     Consistency,
     Estimate,
@@ -38,10 +39,6 @@ parameters fit noise that bodies cannot (0.0016 on the Panda's own log with a cu
 _NOTABLE = 0.1
 """Share of the torques from which on that is worth a word."""
 _FRICTION = (Kind.COULOMB, Kind.VISCOUS)
-_DRIVES = {
-    Kind.COULOMB: "coulomb", Kind.VISCOUS: "viscous", Kind.ROTOR: "inertia", Kind.OFFSET: "offset",
-}  # fmt: skip
-"""Keys of drives by the kinds of their parameters."""
 _ACROSS = 1e-6
 """Share of gravity below which an axis counts as level."""
 _ENOUGH = 6000
@@ -88,9 +85,7 @@ def suspicions(
             delay=delay,
             sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
             modelled=[
-                f"drives.{p.owner}.{_DRIVES[p.kind]}"
-                for p in mechanism.parameters
-                if p.kind in _DRIVES
+                f"drives.{p.owner}.{p.kind.key}" for p in mechanism.parameters if p.kind in DRIVE
             ],
         ),
         *_friction_doubts(model, full),

@@ -7,10 +7,8 @@ from lxml import etree
 
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.imported import ImportedRobot
-from paramreduce_cli.importing.mjcf import read_mjcf
+from paramreduce_cli.importing.formats import formats
 from paramreduce_cli.importing.simplified import SimplifiedRobot, simplified
-from paramreduce_cli.importing.urdf import read_urdf
 
 
 def imported(source: SourceSection) -> SimplifiedRobot:
@@ -19,7 +17,7 @@ def imported(source: SourceSection) -> SimplifiedRobot:
     Raises:
         ConfigError: The file cannot be read, or does not hold what is asked for.
     """
-    return simplified(_read(source.file), source)
+    return simplified(formats[kind_of(source.file)]().read(source.file), source)
 
 
 def described(name: str) -> Path | None:
@@ -43,12 +41,9 @@ def described(name: str) -> Path | None:
 
 
 def kind_of(path: Path) -> str:
-    """``mjcf`` where a file's outermost element says so, else ``urdf``."""
-    return "mjcf" if _outermost(path) == "mujoco" else "urdf"
-
-
-def _read(path: Path) -> ImportedRobot:
-    return read_mjcf(path) if kind_of(path) == "mjcf" else read_urdf(path)
+    """Return the name of the format whose outermost element a file has; ``urdf``, which refuses others, for none."""
+    tag = _outermost(path)
+    return next((name for name, found in formats.items() if found().tag == tag), "urdf")
 
 
 def _outermost(path: Path) -> str | None:

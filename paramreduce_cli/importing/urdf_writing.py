@@ -1,6 +1,7 @@
 """Parameters written back into the URDF file that a robot came from; everything else stays."""
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,7 +14,7 @@ _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 def with_parameters(
-    content: bytes,
+    path: Path,
     robot: SimplifiedRobot,
     inertials: Mapping[str, Inertial | None],
     drives: Mapping[str, Mapping[str, float]],
@@ -24,12 +25,13 @@ def with_parameters(
     move keep it.
 
     Args:
-        content: The file, which was read before.
+        path: The file, which was read before.
         robot: What was made of it.
         inertials: Of the bodies by name, in their frames; None for none.
         drives: Values by the keys of a drive in a config, by body.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
+    content = path.read_bytes()
     root = etree.fromstring(content, parser)
     links = {element.get("name"): element for element in root.findall("link")}
     joints = {element.get("name"): element for element in root.findall("joint")}

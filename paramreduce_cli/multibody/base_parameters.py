@@ -25,8 +25,6 @@ _AFFECTING_TOLERANCE = 1e-11
 _NUMERICALLY_ZERO = 1e-10
 _LENGTHS = {Kind.M: 2, Kind.MX: 1, Kind.MY: 1, Kind.MZ: 1}
 """Powers of a length in the effect of a parameter on a moment."""
-_OF_A_STATE = (Kind.ROTOR, Kind.VISCOUS, Kind.STIFFNESS)
-"""Parameters of drives whose force grows with the motion of the drive."""
 
 
 def affecting_columns(W: FloatArray) -> BoolArray:
@@ -62,7 +60,7 @@ def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
     for drive in mechanism.drives:
         weight = float(np.abs(drive.weights).max())
         for kind, column in mechanism.drive_columns(drive).items():
-            forces = weight if kind in _OF_A_STATE else 1.0
+            forces = weight if kind.order is not None else 1.0
             scale[:, column] = np.sqrt(len(K)) * weight * forces
     return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0)
 

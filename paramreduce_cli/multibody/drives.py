@@ -41,18 +41,13 @@ def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: O
     Raises:
         ValueError: The parameter is none of a drive.
     """
-    q, dq, ddq = states
-    if kind is Kind.ROTOR:
-        return along(drive, ddq)
-    if kind is Kind.VISCOUS:
-        return along(drive, dq)
-    if kind is Kind.STIFFNESS:
-        return along(drive, q) - drive.rest
-    if kind is Kind.OFFSET:
-        return 1.0
-    if kind is not Kind.COULOMB:
+    if kind not in _FORCES:
         raise ValueError(f"{kind} is no parameter of a drive")
-    speed = along(drive, dq)
+    return _FORCES[kind](drive, states, odd)
+
+
+def _friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    speed = along(drive, states[1])
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 
 
@@ -81,3 +76,13 @@ def smoothed(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
 def along(drive: Drive, values: Sequence[Any]) -> Any:
     """The sum of coordinates, or of their derivatives, with the drive's weights."""
     return sum(weight * values[i] for i, weight in enumerate(drive.weights.tolist()) if weight)
+
+
+_FORCES: dict[Kind, Callable[[Drive, Sequence[Sequence[Any]], OddFunctions], Any]] = {
+    Kind.ROTOR: lambda drive, states, odd: along(drive, states[2]),
+    Kind.VISCOUS: lambda drive, states, odd: along(drive, states[1]),
+    Kind.COULOMB: _friction_sign,
+    Kind.OFFSET: lambda drive, states, odd: 1.0,
+    Kind.STIFFNESS: lambda drive, states, odd: along(drive, states[0]) - drive.rest,
+}
+"""Force along a drive's motion for a unit value of each parameter; states are q, dq and ddq."""

@@ -31,18 +31,32 @@ class Kind(Enum):
     IYY = ("Iyy", "kg m^2", 7, "I", "yy")
     IYZ = ("Iyz", "kg m^2", 4, "I", "yz")
     IZZ = ("Izz", "kg m^2", 0, "I", "zz")
-    ROTOR = ("Ia", "kg m^2", 10, "I", "a")
-    VISCOUS = ("fv", "N m s/rad", 11, "f", "v")
-    COULOMB = ("fc", "N m", 12, "f", "c")
-    OFFSET = ("off", "N m", 13, "f", "0")
-    STIFFNESS = ("k", "N m/rad", 14, "k", "")
+    ROTOR = ("Ia", "kg m^2", 10, "I", "a", "inertia", "kg", 2)
+    VISCOUS = ("fv", "N m s/rad", 11, "f", "v", "viscous", "N s/m", 1)
+    COULOMB = ("fc", "N m", 12, "f", "c", "coulomb", "N", None)
+    OFFSET = ("off", "N m", 13, "f", "0", "offset", "N", None)
+    STIFFNESS = ("k", "N m/rad", 14, "k", "", "stiffness", "N/m", 0)
 
-    def __init__(self, symbol: str, unit: str, preference: int, letter: str, axes: str) -> None:
+    def __init__(
+        self, symbol: str, unit: str, preference: int, letter: str, axes: str,
+        key: str = "", sliding_unit: str = "", order: int | None = None,
+    ) -> None:  # fmt: skip
         self.symbol = symbol
         self.unit = unit
         self.preference = preference
         self.letter = letter
         self.axes = axes
+        self.key = key
+        """Key of a drive in a config; empty for what belongs to a body."""
+        self.sliding_unit = sliding_unit
+        """Unit where the drive slides."""
+        self.order = order
+        """Derivative of the drive's position that its force is proportional to; None for none."""
+
+    @property
+    def is_signed(self) -> bool:
+        """Whether the parameter may be negative on a real drive."""
+        return self is Kind.OFFSET
 
     @classmethod
     def of(cls, symbol: str) -> Kind:
@@ -62,16 +76,8 @@ INERTIAL = (
 )  # fmt: skip
 """The standard parameters of a rigid body about its frame's origin: mass, first moments, inertia."""
 
-DRIVE = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
+DRIVE = tuple(kind for kind in Kind if kind.key)
 """What a drive adds to the torques: inertia of its rotor, friction, a constant, a spring."""
-
-_SLIDING_UNITS = {
-    Kind.ROTOR: "kg",
-    Kind.VISCOUS: "N s/m",
-    Kind.COULOMB: "N",
-    Kind.OFFSET: "N",
-    Kind.STIFFNESS: "N/m",
-}
 
 LAST = max(kind.preference for kind in Kind) + 1
 """Rank of preference of columns of which nothing is known."""
@@ -101,9 +107,7 @@ class Parameter:
     @property
     def unit(self) -> str:
         """SI, such as ``kg m^2``."""
-        if not self.sliding:
-            return self.kind.unit
-        return _SLIDING_UNITS[self.kind]
+        return self.kind.sliding_unit if self.sliding else self.kind.unit
 
     @property
     def preference(self) -> int:

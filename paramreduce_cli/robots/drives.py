@@ -18,9 +18,6 @@ ALL = "all"
 
 Value = Number | Literal["unknown"]
 
-EFFECTS = dict(zip(DRIVE, ("inertia", "viscous", "coulomb", "offset", "stiffness"), strict=True))
-"""Keys of what a drive adds, by the kinds of its parameters."""
-
 
 class DriveSection(Section):
     """What acts along one coordinate, or along a sum of several, besides the inertia of bodies; each value a number, or `unknown` for a parameter that is yet to be found."""
@@ -45,12 +42,12 @@ class DriveSection(Section):
     @model_validator(mode="after")
     def _acts(self) -> DriveSection:
         if not self.effects() and "smoothing" not in self.model_fields_set:
-            raise ValueError(f"says nothing; give one of {', '.join(EFFECTS.values())}")
+            raise ValueError(f"says nothing; give one of {', '.join(kind.key for kind in DRIVE)}")
         return self
 
     def effects(self) -> dict[Kind, float]:
         """Values of its parameters by kind; zero for those yet to be found."""
-        given = {kind: getattr(self, key) for kind, key in EFFECTS.items()}
+        given = {kind: getattr(self, kind.key) for kind in DRIVE}
         return {
             kind: 0.0 if value == "unknown" else value
             for kind, value in given.items()
@@ -59,7 +56,7 @@ class DriveSection(Section):
 
     def unknown(self) -> list[str]:
         """Keys of the values that are yet to be found."""
-        return [key for key in EFFECTS.values() if getattr(self, key) == "unknown"]
+        return [kind.key for kind in DRIVE if getattr(self, kind.key) == "unknown"]
 
     def over(self, other: DriveSection | None) -> DriveSection:
         """The same, with what it leaves out taken from another one."""

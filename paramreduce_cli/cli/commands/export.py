@@ -23,9 +23,10 @@ from paramreduce_cli.export.choice import (
     simplified_model,
 )
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.robot_file import FORMATS, robot_file
+from paramreduce_cli.export.robot_file import robot_file
 from paramreduce_cli.export.values import VALUES, values_file
 from paramreduce_cli.export.writing import Exported, exported_model
+from paramreduce_cli.importing.formats import formats
 from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.records import (
     TERMS,
@@ -54,7 +55,7 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
 @RESULTS
 @SET
 @click.option(
-    "--format", "kind", type=click.Choice([*sorted(languages), *FORMATS, VALUES]), default="c", show_default=True,
+    "--format", "kind", type=click.Choice([*sorted(languages), *formats, VALUES]), default="c", show_default=True,
     help="Language of the code; or urdf, mjcf: the robot's own file with the model's parameters; or values alone, as JSON.",
 )  # fmt: skip
 @click.option(
@@ -101,9 +102,9 @@ def export(
         )
     if single and kind != "c":
         raise click.UsageError("--single goes with --format c.")
-    if kind in (*FORMATS, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
+    if kind in (*formats, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
         raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
-    if text in _OF_ONE and kind in FORMATS:
+    if text in _OF_ONE and kind in formats:
         raise click.UsageError(
             f"--model {text}: its values are of use to one function alone, not to a robot's file; "
             f"write code, or --format {VALUES}."
@@ -143,7 +144,7 @@ def export(
     if kind == VALUES:
         known = loading[Model].mechanism if Model in loading else None
         files = values_file(chosen, title, origin, known, simplified)
-    elif kind in FORMATS:
+    elif kind in formats:
         assert loaded is not None
         files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
     else:

@@ -15,7 +15,7 @@ import scipy.optimize
 
 from paramreduce_cli.errors import Concern, ConcernError, ParamreduceWarning
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.multibody.loops.closures import closure_equations, equation_owners
+from paramreduce_cli.multibody.loops.closures import CLOSURES, closure_equations, equation_owners
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import BASE, FloatArray, IntArray, Loops, Mechanism
 
@@ -35,8 +35,6 @@ _MODE_STARTS, _MODE_MOVES = 24, (0.5, 1.0, 2.0)
 """Random starts for other assembly modes, and their sizes, rad or m."""
 _ANOTHER_MODE = 1e-3
 """Difference of a coordinate from which on an assembly mode is another one, rad or m."""
-_ALONG = {"fixed": (2, 0), "prismatic": (2, 0), "revolute": (2,), "cylindrical": (2,)}
-"""Axes that point the same way in a closure of each kind."""
 
 
 def assembled(mechanism: Mechanism) -> Mechanism:
@@ -385,7 +383,7 @@ def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
             frame[:3, :3] if body == BASE else poses[body, :3, :3] @ frame[:3, :3]
             for body, frame in zip(closure.bodies, closure.frames, strict=True)
         )
-        for k in _ALONG.get(closure.kind, ()):
+        for k in CLOSURES[closure.kind].parallel:
             if A[:, k] @ B[:, k] < 0:
                 raise ConcernError(
                     f"{closure.name} closes with its two {'xyz'[k]} axes against each other.",

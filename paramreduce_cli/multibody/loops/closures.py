@@ -4,7 +4,8 @@ Phi(q) = 0 in the generalised coordinates of the open tree; lengths are in m and
 without unit, so that every equation is about as large as the gap it measures.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -15,20 +16,7 @@ from paramreduce_cli.multibody.kinematics import (
     motions,
     point_in_base,
 )
-from paramreduce_cli.records import Closure, Mechanism
-
-EQUATIONS: dict[str, tuple[str, ...]] = {
-    "fixed": ("x", "y", "z", "tilt x", "tilt y", "turn"),
-    "revolute": ("x", "y", "z", "tilt x", "tilt y"),
-    "prismatic": ("x", "y", "tilt x", "tilt y", "turn"),
-    "cylindrical": ("x", "y", "tilt x", "tilt y"),
-    "universal": ("x", "y", "z", "angle"),
-    "point": ("x", "y", "z"),
-    "planar": ("x", "y"),
-    "distance": ("distance",),
-    "coupling": ("coordinates",),
-}
-"""What each equation of a kind of closure measures."""
+from paramreduce_cli.records import Closure, ClosureKind, Mechanism
 
 
 def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
@@ -41,41 +29,99 @@ def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     if mechanism.loops is None:
         return ca.SX(0, 1)
     joints, kept = motions(mechanism, q), mechanism.loops.kept
-    equations = [e for c in mechanism.loops.closures for e in _equations(joints, c, q)]
+    equations = [e for c in mechanism.loops.closures for e in _ClosedPair(joints, c, q).equations()]
     return ca.vertcat(*(e for k, e in enumerate(equations) if kept is None or k in kept))
 
 
 def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
     """For every equation in order the kind of its closure, and its name for people."""
-    return [(c.kind, f"{c.name} ({part})") for c in closures for part in EQUATIONS[c.kind]]
+    return [(c.kind, f"{c.name} ({part})") for c in closures for part in CLOSURES[c.kind].equations]
 
 
-def _equations(joints: list[JointMotion], closure: Closure, q: ca.SX) -> list[ca.SX]:
-    (a, b), (A, B) = closure.bodies, closure.frames
-    if closure.kind == "coupling":
-        return [q[b] - closure.ratio * q[a] - closure.offset]
-    start, end = point_in_base(joints, a, A[:3, 3]), point_in_base(joints, b, B[:3, 3])
-    gap = subtract(end, start)
-    if closure.kind == "distance":
-        length = closure.length
-        return [(dot(gap, gap) - length**2) / (2 * length)]
+class _ClosedPair:
+    """The frames A and B that a closure holds together.
 
-    def along(axes: Sequence[int], other: Vector) -> list[ca.SX]:
-        """Components along some axes of A."""
-        return [dot(direction_in_base(joints, a, A[:3, k]), other) for k in axes]
+    Args:
+        joints: Motions of the joints.
+        closure: The closure.
+        q: Generalised coordinates, (n_q,), rad or m.
+    """
 
-    def axis(k: int) -> Vector:
-        """Of B."""
-        return direction_in_base(joints, b, B[:3, k])
+    def __init__(self, joints: list[JointMotion], closure: Closure, q: ca.SX) -> None:
+        self._joints, self.closure, self.q = joints, closure, q
 
-    if closure.kind == "planar":
-        return along((0, 1), gap)
-    if closure.kind == "point":
-        return list(gap)
-    if closure.kind == "universal":
-        return [*gap, *along((0,), axis(1))]
-    if closure.kind not in EQUATIONS:
-        raise ValueError(f"there is no closure of the kind {closure.kind!r}")
-    place = along((0, 1), gap) if closure.kind in ("prismatic", "cylindrical") else list(gap)
-    turn = along((1,), axis(0)) if closure.kind in ("prismatic", "fixed") else []
-    return [*place, *along((0, 1), axis(2)), *turn]
+    def equations(self) -> list[ca.SX]:
+        """Return what is zero where the closure holds."""
+        if self.closure.kind not in CLOSURES:
+            raise ValueError(f"there is no closure of the kind {self.closure.kind!r}")
+        return CLOSURES[self.closure.kind].measure(self)
+
+    @property
+    def gap(self) -> Vector:
+        """Origin of B from that of A, in the base frame, m."""
+        (a, b), (A, B) = self.closure.bodies, self.closure.frames
+        start, end = (
+            point_in_base(self._joints, a, A[:3, 3]),
+            point_in_base(self._joints, b, B[:3, 3]),
+        )
+        return subtract(end, start)
+
+    def axis(self, k: int) -> Vector:
+        """Axis k of B, in the base frame."""
+        return direction_in_base(
+            self._joints, self.closure.bodies[1], self.closure.frames[1][:3, k]
+        )
+
+    def along(self, axes: Sequence[int], vector: Vector) -> list[ca.SX]:
+        """Components of a vector along some axes of A."""
+        a, A = self.closure.bodies[0], self.closure.frames[0]
+        return [dot(direction_in_base(self._joints, a, A[:3, k]), vector) for k in axes]
+
+    @property
+    def tilt(self) -> list[ca.SX]:
+        """Components of the z axis of B along the x and the y axis of A."""
+        return self.along((0, 1), self.axis(2))
+
+    @property
+    def turn(self) -> list[ca.SX]:
+        """Component of the x axis of B along the y axis of A."""
+        return self.along((1,), self.axis(0))
+
+
+def _distance(pair: _ClosedPair) -> list[ca.SX]:
+    length = pair.closure.length
+    return [(dot(pair.gap, pair.gap) - length**2) / (2 * length)]
+
+
+def _coupling(pair: _ClosedPair) -> list[ca.SX]:
+    (a, b), closure = pair.closure.bodies, pair.closure
+    return [pair.q[b] - closure.ratio * pair.q[a] - closure.offset]
+
+
+class ClosureType(NamedTuple):
+    """What closures of a kind ask for."""
+
+    equations: tuple[str, ...]
+    """What each equation measures."""
+    measure: Callable[[_ClosedPair], list[ca.SX]]
+    parallel: tuple[int, ...] = ()
+    """Axes of the two frames that point the same way."""
+
+
+_PLACE, _TILT = ("x", "y", "z"), ("tilt x", "tilt y")
+CLOSURES: dict[ClosureKind, ClosureType] = {
+    "fixed": ClosureType((*_PLACE, *_TILT, "turn"), lambda p: [*p.gap, *p.tilt, *p.turn], (2, 0)),
+    "revolute": ClosureType((*_PLACE, *_TILT), lambda p: [*p.gap, *p.tilt], (2,)),
+    "prismatic": ClosureType(
+        ("x", "y", *_TILT, "turn"), lambda p: [*p.along((0, 1), p.gap), *p.tilt, *p.turn], (2, 0)
+    ),
+    "cylindrical": ClosureType(
+        ("x", "y", *_TILT), lambda p: [*p.along((0, 1), p.gap), *p.tilt], (2,)
+    ),
+    "universal": ClosureType((*_PLACE, "angle"), lambda p: [*p.gap, *p.along((0,), p.axis(1))]),
+    "point": ClosureType(_PLACE, lambda p: list(p.gap)),
+    "planar": ClosureType(("x", "y"), lambda p: p.along((0, 1), p.gap)),
+    "distance": ClosureType(("distance",), _distance),
+    "coupling": ClosureType(("coordinates",), _coupling),
+}
+"""All kinds of closures."""
