@@ -141,7 +141,7 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
 _NAMED_BY = {
     Coefficients: "trajectories.file",
     Recordings: "sampling.estimation_file, validation_file and test_file",
-    RawLogs: "sampling.log.files and held_out_files",
+    RawLogs: "sampling.log.files and held_out",
 }
 """Keys of files that users bring."""
 

@@ -16,6 +16,7 @@ from pydantic import BaseModel, ValidationError
 from paramreduce_cli.config import reading
 from paramreduce_cli.config.checks import check, remarks
 from paramreduce_cli.config.cutting import cut_to_independent
+from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.config.sections import keys_named
@@ -291,7 +292,8 @@ def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     path = _real_path(entry["loc"], data, kind)
     owner, key = _model_at(path[:-1], kind), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
-        return path, UnknownNameError("key", str(key), owner.model_fields)
+        former = FORMER_KEYS.get(path)
+        return path, former or UnknownNameError("key", str(key), owner.model_fields)
     meaning = ""
     if owner is not None and isinstance(key, str) and key in owner.model_fields:
         meaning = owner.model_fields[key].description or ""
@@ -382,10 +384,9 @@ def _with_paths(config: Config, folder: Path) -> Config:
 
     sampling = resolved(config.sampling, "estimation_file", "validation_file", "test_file")
     if sampling.log is not None:
-        files = {
-            key: [folder / path for path in getattr(sampling.log, key)]
-            for key in ("files", "held_out_files")
-        }
+        files: dict[str, list[Path]] = {"files": [folder / path for path in sampling.log.files]}
+        if others := sampling.log.held_out_files:
+            files["held_out"] = [folder / path for path in others]
         log = sampling.log.model_copy(update=files)
         sampling = sampling.model_copy(update={"log": log})
     return config.model_copy(

@@ -61,15 +61,24 @@ class UnitsSection(Section):
     """Of torques or currents."""
 
 
+class SignsSection(Section):
+    """Signs of joints (or motors) whose motion and torque were counted apart."""
+
+    motion: PerJoint = [1.0]
+    """1, or -1 for motions that were counted the other way."""
+    torque: PerJoint = [1.0]
+    """1, or -1 for torques that were counted the other way."""
+
+
 class LogSection(Section):
     """Logs of the machine itself, as they were recorded: they are made ready and split into a part to learn from and a part held out."""
 
     files: Files
-    """CSV (also .gz), HDF5, NPZ, or ROS 2 bags; relative to this file. If held_out_files are given all of them are learned from."""
-    held_out: Annotated[Number, Field(ge=0.05, le=0.9)] = 0.4
-    """Share of every file, at its end, that is held out."""
-    held_out_files: list[Path] = []
-    """Files that are held out, instead of a share of each."""
+    """CSV (also .gz), HDF5, NPZ, or ROS 2 bags; relative to this file. Where held_out names files all of these are learned from."""
+    held_out: (
+        Annotated[Number, Field(ge=0.05, le=0.9)] | Annotated[list[Path], Field(min_length=1)]
+    ) = 0.4
+    """What is held out: a share of every file, at its end, or a list of other files."""
     columns: ColumnsSection = ColumnsSection()
     """What is where in a file."""
     units: UnitsSection = UnitsSection()
@@ -78,10 +87,8 @@ class LogSection(Section):
     """Motor over joint: one number per joint, or a matrix N of them (motor position = N joint position); recorded positions and torques are then the motors'."""
     torque_constants: PerJoint | None = None
     """Torque over the recorded current, N m (N) per its unit; before the transmission."""
-    signs: PerJoint = [1.0]
-    """1 or -1 for joints (or motors) that were counted the other way, in motion and torque alike."""
-    torque_signs: PerJoint = [1.0]
-    """The same for torques alone."""
+    signs: PerJoint | SignsSection = [1.0]
+    """1, or -1 for joints (or motors) that were counted the other way in motion and torque alike; or motion and torque apart."""
     offsets: PerJoint = [0.0]
     """Added to the joint positions, rad (m)."""
     delay: Number = 0.0
@@ -106,14 +113,30 @@ class LogSection(Section):
 
     @model_validator(mode="after")
     def _signs(self) -> LogSection:
-        for name in ("signs", "torque_signs"):
-            if any(abs(value) != 1 for value in getattr(self, name)):
-                raise ValueError(f"{name} are 1 or -1")
+        if any(abs(value) != 1 for value in (*self.apart.motion, *self.apart.torque)):
+            raise ValueError("signs are 1 or -1")
         if self.torque_constants is not None and 0 in self.torque_constants:
             raise ValueError(
                 "a torque constant of 0 takes all torque away; `unmeasured` is for joints without torques"
             )
         return self
+
+    @property
+    def apart(self) -> SignsSection:
+        """Signs of motions and of torques."""
+        if isinstance(self.signs, SignsSection):
+            return self.signs
+        return SignsSection(motion=self.signs, torque=self.signs)
+
+    @property
+    def held_out_share(self) -> float:
+        """Share of every file that is held out; zero where other files are."""
+        return 0.0 if isinstance(self.held_out, list) else self.held_out
+
+    @property
+    def held_out_files(self) -> list[Path]:
+        """Files that are held out; none where it is a share of each."""
+        return self.held_out if isinstance(self.held_out, list) else []
 
     def motor_per_joint(self, n_dof: int) -> FloatArray | None:
         """Motor positions per joint position, (n_dof, n_dof); None where joints were recorded.

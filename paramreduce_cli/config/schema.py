@@ -56,8 +56,6 @@ class ModelSection(Section):
     """Names of the independent parameters; if left out they are taken in the order Izz Ixx Ixy Ixz Iyz mx my Iyy mz m."""
     rank_tolerance: Annotated[Number, Field(gt=0, lt=1)] = 1e-9
     """Singular values below this share of the largest one count as zero."""
-    seed: Seed = 0
-    """Of the random states on which the rank is decided."""
 
 
 class TrajectoriesSection(Section):
@@ -172,8 +170,6 @@ class SimulationSection(Section):
     """Motions of the test set."""
     start: dict[str, Pair] = {}
     """[lower, upper] of independent coordinates at the start, at rest, rad (m); where the mechanism is assembled, or zero, if left out."""
-    seed: Seed = 0
-    """Of phases and starts."""
 
 
 class SamplingSection(Section):
@@ -252,24 +248,6 @@ class Stop(Section):
     """Number of parameters."""
 
 
-class BackwardElimination(Section):
-    """Backward elimination."""
-
-    base_sets: Count = 1
-    """Base sets to start from: least torques, the preferred one, then random ones; each size keeps the best subset."""
-    swaps: bool = False
-    """Whether its subsets are improved by exchanges."""
-
-
-class Swap(Section):
-    """The swap search."""
-
-    kicks: Annotated[Whole, Field(ge=0, le=10_000)] = 8
-    """Random changes of each subset from which it starts again."""
-    seed: Seed = 0
-    """Of the random changes, and of base sets."""
-
-
 class BestSubset(Section):
     """The search for proven subsets."""
 
@@ -301,10 +279,6 @@ class ReductionSection(Section):
         "best-subset",
     ]
     """Which heuristics run; HEURISTIC@CRITERION selects by acceleration or operations instead of torque."""
-    backward_elimination: BackwardElimination = BackwardElimination()
-    """How backward elimination starts and ends."""
-    swap: Swap = Swap()
-    """Swap search."""
     best_subset: BestSubset = BestSubset()
     """Search for proven subsets."""
     operations: OperationsCriterion = OperationsCriterion()
@@ -376,7 +350,7 @@ class Acceptance(Section):
 
 
 class ValidationSection(Section):
-    """When the selected model is accepted, and when a mass matrix is called unsafe."""
+    """When the selected model is accepted, and what of it is measured."""
 
     accept: Acceptance = Acceptance()
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
@@ -384,10 +358,6 @@ class ValidationSection(Section):
     """Of closed loops: count d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b handed in."""
     stability: bool = True
     """Whether the selection is repeated with each trajectory left out and with fewer samples."""
-    condition_factor: Annotated[Number, Field(gt=1)] = 10.0
-    """Direct dynamics is called unsafe where the mass matrix is this much worse conditioned than with all given parameters, or its smallest eigenvalue this much smaller."""
-    error_factor: Annotated[Number, Field(gt=1)] = 2.0
-    """Estimation and validation errors are said to part where one is this much larger than the other."""
 
 
 class TrackingSection(Section):
@@ -395,14 +365,8 @@ class TrackingSection(Section):
 
     bandwidth: Positive = 20.0
     """Of the feedback, critically damped, rad/s."""
-    control_period: Positive = 0.001
-    """Time between two torques, s."""
     moves: Annotated[int, Field(ge=1, le=20)] = 4
     """How many moves from rest to rest the arm makes."""
-    paths: Annotated[int, Field(ge=1, le=100)] = 10
-    """How many paths of random poses it follows; errors are given as a range over them."""
-    seed: Seed = 0
-    """Of the first path; each further one has the next."""
 
 
 class ReportSection(Section):

@@ -42,7 +42,7 @@ def doubted_unit(expected: FloatArray, found: FloatArray) -> list[str]:
     if factor < 0:
         return [
             "Bodies weigh the opposite of what the parameters in the config let expect: does gravity point the "
-            "other way (description.gravity), or have all torques the wrong sign (sampling.log.torque_signs)?"
+            "other way (description.gravity), or have all torques the wrong sign (sampling.log.signs)?"
         ]
     if 1 / _OTHER_UNIT < factor < _OTHER_UNIT:
         return []
@@ -93,7 +93,7 @@ def doubted_sign(
         for torques, what in ((tau, "but not torques"), (turned, "and torques")):
             text = (
                 f"With positions and speeds of {names[j]} counted the other way, {what}, the residuals are far "
-                "smaller: are signs and torque_signs under sampling.log right?"
+                "smaller: are the signs under sampling.log right?"
             )
             found.append((_left(W, torques, deviation), text))
     left, text = min(found, default=(np.inf, ""))

@@ -266,11 +266,11 @@ def negative_friction(
     if len(joints) > max(1, len(set(owners)) / 2):
         return [
             f"Friction comes out negative at most joints ({listed}): is the sign of all torques wrong? See "
-            "sampling.log.torque_signs."
+            "sampling.log.signs."
         ]
     return [
         f"Friction of {' and '.join(joints)} comes out negative ({listed}): is the sign of its torques or speeds "
-        "wrong, or friction of another form? See sampling.log.torque_signs."
+        "wrong, or friction of another form? See sampling.log.signs."
     ]
 
 
@@ -304,7 +304,7 @@ def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
             (
                 left(usual, signs),
                 f"With the other sign of {name}'s torques the residuals are far smaller: is its sign "
-                "wrong? See sampling.log.torque_signs.",
+                "wrong? See sampling.log.signs.",
             )
         )
     for i, j in combinations(seen, 2):

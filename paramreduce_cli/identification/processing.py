@@ -266,7 +266,7 @@ def _parts(
     moved = [moving(pieces, wanted) for pieces in training]
     if held_out:
         return moved, [moving(pieces, wanted) for pieces in held_out]
-    halves = [split(pieces, 1 - wanted.held_out) for pieces in moved]
+    halves = [split(pieces, 1 - wanted.held_out_share) for pieces in moved]
     return [one for one, _ in halves], [two for _, two in halves]
 
 
@@ -421,7 +421,7 @@ def _said_ofsplit(
     how = (
         "by file"
         if wanted.held_out_files
-        else f"the last {100 * wanted.held_out:.3g} % of each file"
+        else f"the last {100 * wanted.held_out_share:.3g} % of each file"
     )
     text = f"{one:.4g} s are learned from, in {wanted.folds} folds, {two:.4g} s held out ({how})"
     return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."

@@ -103,11 +103,11 @@ def signals(
 
 def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
     """From motors to joints; in place, as there may be gigabytes."""
-    sign = _each(wanted, "signs", n_dof)
+    sign = _each(wanted.apart.motion, "signs", n_dof)
     tau = found.tau
-    tau *= sign * _each(wanted, "torque_signs", n_dof)
+    tau *= _each(wanted.apart.torque, "signs", n_dof)
     if wanted.torque_constants is not None:
-        tau *= _each(wanted, "torque_constants", n_dof)
+        tau *= _each(wanted.torque_constants, "torque_constants", n_dof)
     motion = [found.z, found.dz, found.ddz]
     for values in motion:
         if values is not None:
@@ -124,7 +124,7 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
         _multiply(tau, gears)
     z, dz, ddz = motion
     assert z is not None
-    z += _each(wanted, "offsets", n_dof)
+    z += _each(wanted.offsets, "offsets", n_dof)
     return Signals(found.time, z, dz, ddz, tau, found.turns)
 
 
@@ -134,8 +134,8 @@ def _multiply(values: FloatArray, factors: FloatArray) -> None:
         values[start : start + _AT_ONCE] = values[start : start + _AT_ONCE] @ factors
 
 
-def _each(wanted: LogSection, key: str, n_dof: int) -> FloatArray:
-    values = getattr(wanted, key)
+def _each(values: list[float], key: str, n_dof: int) -> FloatArray:
+    """Return a value for each joint; raise ConfigError for another number of values."""
     if len(values) not in (1, n_dof):
         raise ConfigError(
             f"has {len(values)} values for {n_dof} joints. Give one for each, or one for all.",

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from paramreduce_cli.config.schema import Acceptance, ValidationSection
+from paramreduce_cli.config.schema import Acceptance
 from paramreduce_cli.records import (
     About,
     BoolArray,
@@ -17,6 +17,11 @@ from paramreduce_cli.texts import format_percent
 
 _NEGLIGIBLE = 1e-6
 """Errors below this are not compared: there a model is exact but for round-off."""
+
+_CONDITION_FACTOR = 10.0
+"""A mass matrix is unsafe if it is so many times worse conditioned than with all given parameters."""
+_ERROR_FACTOR = 2.0
+"""Errors on two sets part if one is so many times larger."""
 
 
 def verdict(
@@ -60,7 +65,6 @@ def _shown(value: float, relative: bool) -> str:
 
 
 def remarks(
-    section: ValidationSection,
     heuristics: Mapping[str, HeuristicValidation],
     full: Mapping[str, int | float],
     selected: Selected,
@@ -70,7 +74,7 @@ def remarks(
     who = f"The selected model ({selected.heuristic}, n = {selected.n})"
     for name, result in heuristics.items():
         chosen = result.row(selected.n) if name == selected.heuristic else None
-        for flags, text, consequence in _doubts(section, full, result):
+        for flags, text, consequence in _doubts(full, result):
             if flags.any():
                 common.setdefault(text, []).append(name)
             if chosen is not None and flags[chosen]:
@@ -80,35 +84,33 @@ def remarks(
 
 
 def _doubts(
-    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
+    full: Mapping[str, int | float], result: HeuristicValidation
 ) -> Iterator[tuple[BoolArray, str, str]]:
     """Which subsets are doubtful, why, and what that means for the selected model."""
-    unsafe = _unsafe(section, full, result)
+    unsafe = _unsafe(full, result)
     last = int(result.n[unsafe].max(initial=0))
     yield (
         unsafe,
         f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass matrix loses "
-        f"positive definiteness on the samples, or comes more than {section.condition_factor:g} times "
+        f"positive definiteness on the samples, or comes more than {_CONDITION_FACTOR:g} times "
         "nearer to singular than with all given parameters.",
         "is not safe for direct dynamics: use its inverse dynamics only.",
     )
     for what in ("torque", "acceleration"):
-        apart = _apart(section, result, what)
+        apart = _apart(result, what)
         yield (
             apart,
-            f"{what} errors on the two sets differ more than {section.error_factor:g} times at n = "
+            f"{what} errors on the two sets differ more than {_ERROR_FACTOR:g} times at n = "
             f"{', '.join(_ranges(result.n[apart].tolist()))}.",
             f"has {what} errors on the two sets that part: use more trajectories, or more parameters.",
         )
 
 
-def _unsafe(
-    section: ValidationSection, full: Mapping[str, int | float], result: HeuristicValidation
-) -> BoolArray:
+def _unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
     if not full:  # nothing is known but torques
         return np.zeros(result.n.size, dtype=bool)
     smallest = result.mass_matrix_smallest_eigenvalue
-    factor = section.condition_factor
+    factor = _CONDITION_FACTOR
     near = smallest <= max(0.0, full["mass_matrix_smallest_eigenvalue"] / factor)
     unsafe: BoolArray = near | (
         result.mass_matrix_condition > factor * full["mass_matrix_condition"]
@@ -116,13 +118,11 @@ def _unsafe(
     return unsafe
 
 
-def _apart(section: ValidationSection, result: HeuristicValidation, what: str) -> BoolArray:
+def _apart(result: HeuristicValidation, what: str) -> BoolArray:
     one = np.asarray(getattr(result, f"{what}_error_estimation"))
     two = np.asarray(getattr(result, f"{what}_error_validation"))
     smaller, larger = np.minimum(one, two), np.maximum(one, two)
-    apart: BoolArray = (larger > section.error_factor * smaller) & (
-        (smaller > _NEGLIGIBLE) & (larger < 1)
-    )
+    apart: BoolArray = (larger > _ERROR_FACTOR * smaller) & ((smaller > _NEGLIGIBLE) & (larger < 1))
     return apart
 
 

@@ -26,10 +26,6 @@ def selection_columns(wanted: ReductionSection, samples: Samples) -> GroupedColu
 def effort(wanted: ReductionSection, run: Run) -> Effort:
     """How hard the config asks to search."""
     return Effort(
-        base_sets=wanted.backward_elimination.base_sets,
-        continue_with_swaps=wanted.backward_elimination.swaps,
-        kicks=wanted.swap.kicks,
-        seed=wanted.swap.seed,
         time_limit=wanted.best_subset.time_limit,
         node_limit=wanted.best_subset.node_limit,
         subtrees=wanted.best_subset.parts == "subtrees",

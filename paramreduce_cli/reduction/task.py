@@ -18,13 +18,10 @@ from paramreduce_cli.reduction.objective import Objective, Units
 class Effort:
     """How hard to search."""
 
-    base_sets: int = 1
-    """Base sets from which parameters are eliminated backwards."""
-    continue_with_swaps: bool = False
-    """Whether the subsets of backward elimination are improved by exchanges."""
     kicks: int = 8
     """Random changes of a subset from which the swap search starts again."""
     seed: int = 0
+    """Seed of these changes."""
     time_limit: float = 60.0
     """Of proofs, s."""
     node_limit: int | None = None

@@ -128,7 +128,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
 
     searcher = Searcher(
         lean, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
-        judge.poses(_POSES), budget, direct, section.seed,
+        judge.poses(_POSES), budget, direct,
     )  # fmt: skip
     found = simplified(
         searcher, starts, rounds=section.rounds, seconds=section.time_limit or np.inf,

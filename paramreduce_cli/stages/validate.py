@@ -134,7 +134,7 @@ def validate(
         cross_validation=crossed,
         accepted=accepted,
         verdict=sentence,
-        remarks=tuple(remarks(judging, heuristics, full, selected)),
+        remarks=tuple(remarks(heuristics, full, selected)),
     )
 
 

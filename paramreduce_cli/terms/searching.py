@@ -69,7 +69,7 @@ class Searcher:
     budget: Budget
     direct: bool
     """Whether [M | delta] is meant, not torques."""
-    seed: int
+    seed: int = 0
     """Of what is random."""
 
     def begun(self, start: Start, turn: int = 0) -> Descent:

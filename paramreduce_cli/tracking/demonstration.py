@@ -17,6 +17,12 @@ _SHARE = 0.8
 """Of the range and speed of a motion that the paths keep to."""
 
 
+_CONTROL_PERIOD = 1e-3
+"""Time between two torques, s."""
+_PATHS = 10
+"""Paths of random poses, each with its number as seed; errors are given as a range over them."""
+
+
 class ControllerModel(Protocol):
     """Inverse dynamics as a controller has it."""
 
@@ -43,11 +49,10 @@ def tracked(
     low, high = z.min(axis=0), z.max(axis=0)
     inset = (1 - _SHARE) / 2 * (high - low)
     speed = _SHARE * np.abs(dz).max(axis=0)
-    seeds = range(section.seed, section.seed + section.paths)
     paths = point_to_point(
-        low + inset, high - inset, speed, section.moves, section.control_period, seeds
+        low + inset, high - inset, speed, section.moves, _CONTROL_PERIOD, range(_PATHS)
     )
-    arm = _arm(model, section.control_period)
+    arm = _arm(model, _CONTROL_PERIOD)
     errors = {name: simulate(paths, c, arm, section.bandwidth) for name, c in controllers.items()}
     return Tracking(paths, errors)
 

@@ -23,7 +23,7 @@ _SAID = {
     "all signs": "the wrong sign",
     "gravity": "is description.gravity right",
     "delay": "ms later than positions",
-    "sign": "torque_signs",
+    "sign": "sampling.log.signs",
     "gain": "times what those of the other joints let expect",
     "coulomb": "coulomb is missing",
     "viscous": "viscous is missing",

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.config import config_schema, load_config
+from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import read_yaml
 from paramreduce_cli.config.template import dh_template
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
@@ -148,13 +149,13 @@ def test_a_missing_file_offers_those_that_are_there(tmp_path, write_config):
 
 def test_overrides(write_config):
     path = write_config()
-    settings = ["trajectories.count=3", "description.dh.joints.1.a=2*pi", "model.seed=5",
+    settings = ["trajectories.count=3", "description.dh.joints.1.a=2*pi", "trajectories.seed=5",
                 "trajectories.points=1e2"]  # fmt: skip
     config = load_config(path, settings)
     assert config.trajectories.count == 3
     assert config.trajectories.points == 100
     assert config.description.dh.joints[1].a == pytest.approx(2 * np.pi)
-    assert config.model.seed == 5
+    assert config.trajectories.seed == 5
     (message,) = errors_of(path, "trajectories.count=none_at_all")
     assert message.startswith("--set trajectories.count=none_at_all: ")
     for wrong in ("trajectories.count", "robot.name=1", "description.dh.joints.9.a=1", "a=[", "=1"):
@@ -232,3 +233,9 @@ def test_a_recorded_test_set_needs_no_test_trajectories(write_config, counts, ex
     recorded = "sampling:\n  test_file: test.csv\n\nselected:"
     path = write_config(("  test_count: 4\n", counts), ("selected:", recorded))
     assert load_config(path).trajectories.test_count == expected
+
+
+@pytest.mark.parametrize("key", FORMER_KEYS, ids=".".join)
+def test_former_keys_say_what_stands_in_their_place(write_config, key):
+    with pytest.raises(ConfigError, match=re.escape(FORMER_KEYS[key])):
+        load_config(write_config(), [f"{'.'.join(key)}=1"])

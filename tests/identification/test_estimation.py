@@ -121,7 +121,7 @@ def scaled(log, joint, gain):
 
 CASES = {
     "delay": (lambda log: late(log, 0.01), None, r"Torques come (9|10|11)\S* ms later"),
-    "sign": (lambda log: flipped(log, 1), None, "torque_signs"),
+    "sign": (lambda log: flipped(log, 1), None, "sampling.log.signs"),
     "gain": (lambda log: scaled(log, 1, 1.2), None, r"z_2 are 1\.(1[5-9]|2)"),
     "coulomb": (None, "fc", "coulomb is missing"),
     "viscous": (None, "fv", "viscous is missing"),

@@ -18,8 +18,8 @@ NAMES = ("upper", "fore")
 COLUMNS = {"velocity": "dq{}"}
 
 
-def made(log, held_out=None, **keys):
-    logs = RawLogs((RawLog("log.csv", log, 2),), () if held_out is None else (held_out,))
+def made(log, other=None, **keys):
+    logs = RawLogs((RawLog("log.csv", log, 2),), () if other is None else (other,))
     keys.setdefault("columns", COLUMNS)
     return processed(logs, LogSection(files=["log.csv"], **keys), NAMES)
 
@@ -100,7 +100,7 @@ def test_files_are_read_one_at_a_time():
 
 def test_held_out_files():
     other = RawLog("other.csv", two_link_log(seed=1), 2)
-    found = made(two_link_log(), other, held_out_files=["other.csv"])
+    found = made(two_link_log(), other, held_out=["other.csv"])
     assert np.count_nonzero(found.training.fold != UNUSED) > 0.99 * found.training.time.size
     assert any("by file" in step for step in found.steps)
 
@@ -108,7 +108,7 @@ def test_held_out_files():
 def test_another_rate_of_a_held_out_file_is_refused():
     other = RawLog("other.csv", two_link_log(rate=100.0), 2)
     with pytest.raises(DataError, match=r"other\.csv: is recorded at 100 Hz, log\.csv at 200 Hz"):
-        made(two_link_log(), other, held_out_files=["other.csv"])
+        made(two_link_log(), other, held_out=["other.csv"])
 
 
 def test_standstill_is_cut_but_serves_filters():
@@ -188,7 +188,7 @@ def test_what_is_shown_is_what_was_done():
 
 
 def test_held_out_files_are_not_shown_after_what_is_learned_from():
-    shown = made(two_link_log(seconds=6), RawLog("b.csv", two_link_log(seed=1), 2), held_out_files=["b.csv"]).shown  # fmt: skip
+    shown = made(two_link_log(seconds=6), RawLog("b.csv", two_link_log(seed=1), 2), held_out=["b.csv"]).shown  # fmt: skip
     assert np.isnan(shown.held_out).all()
     assert shown.raw_time[-1] == pytest.approx(6, abs=0.01)
 

@@ -89,7 +89,7 @@ def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):
 
 def test_without_a_compiler_the_controller_is_interpreted(invoke, two_link_copy, monkeypatch):
     monkeypatch.setattr(running, "load", lambda *_: None)
-    settings = ["report.tracking={moves: 1, control_period: 0.01}", "report.formats=[svg]"]
+    settings = ["report.tracking={moves: 1}", "report.formats=[svg]"]
     invoke("report", TWO_LINK, "--results", two_link_copy, "--force", settings=settings)
     assert (two_link_copy / "report/figures/tracking.svg").exists()
 

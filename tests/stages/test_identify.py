@@ -238,7 +238,7 @@ def test_a_joint_whose_torque_is_not_measured(tmp_path, invoke):
     assert re.search(
         r"rank (\d+) of \1 base parameters", said
     )  # those that the measured torques can tell
-    assert "torque_signs" not in error
+    assert "sampling.log.signs" not in error
 
 
 def test_a_joint_that_never_moves_is_told_by_rank(tmp_path, invoke):

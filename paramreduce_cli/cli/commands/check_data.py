@@ -55,7 +55,8 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     if section is None:
         columns = ColumnsSection(**guess_columns(names, joints))  # type: ignore[arg-type]
         section = LogSection(files=[file], columns=columns)
-    section = section.model_copy(update={"held_out_files": []})
+    usual = LogSection.model_fields["held_out"].default
+    section = section.model_copy(update={"held_out": usual} if section.held_out_files else {})
     with placed_errors(config, overrides):
         unmeasured = [] if loaded is None else loaded.unmeasured
         log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)

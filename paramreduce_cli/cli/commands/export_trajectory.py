@@ -28,7 +28,7 @@ _RUN = ("ros", "urscript")
     "export-trajectory",
     cls=ExampleCommand,
     example="export-trajectory {config} --format urscript --rate 500",
-    robot="ur10",
+    config="configs/ur10.yaml",
 )
 @CONFIG
 @RESULTS
