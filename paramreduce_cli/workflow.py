@@ -5,7 +5,6 @@ from pathlib import Path
 
 from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.pipeline import Stage, pipeline
-from paramreduce_cli.records import Identification, MeasuredLog, TermReduction, Trajectories
 from paramreduce_cli.sweep import Sweep
 
 
@@ -20,16 +19,17 @@ def make_rules() -> str:
         "PARAMREDUCE_FLAGS ?=",
         "# What must be there before paramreduce can be called, such as an installation.",
         "PARAMREDUCE_READY ?=",
-        "# Files that there are for some robots only: with a log, without one, with terms to leave out.",
-        "has_log = $(shell grep -Es '^ +log:' $(CONFIGS)/$(1).yaml)",
-        "with_log = $(if $(call has_log,$(1)),$(2))",
-        "without_log = $(if $(call has_log,$(1)),,$(2))",
-        "with_terms = $(if $(shell grep -Es '^terms:' $(CONFIGS)/$(1).yaml),$(2))",
+        "# Files that a run of a robot makes, asked of the program once for each robot, and those of a list among them.",
+        "made = $(if $(made_$(1)),,$(eval made_$(1) := $(shell \\",
+        "  $(if $(PARAMREDUCE_READY),$(MAKE) --silent $(PARAMREDUCE_READY) >&2 &&) \\",
+        "  $(PARAMREDUCE) stages $(CONFIGS)/$(1).yaml $(PARAMREDUCE_FLAGS))))$(made_$(1))",
+        "if_made = $(addprefix $(RESULTS)/$(1)/,$(filter $(2),$(call made,$(1))))",
         ".SECONDEXPANSION:",
     ]
     for stage in pipeline():
         target = f"$(RESULTS)/%/{file_of(stage.output)}"
-        needs = [_prerequisite(entry.type) for entry in stage.artifacts]
+        files = " ".join(file_of(entry.type) for entry in stage.artifacts)
+        needs = [f"$$(call if_made,$$*,{files})"] if files else []
         lines += [
             "",
             f"{target}: {' '.join(['$(CONFIGS)/%.yaml', *needs])} | $(PARAMREDUCE_READY)",
@@ -37,22 +37,6 @@ def make_rules() -> str:
         ]
     kept = " ".join(f"$(RESULTS)/%/{file_of(stage.output)}" for stage in pipeline())
     return "\n".join([*lines, "", f".PRECIOUS: {kept}", ""])
-
-
-_CONDITIONS: dict[type, str] = {
-    MeasuredLog: "with_log",
-    Identification: "with_log",
-    Trajectories: "without_log",
-    TermReduction: "with_terms",
-}
-"""Functions in the rules that say which robots have a file."""
-
-
-def _prerequisite(record: type) -> str:
-    path = f"$(RESULTS)/%/{file_of(record)}"
-    if record not in _CONDITIONS:
-        return path
-    return f"$$(call {_CONDITIONS[record]},$$*,{path.replace('%', '$$*')})"
 
 
 def outline() -> str:

@@ -1,5 +1,6 @@
 import shutil
 import subprocess
+import sys
 
 import pytest
 from conftest import ROOT, TWO_LINK
@@ -24,9 +25,16 @@ def make(tmp_path):
     (tmp_path / "configs").mkdir()
     shutil.copy(TWO_LINK, tmp_path / "configs" / "arm.yaml")
     (tmp_path / "stages.mk").write_text(make_rules())
+    program = (
+        tmp_path / "program"
+    )  # which says what it is asked to do, and knows which files a run makes
+    program.write_text(
+        f'#!/bin/sh\n[ "$1" = stages ] && exec {sys.executable} -m paramreduce_cli "$@"\necho paramreduce "$@"\n'
+    )
+    program.chmod(0o755)
 
-    def call(target):
-        command = ["make", "-f", "stages.mk", "PARAMREDUCE=echo paramreduce", target]
+    def call(target, *settings):
+        command = ["make", "-f", "stages.mk", f"PARAMREDUCE={program}", *settings, target]
         lines = subprocess.check_output(command, cwd=tmp_path, text=True).splitlines()
         return [line.split()[1] for line in lines if line.startswith("paramreduce")]
 
@@ -41,3 +49,18 @@ def test_make_does_just_what_is_missing_for_a_target(make, tmp_path):
     for name in ("model.h5", "trajectories.h5"):
         (folder / name).touch()
     assert make("results/arm/reduction.h5") == stages[2:]
+
+
+@pytest.mark.parametrize(
+    ("settings", "config", "made"),
+    [
+        ((), "", False),
+        (("PARAMREDUCE_FLAGS=--jobs 1 --set terms.torque_error=0.01",), "", True),
+        ((), "\nterms: {torque_error: 0.01}\n", True),
+        ((), "\n'terms': {torque_error: 0.01}\n", True),
+    ],
+)
+def test_make_asks_which_files_a_run_makes(make, tmp_path, settings, config, made):
+    path = tmp_path / "configs" / "arm.yaml"
+    path.write_text(path.read_text().replace("\nterms:", "\n# terms:") + config)
+    assert ("reduce-terms" in make("results/arm/report/summary.json", *settings)) == made

@@ -13,7 +13,7 @@ from paramreduce_cli.cli.project_state import config_meant, configs_in, project_
 from paramreduce_cli.errors import ConfigError, MissingConfigError, ParamreduceError
 from paramreduce_cli.stages import stages
 
-_OF_CONFIGS = ("run", "export", "export-trajectory")
+_OF_CONFIGS = ("run", "stages", "export", "export-trajectory")
 """Commands that take a config, beside the stages."""
 _OF_RESULTS = ("open", "inspect", "table")
 """Commands that take results."""

@@ -1,0 +1,26 @@
+"""The command that lists the stages of a run."""
+
+from pathlib import Path
+
+import click
+
+from paramreduce_cli.artifacts.store import file_of
+from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.options import CONFIG, SET
+from paramreduce_cli.config import load_config
+from paramreduce_cli.pipeline import stages_to_run
+
+
+@click.command(
+    cls=ExampleCommand, example="stages {config}", context_settings={"ignore_unknown_options": True}
+)
+@CONFIG
+@SET
+@click.argument("others", nargs=-1, type=click.UNPROCESSED, metavar="")
+def stages(config: Path, overrides: tuple[str, ...], others: tuple[str, ...]) -> None:
+    """List the stages that a run of a config has, in order, with the file that each makes.
+
+    Options of other commands are ignored, so that Make can ask with the options of a run.
+    """
+    for stage in stages_to_run(load_config(config, overrides)):
+        click.echo(f"{stage.name} {file_of(stage.output)}")
