@@ -22,10 +22,7 @@ from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import DataError, ParamreduceError
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.writing import exported_model
-from paramreduce_cli.frames import frame
-from paramreduce_cli.in_memory import made_in_memory
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.pipeline import maker_of, stages_to_run
 from paramreduce_cli.records import (
     FloatArray,
     Identification,
@@ -42,7 +39,10 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
-from paramreduce_cli.runner import Runner, asked, provenance
+from paramreduce_cli.report.data_frames import frame
+from paramreduce_cli.running.in_memory import made_in_memory
+from paramreduce_cli.running.pipeline import maker_of, stages_to_run
+from paramreduce_cli.running.runner import Runner, asked, provenance
 
 __all__ = [
     "Config",

@@ -20,10 +20,10 @@ from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli import main
 from paramreduce_cli.config import load_config
 from paramreduce_cli.lean import formulations as formulations_module
-from paramreduce_cli.pipeline import stages_to_run
 from paramreduce_cli.records import ReducedModel, Run
 from paramreduce_cli.robots import Robot
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import stages_to_run
+from paramreduce_cli.running.runner import Runner
 from paramreduce_cli.stages.build_model import build_model
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -25,7 +25,7 @@ from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.writing import exported_model
 from paramreduce_cli.fields.section import Section
-from paramreduce_cli.sweep import SweepSection
+from paramreduce_cli.running.sweep import SweepSection
 
 DOCS = ROOT / "docs"
 ENDINGS = r"(_(joint|estimation|validation|inverse|direct|plain|paper_rule|training|held_out))+$"

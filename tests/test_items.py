@@ -10,7 +10,6 @@ from conftest import ONE_FORMAT, TWO_LINK, config_of
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.multibody import observation
-from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import (
     Items,
     Part,
@@ -23,7 +22,8 @@ from paramreduce_cli.records import (
     Trajectories,
 )
 from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.runner import Runner
 
 STAGES = {stage.name: stage for stage in pipeline()}
 SHARED = ("optimize-trajectories", "sample", "reduce", "reduce-terms")

@@ -14,21 +14,19 @@ import paramreduce_cli
 PACKAGE = Path(paramreduce_cli.__file__).parent
 LAYERS = [
     {"cli", "__main__", "api"},
-    {"workflow", "runner", "in_memory"},
-    {"sweep", "taken", "frames"},
-    {"pipeline"},
+    {"running"},
     {"stages"},
     {"judgement", "artifacts", "tracking", "export", "report"},
-    {"terms"},
+    {"motion", "terms"},
     {"excitation", "identification", "reduction", "lean"},
     {"multibody"},
     {"expressions"},
     {"importing"},
     {"config"},
     {"robots"},
-    {"fields", "item_completion"},
+    {"fields", "resources"},
     {"records"},
-    {"registry", "texts", "processes", "scratch"},
+    {"registry", "texts"},
     {"errors"},
 ]
 LEVEL = {name: k for k, names in enumerate(LAYERS) for name in names}
@@ -112,7 +110,7 @@ except SystemExit as stopped:
 
 def test_what_stages_need_seldom_is_loaded_when_they_do():
     """Half of the time until a stage begins was that of loading these."""
-    loaded = modules_after("from paramreduce_cli.pipeline import pipeline; pipeline()")
+    loaded = modules_after("from paramreduce_cli.running.pipeline import pipeline; pipeline()")
     assert not loaded & {"scipy.signal", "scipy.stats", "matplotlib", "jinja2"}
 
 

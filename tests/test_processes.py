@@ -7,7 +7,7 @@ from functools import partial
 import pytest
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.processes import worker_pool
+from paramreduce_cli.resources.processes import worker_pool
 
 
 @pytest.mark.parametrize("jobs", [1, 2])

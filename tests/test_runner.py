@@ -9,10 +9,10 @@ from conftest import config_of, run_stages
 from paramreduce_cli.artifacts.store import Store, file_of, load_file
 from paramreduce_cli.cli.terminal import Interruption
 from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
-from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Part, Reduction
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.runner import Runner
 
 ORDER = [
     "build-model", "optimize-trajectories", "process-log", "sample", "reduce", "reduce-terms", "validate", "identify", "report",

@@ -6,9 +6,9 @@ import sys
 import numpy as np
 import pytest
 
-from paramreduce_cli.scratch import LargeTable, large_matrix, side_by_side, stacked
+from paramreduce_cli.resources.scratch import LargeTable, large_matrix, side_by_side, stacked
 
-SCRATCH = sys.modules["paramreduce_cli.scratch"]
+SCRATCH = sys.modules["paramreduce_cli.resources.scratch"]
 
 
 @pytest.fixture(params=["in memory", "in a file", "no room"])

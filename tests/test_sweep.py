@@ -8,12 +8,12 @@ from cluster.scripted import scheduled
 from conftest import CONFIGS, TWO_LINK
 from simulated_logs import log_config
 
-from paramreduce_cli import workflow
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import Part
-from paramreduce_cli.sweep import Sweep, load_sweep
-from paramreduce_cli.workflow import slurm_script
+from paramreduce_cli.running import workflow
+from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.sweep import Sweep, load_sweep
+from paramreduce_cli.running.workflow import slurm_script
 
 STAGES = {stage.name: stage for stage in pipeline()}
 

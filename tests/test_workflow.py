@@ -5,7 +5,7 @@ import sys
 import pytest
 from conftest import ROOT, TWO_LINK
 
-from paramreduce_cli.workflow import make_rules, outline
+from paramreduce_cli.running.workflow import make_rules, outline
 
 
 def test_committed_rules_are_those_of_the_declared_stages():

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from paramreduce_cli.artifacts.atomic import check_is_file, missing
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.scratch import LargeTable
+from paramreduce_cli.resources.scratch import LargeTable
 
 _UTF_16 = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 """First bytes of what spreadsheets call Unicode text."""

@@ -16,7 +16,7 @@ from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import reading
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray, RawLog
-from paramreduce_cli.scratch import large_matrix
+from paramreduce_cli.resources.scratch import large_matrix
 
 _MOST_COLUMNS = 64
 """Columns of a matrix beyond which they are samples, where rows are fewer."""

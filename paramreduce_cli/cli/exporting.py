@@ -5,8 +5,8 @@ from typing import Any
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.pipeline import maker_of
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import maker_of
+from paramreduce_cli.running.runner import Runner
 
 
 def up_to_date(config: Config | None, store: Store, record: type) -> Any:

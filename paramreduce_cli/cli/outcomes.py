@@ -1,7 +1,7 @@
 """What is said of stages that have run."""
 
 from paramreduce_cli.cli.terminal import complain, say
-from paramreduce_cli.runner import Outcome
+from paramreduce_cli.running.runner import Outcome
 
 NOT_ACCEPTED = 1
 

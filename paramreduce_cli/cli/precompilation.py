@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.processes import worker_pool
+from paramreduce_cli.resources.processes import worker_pool
 
 _EXAMPLE = "two_link"
 _QUICK = (
@@ -55,9 +55,9 @@ def _leave_out_terms() -> None:
     """Run the small arm as far as its functions without terms; their operations are counted on the way."""
     from paramreduce_cli.config import load_config
     from paramreduce_cli.config.examples import examples
-    from paramreduce_cli.in_memory import made_in_memory
-    from paramreduce_cli.pipeline import stages_to_run
     from paramreduce_cli.records import Run, TermReduction
+    from paramreduce_cli.running.in_memory import made_in_memory
+    from paramreduce_cli.running.pipeline import stages_to_run
 
     config = load_config(examples()[_EXAMPLE], _QUICK)
     records: dict[type, Any] = {}

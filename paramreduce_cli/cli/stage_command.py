@@ -25,9 +25,9 @@ from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, remark, sho
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
-from paramreduce_cli.pipeline import Stage, check_is_asked_for, describe_stage
 from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
-from paramreduce_cli.runner import Outcome, Runner, asked
+from paramreduce_cli.running.pipeline import Stage, check_is_asked_for, describe_stage
+from paramreduce_cli.running.runner import Outcome, Runner, asked
 from paramreduce_cli.stages import stages
 
 _OF_LOGS = (MeasuredLog, Identification)

@@ -85,7 +85,7 @@ BOUNDED_TREE = Plan(
 
 
 @dataclass(frozen=True)
-class Settings:
+class TrajectorySettings:
     """What is asked of every trajectory."""
 
     period: float
@@ -142,7 +142,9 @@ class _Candidate:
     status: str = ""
 
 
-def optimise_trajectory(excitation: Excitation, settings: Settings, seed: list[int]) -> Trajectory:
+def optimise_trajectory(
+    excitation: Excitation, settings: TrajectorySettings, seed: list[int]
+) -> Trajectory:
     """Find one exciting trajectory.
 
     Args:
@@ -190,7 +192,7 @@ def optimise_trajectory(excitation: Excitation, settings: Settings, seed: list[i
 class _Search:
     """The search for one trajectory: its grid, limits, resting position and plan."""
 
-    def __init__(self, excitation: Excitation, settings: Settings) -> None:
+    def __init__(self, excitation: Excitation, settings: TrajectorySettings) -> None:
         self._excitation, self._settings = excitation, settings
         self._grid = self._coarse = self._grid_of(settings.basis())
         if settings.points > _ENOUGH * settings.harmonics:
@@ -321,7 +323,7 @@ class _Search:
 
 
 def fine_positions(
-    excitation: Excitation, settings: Settings, series: FloatArray
+    excitation: Excitation, settings: TrajectorySettings, series: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Times and generalised coordinates on the grid on which bounds are checked.
 
@@ -334,7 +336,7 @@ def fine_positions(
 
 def describe(
     excitation: Excitation,
-    settings: Settings,
+    settings: TrajectorySettings,
     coefficients: FloatArray,
     *,
     kappa_start: float,

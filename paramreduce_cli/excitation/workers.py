@@ -15,9 +15,8 @@ import numpy as np
 from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.loads import Loads
 from paramreduce_cli.excitation.objective import Excitation
-from paramreduce_cli.excitation.optimiser import Settings, optimise_trajectory
+from paramreduce_cli.excitation.optimiser import TrajectorySettings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
-from paramreduce_cli.item_completion import complete_items
 from paramreduce_cli.multibody.drives import smoothed
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -31,6 +30,7 @@ from paramreduce_cli.records import (
     Run,
     Trajectory,
 )
+from paramreduce_cli.resources.item_completion import complete_items
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class ExcitationTask:
     """What rows of each joint are divided by, (n_dof,), N m or N."""
     criterion: str
     constraints: tuple[Constraint, ...]
-    settings: Settings
+    settings: TrajectorySettings
     seed: int
 
 

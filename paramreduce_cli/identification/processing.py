@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.config.logs import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
-from paramreduce_cli.identification.doubts import doubts
+from paramreduce_cli.identification.log_checks import doubts
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.pieces import Piece, moving, split
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
@@ -32,7 +32,7 @@ from paramreduce_cli.records import (
     Spectra,
     Tell,
 )
-from paramreduce_cli.scratch import large_matrix, stacked
+from paramreduce_cli.resources.scratch import large_matrix, stacked
 
 UNUSED = -1
 """Fold of samples that only serve filters."""

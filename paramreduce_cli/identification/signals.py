@@ -21,7 +21,7 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.identification.turns import unwrap_positions
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
-from paramreduce_cli.scratch import large_matrix, side_by_side
+from paramreduce_cli.resources.scratch import large_matrix, side_by_side
 
 _EVEN = 0.005
 """Deviation of a time step from the usual one, a share, up to which time is even."""

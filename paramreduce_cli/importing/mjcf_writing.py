@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.doubts import possible
 from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.inertia_checks import possible
 from paramreduce_cli.importing.mjcf import compiled
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import FloatArray

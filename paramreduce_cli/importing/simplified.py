@@ -12,7 +12,6 @@ import numpy as np
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import UnknownNameError
-from paramreduce_cli.importing.doubts import doubts
 from paramreduce_cli.importing.imported import (
     CLOSED_KINDS,
     ImportedClosure,
@@ -24,6 +23,7 @@ from paramreduce_cli.importing.imported import (
     steps_of,
     together,
 )
+from paramreduce_cli.importing.inertia_checks import doubts
 from paramreduce_cli.records import JOINT_COORDINATES, ClosureKind, FloatArray
 from paramreduce_cli.robots.tree import rotation_to
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels, lean_models
 from paramreduce_cli.multibody.plain import PlainDynamics
-from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.records import (
     BoolArray,
     CountedDynamics,
@@ -17,6 +16,7 @@ from paramreduce_cli.records import (
     ReducedModel,
     Run,
 )
+from paramreduce_cli.resources.processes import worker_pool
 
 COUNTS = ("operations_inverse", "operations_direct")
 """Names of the counts of lean models, which :meth:`Counts.lean` returns in this order."""

@@ -27,7 +27,6 @@ from paramreduce_cli.lean.choices import (
 from paramreduce_cli.lean.motion import Rates
 from paramreduce_cli.lean.search import best_choices
 from paramreduce_cli.lean.tree import Tree, lean_tree
-from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.records import (
     BoolArray,
     Formulation,
@@ -39,6 +38,7 @@ from paramreduce_cli.records import (
     Progress,
     Run,
 )
+from paramreduce_cli.resources.processes import worker_pool
 
 _FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
 _MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)

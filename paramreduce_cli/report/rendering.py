@@ -5,10 +5,10 @@ from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
-from paramreduce_cli.processes import worker_pool
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.style import render
+from paramreduce_cli.resources.processes import worker_pool
 
 Encoded = dict[str, bytes]
 """A figure in each format; empty where there is nothing to draw."""

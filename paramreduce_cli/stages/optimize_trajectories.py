@@ -8,7 +8,7 @@ import numpy as np
 from paramreduce_cli.config.schema import TrajectoriesSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
-from paramreduce_cli.excitation.optimiser import Settings, describe
+from paramreduce_cli.excitation.optimiser import TrajectorySettings, describe
 from paramreduce_cli.excitation.point_to_point import find_point_to_point
 from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
 from paramreduce_cli.fields.section import per_joint
@@ -88,9 +88,11 @@ def _torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> Fl
     return np.where(np.isfinite(nominal_torque), noise, np.inf)
 
 
-def _settings(wanted: TrajectoriesSection, model: Model, period: float, harmonics: int) -> Settings:
+def _settings(
+    wanted: TrajectoriesSection, model: Model, period: float, harmonics: int
+) -> TrajectorySettings:
     """What the config asks of every trajectory."""
-    return Settings(
+    return TrajectorySettings(
         period=period,
         harmonics=harmonics,
         points=max(wanted.points, 2 * harmonics + 1),

@@ -10,7 +10,6 @@ import numpy as np
 from paramreduce_cli.config.schema import SamplingSection, TrajectoriesSection
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.item_completion import complete_items
 from paramreduce_cli.lean.formulations import formulations_for
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
@@ -25,6 +24,7 @@ from paramreduce_cli.records import (
     TermModel,
     TermReduction,
 )
+from paramreduce_cli.resources.item_completion import complete_items
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.judging import Errors, Judge

@@ -24,7 +24,6 @@ from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simula
 from paramreduce_cli.excitation.symmetry import completed, symmetries
 from paramreduce_cli.fields.section import per_joint
 from paramreduce_cli.identification.samples import LoggedSet
-from paramreduce_cli.item_completion import complete_items
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.joined import JoinedSet
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -55,6 +54,7 @@ from paramreduce_cli.records import (
     Tell,
     Trajectories,
 )
+from paramreduce_cli.resources.item_completion import complete_items
 
 ComputedSet = ObservedSet | LoggedSet
 

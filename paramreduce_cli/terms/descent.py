@@ -14,7 +14,7 @@ from paramreduce_cli.expressions.scaling import rescaled
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.search import Search, Step
+from paramreduce_cli.terms.search import Step, TermSearch
 from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Outputs, Remains, Tape
 
@@ -125,9 +125,9 @@ class Descent:
     """A search from one start, and what it has come by."""
 
     start: Start
-    searching: Callable[[Tape], Search]
+    searching: Callable[[Tape], TermSearch]
     """Makes the search among the terms of a program of this start."""
-    search: Search
+    search: TermSearch
     """Among the terms of the program as it was last rewritten."""
     end: Step
     """Of that program."""
@@ -137,14 +137,16 @@ class Descent:
     """The best one of every number of operations."""
 
     @classmethod
-    def begun(cls, start: Start, program: Program, searching: Callable[[Tape], Search]) -> Descent:
+    def begun(
+        cls, start: Start, program: Program, searching: Callable[[Tape], TermSearch]
+    ) -> Descent:
         """With all terms of a program, whose first inputs are the parameters of the start."""
         program, units = rescaled(program, start.model.n)
         return cls._of(Simplified(start, program, start.model.values / units, units), searching, {})
 
     @classmethod
     def again(
-        cls, way: Way, rng: np.random.Generator, searching: Callable[[Tape], Search]
+        cls, way: Way, rng: np.random.Generator, searching: Callable[[Tape], TermSearch]
     ) -> Descent:
         """From a program shortly before the end of a descent, written in another way.
 
@@ -164,7 +166,7 @@ class Descent:
 
     @classmethod
     def _of(
-        cls, whole: Simplified, searching: Callable[[Tape], Search], visited: dict[int, Passed]
+        cls, whole: Simplified, searching: Callable[[Tape], TermSearch], visited: dict[int, Passed]
     ) -> Descent:
         """With all terms of a program, after others on the way to it."""
         search = searching(Tape(whole.program))
@@ -222,7 +224,7 @@ class Descent:
             self.visited[step.count] = passed
 
 
-def gone_on(way: Way, searching: Callable[[Tape], Search]) -> Way | None:
+def gone_on(way: Way, searching: Callable[[Tape], TermSearch]) -> Way | None:
     """Down on other samples, from the leanest program within the budget there, or made to be.
 
     Args:

@@ -98,7 +98,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Fit:
+class TermFit:
     """What remains of a program, its parameters fitted."""
 
     left: Remains
@@ -159,7 +159,7 @@ class Fitting:
         inputs[: self.n], inputs[self.n :] = beta[:, None], samples.states
         return inputs
 
-    def fit(self, left: Remains, beta: FloatArray, looks: int = 1) -> Fit:
+    def fit(self, left: Remains, beta: FloatArray, looks: int = 1) -> TermFit:
         """Fit the parameters.
 
         Args:
@@ -194,7 +194,7 @@ class Fitting:
 
     def _judged(
         self, left: Remains, beta: FloatArray, errors: tuple[float, float], linear: Linear
-    ) -> Fit:
+    ) -> TermFit:
         shares = self._shares(errors)
         cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
         strain = cost
@@ -206,7 +206,7 @@ class Fitting:
             masses = self._poses.mass_matrices(self._outputs(left, beta, self._poses))
             if not positive_definite(masses):
                 shares.append(np.inf)
-        return Fit(left, beta, *errors, cost, strain, float(np.max(shares)), linear)
+        return TermFit(left, beta, *errors, cost, strain, float(np.max(shares)), linear)
 
     def _shares(self, errors: tuple[float, float]) -> list[float]:
         """Errors over the allowed ones."""
@@ -236,13 +236,13 @@ class Fitting:
         values = self.tape.values(left, self._inputs(beta, samples), self.tape.needed(left))
         return self.tape.outputs(values)
 
-    def effects(self, fit: Fit, candidates: IntArray) -> FloatArray:
+    def effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
         """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
         values, own, adjoints = self._derived(fit)
         found = self.tape.effects(fit.left, candidates, values, own, adjoints)
         return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
-    def stand_ins(self, fit: Fit) -> tuple[Ways, FloatArray, FloatArray]:
+    def stand_ins(self, fit: TermFit) -> tuple[Ways, FloatArray, FloatArray]:
         """Nodes that could stand for others, and what :meth:`Ways.changes` wants to know.
 
         That is the values of all nodes, and the weighed derivatives of the torques by them.
@@ -255,7 +255,7 @@ class Fitting:
         constants = self.tape.constants()
         return ways.with_ones(constants[itself[constants]]), values, pulls
 
-    def _derived(self, fit: Fit) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _derived(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Values of the nodes, what they would be, and derivatives of the torques by them."""
         inputs, everywhere = self._inputs(fit.beta, self.samples), np.ones(self.tape.size, np.bool_)
         values = self.tape.values(fit.left, inputs, everywhere)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
-from paramreduce_cli.terms.fitting import Costs, Fit, Fitting
+from paramreduce_cli.terms.fitting import Costs, Fitting, TermFit
 from paramreduce_cli.terms.kernels import ITSELF
 from paramreduce_cli.terms.tape import Remains
 
@@ -38,11 +38,11 @@ NOISE = 0.3
 class Step:
     """A program on the way, with the operations that it takes."""
 
-    fit: Fit
+    fit: TermFit
     count: int
 
 
-class Search:
+class TermSearch:
     """Leaves terms of one program out, and lets nodes stand for others.
 
     Args:
@@ -192,19 +192,19 @@ class Search:
         saved = step.count - self.tape.counts(left, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
-    def _step(self, fit: Fit) -> Step:
+    def _step(self, fit: TermFit) -> Step:
         return Step(fit, self.tape.count(fit.left))
 
-    def _with(self, fit: Fit, flipped: IntArray) -> Fit:
+    def _with(self, fit: TermFit, flipped: IntArray) -> TermFit:
         """Fitted with some terms the other way round."""
         return self._fitting.fit(fit.left.flipped(flipped), fit.beta)
 
-    def _costs(self, fit: Fit, live: IntArray) -> Costs:
+    def _costs(self, fit: TermFit, live: IntArray) -> Costs:
         """What leaving each term out costs."""
         combinations = self.tape.combinations(fit.left, live, self._fitting.n)
         return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
 
-    def _most_helpful(self, fit: Fit, but: list[int]) -> int | None:
+    def _most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
         """The number of the term to put back that helps most for what it costs, none of some; None if none helps."""
         gone = ~fit.left.has(self._candidates)
         gone[but] = False

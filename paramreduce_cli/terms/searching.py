@@ -13,11 +13,11 @@ from typing import NamedTuple
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.processes import Item, WorkerPool, worker_pool
+from paramreduce_cli.resources.processes import Item, WorkerPool, worker_pool
 from paramreduce_cli.terms.descent import Descent, Way, gone_on
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.search import NOISE, TermSearch
 from paramreduce_cli.terms.starts import Start, near
 from paramreduce_cli.terms.tape import Tape
 
@@ -100,12 +100,14 @@ class Searcher:
         """On from what a descent has come by with more samples."""
         return gone_on(way, self._searching(way.start, self.closely))
 
-    def _searching(self, start: Start, some: LookedAt, turn: int = 0) -> Callable[[Tape], Search]:
-        def made(tape: Tape) -> Search:
+    def _searching(
+        self, start: Start, some: LookedAt, turn: int = 0
+    ) -> Callable[[Tape], TermSearch]:
+        def made(tape: Tape) -> TermSearch:
             fitting = Fitting(
                 tape, start.model.n, some.samples, self.budget, some.watched, self.poses
             )
-            return Search(fitting, self.seed + turn)
+            return TermSearch(fitting, self.seed + turn)
 
         return made
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paramreduce_cli.processes import Item
+from paramreduce_cli.resources.processes import Item
 from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
 from paramreduce_cli.terms.searching import Again, Hands, Near, Searcher, hands
 from paramreduce_cli.terms.starts import Start, promising

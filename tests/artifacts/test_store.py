@@ -24,7 +24,6 @@ from paramreduce_cli.artifacts.plain import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import (
     Identification,
     MeasuredLog,
@@ -36,7 +35,8 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.runner import Runner
 
 VERSIONS = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
 STAMP = Stamp(SCHEMA, "arm", "build-model", VERSIONS, {"model": "abc"}, {"x.h5": "def"}, 3, 1.5)

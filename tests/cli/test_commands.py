@@ -11,9 +11,9 @@ from conftest import CONFIGS, ONE_FORMAT, TWO_LINK, summary_of
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Identification, Model, Reduction
 from paramreduce_cli.reduction.models import reduced_model
+from paramreduce_cli.running.pipeline import pipeline, stages_to_run
 
 STAGES = [stage.name for stage in pipeline()]
 USUAL = [stage.name for stage in stages_to_run(load_config(TWO_LINK))]

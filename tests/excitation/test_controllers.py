@@ -19,9 +19,9 @@ from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import optimise_trajectory
 from paramreduce_cli.excitation.workers import excitation_of
-from paramreduce_cli.export.timed_motion import timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
-from paramreduce_cli.export.ways import Ways, at_rest
+from paramreduce_cli.motion.approach import Ways, at_rest
+from paramreduce_cli.motion.timed_motion import timed_motion
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities

@@ -67,7 +67,7 @@ def test_logs_larger_than_memory_are_the_same(monkeypatch):
     keys = {"outliers": "replace", "delay": 0.01, "transmission": [[1, 0.5], [0, 2]]}
     here = made(log, **keys)
     before = {name: column.copy() for name, column in log.items()}
-    monkeypatch.setattr(sys.modules["paramreduce_cli.scratch"], "_LARGE", 1)
+    monkeypatch.setattr(sys.modules["paramreduce_cli.resources.scratch"], "_LARGE", 1)
     there = made(log, **keys)
     for key in ("time", "z", "dz", "ddz", "tau", "piece", "fold"):
         for part in ("training", "held_out"):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from paramreduce_cli.importing.doubts import doubts
 from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.inertia_checks import doubts
 
 ROD = np.diag([1e-4, 1 / 12, 1 / 12])
 MIDDLE = np.array([0.5, 0.0, 0.0])

@@ -7,9 +7,9 @@ from conftest import ONE_FORMAT, config_of
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.judgement import operation_counts
 from paramreduce_cli.lean.counting import Counts
-from paramreduce_cli.pipeline import pipeline
 from paramreduce_cli.records import CountedDynamics, Model, Reduction, Validation
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.runner import Runner
 
 VALIDATE = next(stage for stage in pipeline() if stage.output is Validation)
 

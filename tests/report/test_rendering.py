@@ -3,8 +3,8 @@
 import pytest
 from conftest import run_stages
 
-from paramreduce_cli import processes
 from paramreduce_cli.report import rendering
+from paramreduce_cli.resources import processes
 
 NAMES = [
     "torques",

@@ -14,7 +14,7 @@ from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.terms.descent import Descent, drawn, front, gone_on, leanest, slimmed
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
-from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.search import NOISE, TermSearch
 from paramreduce_cli.terms.starts import Start
 
 BUDGET = Budget(0.03, np.inf)
@@ -42,7 +42,7 @@ def begun(arm):
 
     def made(seed=0):
         def searching(tape):
-            return Search(Fitting(tape, base.n, looked_at, BUDGET), seed)
+            return TermSearch(Fitting(tape, base.n, looked_at, BUDGET), seed)
 
         return Descent.begun(start, program, searching)
 
@@ -125,7 +125,7 @@ def test_on_other_samples_the_leanest_that_keeps_to_the_budget_is_gone_on_from(a
     other = samples(arm, 200, 5)
 
     def closer(budget):
-        return lambda tape: Search(Fitting(tape, descent.start.model.n, other, budget), 0)
+        return lambda tape: TermSearch(Fitting(tape, descent.start.model.n, other, budget), 0)
 
     found = gone_on(descent, closer(BUDGET))
     one = found.simplified(found.visited[found.fewest])

@@ -14,7 +14,7 @@ from paramreduce_cli.reduction.models import base_model
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
 from paramreduce_cli.terms.samples import term_samples
-from paramreduce_cli.terms.search import NOISE, Search
+from paramreduce_cli.terms.search import NOISE, TermSearch
 from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Tape
 
@@ -61,7 +61,7 @@ def predicted(fitting, fit, samples, direct):
 @pytest.mark.parametrize("direct", [False, True])
 def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct):
     fitting, reduced, samples = fitting_of(arm, direct, Budget(0.1, 0.1))
-    search = Search(fitting, 0)
+    search = TermSearch(fitting, 0)
     whole = search.start(reduced.values)
     assert whole.fit.torque_error < 1e-6
 
@@ -99,7 +99,7 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
 @pytest.mark.parametrize("direct", [False, True])
 def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
     fitting, reduced, _ = fitting_of(arm, direct, Budget(1e-6, np.inf))
-    search, tape = Search(fitting, 0), fitting.tape
+    search, tape = TermSearch(fitting, 0), fitting.tape
     whole = search.start(reduced.values)
     terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
     missed = helped = 0
@@ -162,7 +162,7 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, direct):
         left.kept[sums, :2] = ways
         if tape.count(left) < fewest and fitting.fit(left, values).within:
             fewest = tape.count(left)
-    search = Search(fitting, 0)
+    search = TermSearch(fitting, 0)
     start = search.start(values)
     noisy = (search.descended(start, noise=noise) for noise in [0.0] + [NOISE] * 20)
     found = min(map(search.descended, noisy), key=lambda end: end.count)

@@ -22,9 +22,9 @@ from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.pipeline import pipeline, stages_to_run
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
-from paramreduce_cli.runner import Runner
+from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.runner import Runner
 from paramreduce_cli.stages import reduce_terms
 from paramreduce_cli.terms import simplify
 from paramreduce_cli.texts import format_percent

@@ -14,10 +14,10 @@ from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import LOG, say
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, DataError
-from paramreduce_cli.export.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
-from paramreduce_cli.export.ways import Ways
 from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.motion.approach import Ways
+from paramreduce_cli.motion.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.records import SETS, Model, Trajectories, Trajectory
 
 _RUN = ("ros", "urscript")

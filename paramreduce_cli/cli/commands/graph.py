@@ -5,8 +5,8 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.sweep import load_sweep
-from paramreduce_cli.workflow import FORMATS, slurm_script
+from paramreduce_cli.running.sweep import load_sweep
+from paramreduce_cli.running.workflow import FORMATS, slurm_script
 
 _SLURM = "slurm"
 

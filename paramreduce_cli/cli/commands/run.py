@@ -34,9 +34,9 @@ from paramreduce_cli.cli.terminal import (
     show_progress,
 )
 from paramreduce_cli.config import load_config, placed_errors
-from paramreduce_cli.pipeline import absent_files, stages_to_run
 from paramreduce_cli.records import Report
-from paramreduce_cli.runner import Runner, asked
+from paramreduce_cli.running.pipeline import absent_files, stages_to_run
+from paramreduce_cli.running.runner import Runner, asked
 from paramreduce_cli.texts import format_percent, format_percent_range
 
 _TABLE_WIDTH = 110

@@ -8,7 +8,7 @@ from paramreduce_cli.artifacts.store import file_of
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import CONFIG, SET
 from paramreduce_cli.config import load_config
-from paramreduce_cli.pipeline import stages_to_run
+from paramreduce_cli.running.pipeline import stages_to_run
 
 
 @click.command(

@@ -16,7 +16,7 @@ from paramreduce_cli.cli.terminal import JSON, LOG, emit, remark, say
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
-from paramreduce_cli.sweep import Sweep, load_sweep
+from paramreduce_cli.running.sweep import Sweep, load_sweep
 from paramreduce_cli.texts.latex_table import latex_table
 from paramreduce_cli.texts.table import Table
 

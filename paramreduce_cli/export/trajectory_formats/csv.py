@@ -4,7 +4,7 @@ import io
 
 import numpy as np
 
-from paramreduce_cli.export.timed_motion import TimedMotion
+from paramreduce_cli.motion.timed_motion import TimedMotion
 
 
 def csv(motion: TimedMotion) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from json import dumps
 
-from paramreduce_cli.export.timed_motion import TimedMotion
+from paramreduce_cli.motion.timed_motion import TimedMotion
 
 
 def json(motion: TimedMotion) -> dict[str, str]:

@@ -1,6 +1,6 @@
 """A ROS JointTrajectory message as YAML."""
 
-from paramreduce_cli.export.timed_motion import TimedMotion
+from paramreduce_cli.motion.timed_motion import TimedMotion
 
 
 def ros(motion: TimedMotion) -> dict[str, str]:

@@ -1,7 +1,7 @@
 """URScript for arms of Universal Robots."""
 
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.export.timed_motion import TimedMotion
+from paramreduce_cli.motion.timed_motion import TimedMotion
 
 _JOINTS = 6
 

@@ -12,7 +12,6 @@ from paramreduce_cli.artifacts.store import file_digest
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.concerns import explained
 from paramreduce_cli.errors import ConcernError, ParamreduceWarning
-from paramreduce_cli.pipeline import Stage, brought_files
 from paramreduce_cli.records import (
     SETS,
     Coefficients,
@@ -23,6 +22,7 @@ from paramreduce_cli.records import (
     Recordings,
     Tell,
 )
+from paramreduce_cli.running.pipeline import Stage, brought_files
 
 _MOST_WARNINGS = 50
 """Of a stage that are kept; an attribute of a file has not room for any number."""

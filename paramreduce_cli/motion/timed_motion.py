@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.export.ways import State, Ways, at_rest
+from paramreduce_cli.motion.approach import State, Ways, at_rest
 from paramreduce_cli.records import FloatArray, Kind, Mechanism, Trajectories, Trajectory
 
 _FINER = 4

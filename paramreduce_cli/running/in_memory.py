@@ -6,9 +6,9 @@ from typing import Any
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import is_section, section
-from paramreduce_cli.pipeline import Stage, maker_of
 from paramreduce_cli.records import Items, Run, Tell
-from paramreduce_cli.taken import OUTSIDE, Inputs, called
+from paramreduce_cli.running.pipeline import Stage, maker_of
+from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, called
 
 
 def made_in_memory(

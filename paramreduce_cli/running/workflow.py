@@ -4,8 +4,8 @@ import shlex
 from pathlib import Path
 
 from paramreduce_cli.artifacts.store import file_of
-from paramreduce_cli.pipeline import Stage, pipeline
-from paramreduce_cli.sweep import Sweep
+from paramreduce_cli.running.pipeline import Stage, pipeline
+from paramreduce_cli.running.sweep import Sweep
 
 
 def make_rules() -> str:

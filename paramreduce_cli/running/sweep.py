@@ -20,8 +20,8 @@ from paramreduce_cli.config.loading import load_section
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import UnknownNameError
 from paramreduce_cli.fields.section import Section
-from paramreduce_cli.pipeline import Stage, pipeline, stages_to_run
 from paramreduce_cli.records import PROVING, Part, Reduction, Report, Samples, Validation
+from paramreduce_cli.running.pipeline import Stage, pipeline, stages_to_run
 
 _SEED = "trajectories.seed"
 """What a seed of the list sets."""

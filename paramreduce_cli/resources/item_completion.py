@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
-from paramreduce_cli.processes import State, worker_pool
 from paramreduce_cli.records import Items, PartFinished, Progress, Run
+from paramreduce_cli.resources.processes import State, worker_pool
 
 Record = TypeVar("Record")
 

@@ -24,7 +24,6 @@ from paramreduce_cli.config.checks import remarks
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.pipeline import LENT, Stage, StageInput, maker_of, pipeline, stages_to_run
 from paramreduce_cli.records import (
     WHOLE,
     Items,
@@ -37,7 +36,15 @@ from paramreduce_cli.records import (
     Samples,
     Tell,
 )
-from paramreduce_cli.taken import OUTSIDE, Inputs, called, noted_warnings
+from paramreduce_cli.running.pipeline import (
+    LENT,
+    Stage,
+    StageInput,
+    maker_of,
+    pipeline,
+    stages_to_run,
+)
+from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, called, noted_warnings
 
 
 def provenance(

@@ -1,0 +1,1 @@
+"""Worker processes, the items of stages that these do, and room for large matrices."""
