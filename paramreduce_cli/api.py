@@ -42,7 +42,7 @@ from paramreduce_cli.reduction.models import base_model, full_model, reduced_mod
 from paramreduce_cli.report.data_frames import frame
 from paramreduce_cli.running.in_memory import made_in_memory
 from paramreduce_cli.running.pipeline import maker_of, stages_to_run
-from paramreduce_cli.running.runner import Runner, asked, provenance
+from paramreduce_cli.running.runner import Callbacks, Runner, asked, provenance
 
 __all__ = [
     "Config",
@@ -324,7 +324,7 @@ def run(
     words = asked(Path(config), None if results is None else Path(results), overrides)
     with store.locked():
         for stage in stages_to_run(loaded):
-            Runner(loaded, store, jobs, progress, asked=words).run(stage)
+            Runner(loaded, store, jobs, Callbacks(progress), asked=words).run(stage)
     return Results(store.folder)
 
 

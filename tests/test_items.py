@@ -23,7 +23,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
 from paramreduce_cli.running.pipeline import pipeline, stages_to_run
-from paramreduce_cli.running.runner import Runner
+from paramreduce_cli.running.runner import Callbacks, Runner
 
 STAGES = {stage.name: stage for stage in pipeline()}
 SHARED = ("optimize-trajectories", "sample", "reduce", "reduce-terms")
@@ -135,7 +135,11 @@ def test_what_jobs_were_warned_of_is_said_of_the_whole(two_link_results, tmp_pat
     for name in ("model.h5", "trajectories.h5", "samples.h5", "reduction.h5"):
         shutil.copy(two_link_results / name, tmp_path / name)
     told = []
-    runner = Runner(config_of("two_link", ONE_FORMAT, *rough), Store(tmp_path), remark=told.append)
+    runner = Runner(
+        config_of("two_link", ONE_FORMAT, *rough),
+        Store(tmp_path),
+        callbacks=Callbacks(warn=told.append),
+    )
     with pytest.warns(ParamreduceWarning, match="time_limit"):
         runner.run(STAGES["reduce-terms"], part=Part(1, 2))
     assert not told

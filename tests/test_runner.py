@@ -12,7 +12,7 @@ from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
 from paramreduce_cli.records import Part, Reduction
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.running.pipeline import pipeline, stages_to_run
-from paramreduce_cli.running.runner import Runner
+from paramreduce_cli.running.runner import Callbacks, Runner
 
 ORDER = [
     "build-model", "optimize-trajectories", "process-log", "sample", "reduce", "reduce-terms", "validate", "identify", "report",
@@ -78,7 +78,11 @@ def test_a_kill_ends_more_than_a_search_for_proofs(two_link_copy, monkeypatch):
         interruption._note(signal.SIGTERM, None)
 
     monkeypatch.setattr(ProofSearch, "_round", killed)
-    runner = Runner(config_of("two_link"), Store(two_link_copy), interrupted=interruption.heeded)
+    runner = Runner(
+        config_of("two_link"),
+        Store(two_link_copy),
+        callbacks=Callbacks(interrupted=interruption.heeded),
+    )
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])
     assert not (two_link_copy / "reduction.h5").exists()
@@ -105,7 +109,7 @@ def test_what_a_stage_has_warned_of_is_said_again_when_it_is_up_to_date(two_link
     runner = Runner(
         config_of("two_link", *overrides, "selected.heuristic=best-subset"),
         Store(two_link_copy),
-        remark=said.append,
+        callbacks=Callbacks(warn=said.append),
     )
     with pytest.warns(ParamreduceWarning, match="sizes are proven"):
         assert not runner.run(STAGES["reduce"]).current
@@ -141,8 +145,7 @@ def test_what_a_swallowed_interruption_may_have_spoilt_is_not_written(two_link_c
     runner = Runner(
         config_of("two_link"),
         Store(two_link_copy),
-        interrupted=interruption.heeded,
-        check=interruption.check,
+        callbacks=Callbacks(interrupted=interruption.heeded, check=interruption.check),
     )
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])

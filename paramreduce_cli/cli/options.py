@@ -1,15 +1,18 @@
 """Options that several commands take, and what they stand for."""
 
 import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 
 from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.terminal import interruption, remark
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import MissingConfigError
-from paramreduce_cli.records import Part
+from paramreduce_cli.records import Part, Progress
+from paramreduce_cli.running.runner import Callbacks
 
 
 class FilePath(click.Path):
@@ -85,3 +88,8 @@ def results_store(config: Config | None, results: Path | None) -> Store:
             options=("--results", "results/my_samples"),
         )
     return Store(Path("results") / config.robot)
+
+
+def callbacks(progress: Callable[[Progress], None]) -> Callbacks:
+    """Return what a run calls at the terminal."""
+    return Callbacks(progress, remark, interruption.heeded, interruption.check)

@@ -17,11 +17,12 @@ from paramreduce_cli.cli.options import (
     SET,
     WAIT,
     FilePath,
+    callbacks,
     cores,
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import LOG, VERBOSE, interruption, remark, show_progress
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, remark, show_progress
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
@@ -65,12 +66,9 @@ def stage_command(name: str) -> click.Command:
                 loaded,
                 store,
                 jobs or cores(),
-                progress,
+                callbacks(progress),
                 samples,
                 settings,
-                remark,
-                interruption.heeded,
-                interruption.check,
                 asked(config if robot else None, results, overrides),
             )
             outcome = runner.run(stage, force=force, go_on=True, part=part or WHOLE)

@@ -98,6 +98,21 @@ def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -
     return shlex.join(words)
 
 
+@dataclass(frozen=True)
+class Callbacks:
+    """Functions that a run calls."""
+
+    progress: Callable[[Progress], None] = lambda _: None
+    """Called with each step of long work."""
+    warn: Callable[[str], None] = lambda _: None
+    """Called with things the user should know."""
+    interrupted: Callable[[], None] = lambda: None
+    """Called where a stage has met Ctrl-C and ends early, but whole."""
+    check: Callable[[], None] = lambda: None
+    """Called before anything is written; raises a KeyboardInterrupt that a library swallowed, which may have spoilt
+    what was computed."""
+
+
 @dataclass
 class Runner:
     """Runs stages on one robot in one folder.
@@ -106,25 +121,18 @@ class Runner:
         config: None where a stage is run on brought files alone.
         store: The results folder.
         jobs: Worker processes.
-        progress: Told of long work.
+        callbacks: Functions that a run calls.
         samples: A samples.h5 brought by the user instead of the folder's own.
         settings: What is asked where there is no config.
-        remark: Told of things the user should know.
-        interrupted: Told that a stage has met Ctrl-C and ends early, but whole.
-        check: Called before anything is written; raises a KeyboardInterrupt that a library swallowed,
-            which may have spoilt what was computed.
         asked: Config and options that name the run at the shell.
     """
 
     config: Config | None
     store: Store
     jobs: int = 1
-    progress: Callable[[Progress], None] = lambda _: None
+    callbacks: Callbacks = Callbacks()
     samples: Path | None = None
     settings: Settings | None = None
-    remark: Callable[[str], None] = lambda _: None
-    interrupted: Callable[[], None] = lambda: None
-    check: Callable[[], None] = lambda: None
     asked: str = ""
     _cut_short: bool = field(default=False, init=False)
     """Whether Ctrl-C has ended a search of the stage at hand."""
@@ -152,7 +160,7 @@ class Runner:
         if not force and not better and self.is_current(stage):
             return self._current_outcome(stage, part)
         started = time.perf_counter()
-        inputs = Inputs(self.config, self.progress)
+        inputs = Inputs(self.config, self.callbacks.progress)
         lent_types = (*LENT, stage.output)
         arguments = {
             i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent_types
@@ -166,17 +174,22 @@ class Runner:
             earlier = kept.stamps() if part.is_whole else []
             said = dict.fromkeys(text for one in earlier for text in one.warnings)
             for text in said:
-                self.remark(text)
+                self.callbacks.warn(text)
             unchanged = self._unchanged(stage, inputs) if previous and not force else frozenset()
-            run = Run(self.jobs, self.progress, self._cut, unchanged)
-            lent = {Run: run, Tell: self.progress, Items: Items(kept, part), stage.output: previous}
+            run = Run(self.jobs, self.callbacks.progress, self._cut, unchanged)
+            lent = {
+                Run: run,
+                Tell: self.callbacks.progress,
+                Items: Items(kept, part),
+                stage.output: previous,
+            }
             arguments |= {i.name: lent[i.type] for i in stage.inputs if i.type in lent}
             try:
                 record = called(stage, arguments)
             except PartFinished:
                 seconds = time.perf_counter() - started
                 return Outcome(stage.name, path, not kept.written, seconds)
-        self.check()
+        self.callbacks.check()
         seconds = time.perf_counter() - started
         total = seconds + sum(one.seconds for one in earlier)
         texts = tuple(dict.fromkeys([*said, *warnings]))
@@ -191,7 +204,7 @@ class Runner:
         if part.is_whole:
             self.store.touch(stage.output)
             for text in stamp.warnings if stamp else ():
-                self.remark(text)
+                self.callbacks.warn(text)
         return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
 
     def _previous(self, stage: Stage) -> Any:
@@ -295,7 +308,7 @@ class Runner:
             if text := self.describe_mismatch(record):
                 run = f"`paramreduce run {self.asked}`".replace(" `", "`")
                 again = f"{run} rebuilds it" if self.config is not None else "make it again"
-                self.remark(f"{text}; {again}")
+                self.callbacks.warn(f"{text}; {again}")
 
     def _upstream(self, stage: Stage) -> list[type]:
         """Records of files that a stage's artifact comes from, each after those that it is made from."""
@@ -337,7 +350,7 @@ class Runner:
         ]
 
     def _cut(self) -> None:
-        self.interrupted()
+        self.callbacks.interrupted()
         self._cut_short = True
 
     def _stamp(

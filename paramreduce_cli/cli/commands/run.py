@@ -18,6 +18,7 @@ from paramreduce_cli.cli.options import (
     QUIET,
     RESULTS,
     SET,
+    callbacks,
     cores,
     results_store,
 )
@@ -27,7 +28,6 @@ from paramreduce_cli.cli.terminal import (
     LOG,
     VERBOSE,
     emit,
-    interruption,
     remark,
     say,
     say_table,
@@ -88,18 +88,7 @@ def run(
         for number, stage in enumerate(stages, 1):
             label = f"{number}/{len(stages)} {stage.name}"
             with show_progress(label, quiet, as_json) as progress:
-                runner = Runner(
-                    loaded,
-                    store,
-                    jobs or cores(),
-                    progress,
-                    None,
-                    None,
-                    remark,
-                    interruption.heeded,
-                    interruption.check,
-                    words,
-                )
+                runner = Runner(loaded, store, jobs or cores(), callbacks(progress), asked=words)
                 outcome = runner.run(stage, force=force)
             if as_json:
                 emit(event="stage", stage=stage.name, up_to_date=outcome.current,
