@@ -11,6 +11,7 @@ from typing import Any
 
 import filelock
 
+from paramreduce_cli import records
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import (
@@ -32,17 +33,7 @@ from paramreduce_cli.artifacts.report_files import (
 )
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import (
-    Identification,
-    MeasuredLog,
-    Model,
-    Reduction,
-    Report,
-    Samples,
-    TermReduction,
-    Trajectories,
-    Validation,
-)
+from paramreduce_cli.records import Report, Samples
 
 
 @dataclass(frozen=True)
@@ -55,20 +46,11 @@ class Layout:
 
 
 LAYOUTS: dict[type, Layout] = {
-    Samples: Layout("samples.h5", save_samples, load_samples),
-    **{
-        record: Layout(file, layouts.save, partial(layouts.load, record=record))
-        for record, file in (
-            (Model, "model.h5"),
-            (Trajectories, "trajectories.h5"),
-            (MeasuredLog, "log.h5"),
-            (Reduction, "reduction.h5"),
-            (Validation, "validation.h5"),
-            (Identification, "identification.h5"),
-            (TermReduction, "terms.h5"),
-        )
-    },
-}
+    record: Layout(record.FILE, layouts.save, partial(layouts.load, record=record))
+    for record in vars(records).values()
+    if hasattr(record, "FILE")
+} | {Samples: Layout(Samples.FILE, save_samples, load_samples)}
+"""How the records that name their file are kept."""
 
 
 def file_of(record: type) -> str:

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -111,6 +112,7 @@ class Spectra:
 class MeasuredLog:
     """A log made ready: motions to train on and motions held out, and what was done to them."""
 
+    FILE: ClassVar[str] = "log.h5"
     training: MeasuredMotions
     held_out: MeasuredMotions
     rate: float
@@ -212,6 +214,7 @@ class Consistency:
 class Identification:
     """What measured torques say of a robot."""
 
+    FILE: ClassVar[str] = "identification.h5"
     estimator: str
     torque_deviation: FloatArray
     """What torques of each joint were divided by, (n_dof,)."""

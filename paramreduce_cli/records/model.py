@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import ClassVar
 
 import numpy as np
 
@@ -42,6 +43,7 @@ class Formulations:
 class Model:
     """A mechanism with its standard parameters and their base."""
 
+    FILE: ClassVar[str] = "model.h5"
     mechanism: Mechanism
     values: FloatArray
     """Standard parameters, (n,), kg, kg m, kg m^2."""

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -268,6 +269,7 @@ class ProofItem:
 class Reduction:
     """The subsets of all heuristics on one estimation set."""
 
+    FILE: ClassVar[str] = "reduction.h5"
     columns: Columns
     nominal_torque: FloatArray
     rank: int

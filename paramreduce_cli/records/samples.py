@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import ClassVar, Protocol
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 
@@ -76,6 +76,7 @@ class SampleSet(Protocol):
 class Samples:
     """The estimation, validation and test sets with the scales their errors are measured in."""
 
+    FILE: ClassVar[str] = "samples.h5"
     names: tuple[str, ...]
     """Of the columns of W."""
     preference: IntArray

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 
@@ -104,6 +105,7 @@ class TermModel:
 class TermReduction:
     """Functions whose terms were reduced within a budget."""
 
+    FILE: ClassVar[str] = "terms.h5"
     torque_budget: float
     """Torque error allowed on both sets, or on the estimation set."""
     acceleration_budget: float

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import ClassVar, Literal
 
 from paramreduce_cli.records.arrays import FloatArray
 
@@ -106,6 +106,7 @@ class PointToPoint:
 class Trajectories:
     """The trajectories of the estimation, the validation and the test set."""
 
+    FILE: ClassVar[str] = "trajectories.h5"
     period: float
     """s"""
     points: int

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
@@ -168,6 +168,7 @@ class Remark:
 class Validation:
     """What the reduced models are worth, and whether the selected one is accepted."""
 
+    FILE: ClassVar[str] = "validation.h5"
     heuristics: Mapping[str, HeuristicValidation]
     full: Mapping[str, float]
     """Operation counts and mass-matrix figures of the full model, by name; counts of textbook recursion and those of the
