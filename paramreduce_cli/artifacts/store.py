@@ -11,7 +11,6 @@ from typing import Any
 
 import filelock
 
-from paramreduce_cli import records
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import (
@@ -33,7 +32,7 @@ from paramreduce_cli.artifacts.report_files import (
 )
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.records import Report, Samples
+from paramreduce_cli.records import STORED, Report, Samples
 
 
 @dataclass(frozen=True)
@@ -47,8 +46,7 @@ class Layout:
 
 LAYOUTS: dict[type, Layout] = {
     record: Layout(record.FILE, layouts.save, partial(layouts.load, record=record))
-    for record in vars(records).values()
-    if hasattr(record, "FILE")
+    for record in STORED
 } | {Samples: Layout(Samples.FILE, save_samples, load_samples)}
 """How the records that name their file are kept."""
 

@@ -61,7 +61,7 @@ from paramreduce_cli.records.reduction import (
     SelectionMethod,
     Subsets,
 )
-from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Tell
+from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Stored, Tell
 from paramreduce_cli.records.samples import SETS, Block, Recording, Recordings, Samples, SampleSet
 from paramreduce_cli.records.terms import (
     NO_OPERAND,
@@ -95,3 +95,10 @@ from paramreduce_cli.records.validation import (
     Stability,
     Validation,
 )
+
+STORED: tuple[type[Stored], ...] = tuple(
+    record
+    for record in list(globals().values())
+    if isinstance(record, type) and "FILE" in vars(record)
+)
+"""Records that have a file of their own, which they name as ``FILE``."""

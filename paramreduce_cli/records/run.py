@@ -2,7 +2,14 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar, Protocol
+
+
+class Stored(Protocol):
+    """A record that has a file of its own."""
+
+    FILE: ClassVar[str]
+    """Name of the file below the results folder."""
 
 
 @dataclass(frozen=True)
