@@ -38,7 +38,8 @@ class StoredItems(MutableMapping[str, Any]):
     def __init__(
         self, path: Path, stamp: Callable[[float], Stamp], *, from_start: bool = False
     ) -> None:
-        self._folder = path.with_name(f"{path.name}{ITEMS}")
+        self.folder = path.with_name(f"{path.name}{ITEMS}")
+        """Folder of the items."""
         self._stamp = stamp
         self._since = time.perf_counter()
         self._read: dict[str, tuple[int, Any]] = {}
@@ -47,7 +48,7 @@ class StoredItems(MutableMapping[str, Any]):
         """Keys of the items that this run has finished."""
 
     def _path(self, key: str) -> Path:
-        return self._folder / f"{key}.h5"
+        return self.folder / f"{key}.h5"
 
     def __getitem__(self, key: str) -> Any:
         path = self._path(key)
@@ -91,7 +92,7 @@ class StoredItems(MutableMapping[str, Any]):
         self._path(key).unlink()
 
     def __iter__(self) -> Iterator[str]:
-        names = (path.stem for path in self._folder.glob("*.h5"))
+        names = (path.stem for path in self.folder.glob("*.h5"))
         return iter(sorted(name for name in names if not name.startswith(".")))
 
     def __len__(self) -> int:
@@ -109,10 +110,10 @@ class StoredItems(MutableMapping[str, Any]):
 
     def clear(self) -> None:
         """Remove all items, what killed jobs have left, and the folder."""
-        for path in self._folder.glob("*"):
+        for path in self.folder.glob("*"):
             path.unlink(missing_ok=True)
         with contextlib.suppress(OSError):
-            self._folder.rmdir()
+            self.folder.rmdir()
 
 
 class _Absent:

@@ -188,7 +188,7 @@ class Runner:
                 record = called(stage, arguments)
             except PartFinished:
                 seconds = time.perf_counter() - started
-                return Outcome(stage.name, path, not kept.written, seconds)
+                return Outcome(stage.name, kept.folder, not kept.written, seconds)
         self.callbacks.check()
         seconds = time.perf_counter() - started
         total = seconds + sum(one.seconds for one in earlier)

@@ -87,7 +87,8 @@ def reduce(
     kept = KeptProofs(items, factor, by_subtrees=reduction.best_subset.parts == "subtrees")
     if not items.part.is_whole:
         _check_proves(reduction.heuristics)
-        sizes = range(1, (reduction.stop.parameters or len(problem.columns)) + 1)
+        most = len(problem.columns)
+        sizes = range(1, min(reduction.stop.parameters or most, most) + 1)
         if kept.is_finished(sizes):
             raise PartFinished
     proven = kept.load()
