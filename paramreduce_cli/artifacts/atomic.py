@@ -81,7 +81,7 @@ _LONGEST_WRITING = 24 * 3600
 def remove_leftovers(folder: Path) -> None:
     """Remove temporary files of runs that were killed, in a folder that nobody writes to."""
     for path in folder.rglob(".*.tmp"):
-        # Shares of a stage may be at work on other machines.
+        # Other machines may be at work on items of the stage.
         shared = path.parent.suffix == ITEMS
         if _LEFT.fullmatch(path.name) and not (shared and _may_be_written(path)):
             path.unlink(missing_ok=True)
