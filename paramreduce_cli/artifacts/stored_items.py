@@ -33,17 +33,24 @@ class StoredItems(MutableMapping[str, Any]):
         path: The artifact that they are items of.
         stamp: Returns the provenance of an item, given the seconds that it took.
         from_start: Whether items of earlier runs count as absent.
+        check: Called before an item is written; raises a KeyboardInterrupt that a library swallowed, which may
+            have spoilt the item.
     """
 
     def __init__(
-        self, path: Path, stamp: Callable[[float], Stamp], *, from_start: bool = False
+        self,
+        path: Path,
+        stamp: Callable[[float], Stamp],
+        *,
+        from_start: bool = False,
+        check: Callable[[], None] = lambda: None,
     ) -> None:
         self.folder = path.with_name(f"{path.name}{ITEMS}")
         """Folder of the items."""
         self._stamp = stamp
         self._since = time.perf_counter()
         self._read: dict[str, tuple[int, Any]] = {}
-        self._from_start = from_start
+        self._from_start, self._check = from_start, check
         self.written: set[str] = set()
         """Keys of the items that this run has finished."""
 
@@ -82,6 +89,7 @@ class StoredItems(MutableMapping[str, Any]):
         return _origin(self._stamp(0.0))
 
     def __setitem__(self, key: str, record: Any) -> None:
+        self._check()
         now = time.perf_counter()
         stamp = self._stamp(now - self._since)
         self._since = now

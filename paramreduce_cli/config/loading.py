@@ -203,7 +203,9 @@ def _no_mapping(path: Path) -> ConfigError:
 
 def _correction(document: Document, problems: list[Problem]) -> tuple[str, list[str]]:
     """Return the setting of the call that has an unknown name, and what it should be; nothing where no name is near."""
-    ((path, error),) = problems or [((), "")]
+    if len(problems) != 1:
+        return "", []
+    ((path, error),) = problems
     typed = document.overrides.items()
     text = next((t for key, t in typed if all(map(operator.eq, key, path))), "")
     if not text or not isinstance(error, UnknownNameError):

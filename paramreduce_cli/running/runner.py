@@ -170,7 +170,7 @@ class Runner:
             def stamp(seconds: float) -> Stamp:
                 return self._stamp(stage, inputs, seconds, warnings)
 
-            kept = StoredItems(path, stamp, from_start=force)
+            kept = StoredItems(path, stamp, from_start=force, check=self.callbacks.check)
             earlier = kept.stamps() if part.is_whole else []
             said = dict.fromkeys(text for one in earlier for text in one.warnings)
             for text in said:
@@ -187,6 +187,7 @@ class Runner:
             try:
                 record = called(stage, arguments)
             except PartFinished:
+                self.callbacks.check()
                 seconds = time.perf_counter() - started
                 return Outcome(stage.name, kept.folder, not kept.written, seconds)
         self.callbacks.check()

@@ -54,3 +54,13 @@ def test_what_is_damaged_or_of_another_config_is_not_read(items, tmp_path):
         assert key not in (fresh := stored(tmp_path)) or fresh[key].tolist() == [3, 1, 2]
     path.write_bytes(content[:100])
     assert key not in stored(tmp_path)
+
+
+def test_what_a_swallowed_interruption_may_have_spoilt_is_not_kept(tmp_path):
+    def check():
+        raise KeyboardInterrupt
+
+    items = StoredItems(tmp_path / "x.h5", lambda seconds: STAMP, check=check)
+    with pytest.raises(KeyboardInterrupt):
+        items["a"] = np.arange(3)
+    assert list(items) == []

@@ -239,3 +239,9 @@ def test_a_recorded_test_set_needs_no_test_trajectories(write_config, counts, ex
 def test_former_keys_say_what_stands_in_their_place(write_config, key):
     with pytest.raises(ConfigError, match=re.escape(FORMER_KEYS[key])):
         load_config(write_config(), [f"{'.'.join(key)}=1"])
+
+
+def test_a_line_that_two_problems_share_is_a_config_error(write_config):
+    path = write_config(("com: [0.25, 0, 0]", "com: [99999999999999999999, 99999999999999999999, 0]"))
+    with pytest.raises(ConfigError, match="too large"):
+        load_config(path)

@@ -11,7 +11,7 @@ from selecting import Effort, dependent_problem, found, problem
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import WHOLE, Part, ProofStatus
 from paramreduce_cli.reduction.best_subset import kernel, parts
-from paramreduce_cli.reduction.best_subset.merging import joined
+from paramreduce_cli.reduction.best_subset.merging import joined, merged
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
 from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
@@ -428,3 +428,26 @@ def test_columns_of_which_round_off_leaves_nothing_end_no_search(seed):
     chi = W @ (rng.normal(size=14) / np.linalg.norm(W, axis=0)) + 1e-6 * rng.normal(size=40)
     proofs = found("best-subset", problem(W, chi), effort=Effort(node_limit=20_000)).proofs
     assert np.all(proofs.lower_bound <= proofs.torque_error)
+
+
+def test_sizes_of_groups_above_the_rank_are_proven_where_some_columns_still_help():
+    """Six pairs whose first columns span three dimensions and whose second ones three others."""
+    rng = np.random.default_rng(2)
+    W = rng.normal(size=(40, 6)) @ rng.normal(size=(6, 12))
+    given = problem(W, rng.normal(size=40) + W[:, 0], groups=[(k, k + 6) for k in range(6)])
+    proofs = found("best-subset", given).proofs
+    least = proofs.torque_error[-1]
+    for n, error, status in zip(proofs.n, proofs.torque_error, proofs.status, strict=True):
+        assert (status == "beyond-rank") == (n > 6 and error <= least * (1 + 1e-9))
+
+
+def test_of_equal_proofs_the_furthest_search_is_kept():
+    given = hard_problem()
+    limited = [found("best-subset", given, effort=Effort(node_limit=k)).proofs for k in (40, 80)]
+    for proofs in (limited, limited[::-1]):
+        together = merged(proofs)
+        for n, log, status in zip(together.n, together.logs, together.status, strict=True):
+            if status == "best-found" and np.array_equal(
+                *(one.of_size(n).lower_bound for one in limited)
+            ):
+                assert np.array_equal(log, limited[1].of_size(n).logs[0])

@@ -99,9 +99,10 @@ def merged(proofs: Sequence[Proofs]) -> Proofs:
 def _merged_size(proofs: Sequence[Proofs]) -> Proofs:
     """Return the proof of one size that says most."""
 
-    def worth(one: Proofs) -> tuple[bool, float, float]:
+    def worth(one: Proofs) -> tuple[bool, float, float, int]:
         unfinished = one.status[0] is ProofStatus.BEST_FOUND
-        return unfinished, float(one.torque_error[0]), -float(one.lower_bound[0])
+        error, bound = float(one.torque_error[0]), float(one.lower_bound[0])
+        return unfinished, error, -bound, -int(one.nodes[0])  # of equal ones the furthest search
 
     return replace(
         min(proofs, key=worth),

@@ -280,6 +280,11 @@ class ProofSearch:
         return clear and not search.doubtful
 
     @cached_property
+    def _least_error(self) -> float:
+        """Squared error of all columns together."""
+        return self._objective.score(tuple(range(len(self._objective.units)))) ** 2
+
+    @cached_property
     def _rank(self) -> int:
         problem = self._objective.problem
         return len(independent_columns(problem.W, problem.candidates_by_preference))
@@ -339,7 +344,11 @@ class ProofSearch:
         rank = self._rank
 
         def status(proof: _Proof) -> ProofStatus:
-            done = proof.status == ProofStatus.OPTIMAL and proof.n > rank
+            done = (
+                proof.status == ProofStatus.OPTIMAL
+                and proof.n > rank
+                and proof.squared_error <= self._least_error * (1 + RESOLUTION) + FULL_PRECISION**2
+            )
             return ProofStatus.BEYOND_RANK if done else proof.status
 
         return Proofs(
