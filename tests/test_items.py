@@ -268,14 +268,33 @@ def test_shares_of_a_proof_hold_together_alone():
 
     def load(*found, key="subtrees-{:04d}-of-0002"):
         kept = {key.format(k): one for k, one in enumerate(found, 1)}
-        return KeptProofs(Items(kept), factor, by_subtrees=True).load()
+        return KeptProofs(Items(kept), factor, by_subtrees=True).load(None)
 
     with pytest.raises(DataError, match=r"1 of the 2 parts are of samples .* other last digits"):
         load(*both)
     with pytest.raises(DataError, match=r"1 of the 2 parts .* missing. .*--part \(2/2\)"):
         load(both[0])
-    assert len(load(both[0], both[0])) == 1
-    assert load(*both, key="n-{:04d}") == [both[0].proofs]
+    assert load(both[0], both[0]).nodes.tolist() == [2]
+    assert load(*both, key="n-{:04d}").nodes.tolist() == [1]
+
+
+def test_jobs_that_are_complete_count_whatever_others_have_begun():
+    item = shared_proofs(np.eye(3))
+    kept = {f"subtrees-{k:04d}-of-0002": item for k in (1, 2)}
+    kept["subtrees-0001-of-0003"] = item
+    assert KeptProofs(Items(kept), np.eye(3), by_subtrees=True).load(None).nodes.tolist() == [2]
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_job_is_finished_where_sizes_have_no_subset_and_factors_are_equal(other):
+    items = Items({}, Part(1, 1))
+    kept = KeptProofs(items, np.eye(3), by_subtrees=False)
+    assert not kept.is_finished([1, 2])
+    kept.keep(shared_proofs(np.eye(3)).proofs, [1, 2])
+    assert kept.is_finished([1, 2])
+    assert kept.load(None).n.tolist() == [1]
+    again = KeptProofs(items, np.eye(3) * (1 + other * 1e-15), by_subtrees=False)
+    assert again.is_finished([1, 2]) is not other
 
 
 def shared_proofs(factor, dealt=5):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.atomic import remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import Reader, Stamp, Writer, read_stamp, reading, write
 from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.artifacts.sample_files import load_item_set, save_sample_set
@@ -117,9 +118,10 @@ class StoredItems(MutableMapping[str, Any]):
         return found
 
     def clear(self) -> None:
-        """Remove all items, what killed jobs have left, and the folder."""
-        for path in self.folder.glob("*"):
+        """Remove all items, the temporary files of killed jobs, and the folder unless a running job writes to it."""
+        for path in self.folder.glob("*.h5"):
             path.unlink(missing_ok=True)
+        remove_leftovers(self.folder)
         with contextlib.suppress(OSError):
             self.folder.rmdir()
 

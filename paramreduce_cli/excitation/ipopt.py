@@ -118,6 +118,8 @@ class _Call(ca.Callback):
     ) -> None:
         ca.Callback.__init__(self)
         self._inputs, self._outputs, self._function = inputs, outputs, function
+        self.interruption: KeyboardInterrupt | None = None
+        """KeyboardInterrupt raised in the function, which CasADi takes for a failed evaluation."""
         self.construct(name, {})
 
     def get_n_in(self) -> int:
@@ -133,7 +135,11 @@ class _Call(ca.Callback):
         return self._outputs[i]
 
     def eval(self, arguments: list[ca.DM]) -> list:
-        return self._function(*(np.array(argument.nonzeros()) for argument in arguments))
+        try:
+            return self._function(*(np.array(argument.nonzeros()) for argument in arguments))
+        except KeyboardInterrupt as error:
+            self.interruption = error
+            raise
 
 
 def minimise(
@@ -154,6 +160,9 @@ def minimise(
 
     Returns:
         The best point met, whatever IPOPT says of convergence.
+
+    Raises:
+        KeyboardInterrupt: The user interrupted an evaluation of the objective.
     """
     n = start.size
     memory = _Memory(objective, curvature)
@@ -178,6 +187,9 @@ def minimise(
     }
     solver = ca.nlpsol("solver", "ipopt", {"x": x, "f": value(x)}, options)
     solver(x0=start)
+    for call in (value, slope, bend):
+        if call.interruption is not None:
+            raise call.interruption
     stats = solver.stats()
     best = memory.best_x if memory.best_x is not None else start
     matrix = memory.curvature if memory.curvature is not None else np.eye(n)

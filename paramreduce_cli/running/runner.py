@@ -202,11 +202,15 @@ class Runner:
         """Say again what is still true of an artifact that is up to date."""
         path = self.store.path(stage.output)
         stamp = self.store.stamp(stage.output)
+        assert stamp is not None, "an artifact that is up to date has one"
         if part.is_whole:
+            StoredItems(
+                path, lambda _: stamp
+            ).clear()  # of jobs that ended after the artifact was combined
             self.store.touch(stage.output)
-            for text in stamp.warnings if stamp else ():
+            for text in stamp.warnings:
                 self.callbacks.warn(text)
-        return Outcome(stage.name, path, True, stamp.seconds if stamp else 0.0)
+        return Outcome(stage.name, path, True, stamp.seconds)
 
     def _previous(self, stage: Stage) -> Any:
         """What this version of the stage has made before, None if there is nothing to go on from."""

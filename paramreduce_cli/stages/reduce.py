@@ -39,7 +39,6 @@ from paramreduce_cli.records import (
     Subsets,
 )
 from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
-from paramreduce_cli.reduction.best_subset.merging import merged
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
 from paramreduce_cli.reduction.grouping import merged_factor
@@ -85,19 +84,18 @@ def reduce(
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
     _remark_on_rank(rank, model, columns)
     kept = KeptProofs(items, factor, by_subtrees=reduction.best_subset.parts == "subtrees")
+    most = len(problem.columns)
+    sizes = range(1, min(reduction.stop.parameters or most, most) + 1)
     if not items.part.is_whole:
         _check_proves(reduction.heuristics)
-        most = len(problem.columns)
-        sizes = range(1, min(reduction.stop.parameters or most, most) + 1)
         if kept.is_finished(sizes):
             raise PartFinished
-    proven = kept.load()
-    if previous is not None and previous.proofs and np.array_equal(previous.factor, factor):
-        proven.insert(0, previous.proofs)
+    same = previous is not None and np.array_equal(previous.factor, factor)
+    proven = kept.load(previous.proofs if previous is not None and same else None)
     inputs = _criterion_inputs(reduction, counted, model, samples, columns)
     if not items.part.is_whole:
         objective = criteria[SelectionMethod.criterion](problem, inputs)
-        _prove_part(_task(objective, reduction, proven, items, kept, run), kept)
+        _prove_part(_task(objective, reduction, proven, items, kept, run), kept, sizes)
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
     proofs = None
@@ -125,8 +123,13 @@ def _check_proves(heuristics: Sequence[str]) -> None:
         )
 
 
-def _prove_part(task: SelectionTask, kept: KeptProofs) -> NoReturn:
+def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> NoReturn:
     """Search for this job's part of the proofs, and keep what is proven.
+
+    Args:
+        task: Criterion, effort and callbacks.
+        kept: Proofs among the items, which are added to.
+        sizes: Numbers of parameters that are searched.
 
     Raises:
         PartFinished: The search has ended.
@@ -139,7 +142,7 @@ def _prove_part(task: SelectionTask, kept: KeptProofs) -> NoReturn:
 
     proofs = run_heuristic(PROVING, replace(task, interrupted=interrupted)).proofs
     assert proofs is not None
-    kept.keep(proofs, cut_short=bool(cut_short))
+    kept.keep(proofs, sizes, cut_short=bool(cut_short))
     raise PartFinished
 
 
@@ -249,7 +252,7 @@ class _Selected:
 def _task(
     objective: Objective,
     wanted: ReductionSection,
-    proven: Sequence[Proofs],
+    proven: Proofs | None,
     items: Items,
     kept: KeptProofs,
     run: Run,
@@ -258,7 +261,7 @@ def _task(
         objective=objective,
         largest=wanted.stop.parameters,
         effort=effort(wanted, run),
-        previous=merged(proven) if proven else None,
+        previous=proven,
         part=items.part,
         incumbents={} if items.part.is_whole else items.kept,
         keep=kept.keep_size,

@@ -242,6 +242,8 @@ def test_former_keys_say_what_stands_in_their_place(write_config, key):
 
 
 def test_a_line_that_two_problems_share_is_a_config_error(write_config):
-    path = write_config(("com: [0.25, 0, 0]", "com: [99999999999999999999, 99999999999999999999, 0]"))
+    path = write_config(
+        ("com: [0.25, 0, 0]", "com: [99999999999999999999, 99999999999999999999, 0]")
+    )
     with pytest.raises(ConfigError, match="too large"):
         load_config(path)

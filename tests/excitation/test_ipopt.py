@@ -20,6 +20,20 @@ def test_keeps_the_best_point_when_it_runs_out_of_iterations():
     assert end.status == "Maximum_Iterations_Exceeded"
 
 
+def test_an_interruption_ends_the_search():
+    calls = []
+
+    def objective(x):
+        calls.append(x)
+        if len(calls) == 5:
+            raise KeyboardInterrupt
+        return rosen(x), rosen_der(x)
+
+    with pytest.raises(KeyboardInterrupt):
+        minimise(objective, np.array([-1.2, 1.0]), 500)
+    assert len(calls) < 20
+
+
 def test_curvature_is_carried_over():
     A = np.diag([1.0, 100.0])
     first = minimise(lambda x: (float(x @ A @ x) / 2, A @ x), np.array([3.0, 1.0]), 50)

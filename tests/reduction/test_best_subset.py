@@ -451,3 +451,22 @@ def test_of_equal_proofs_the_furthest_search_is_kept():
                 *(one.of_size(n).lower_bound for one in limited)
             ):
                 assert np.array_equal(log, limited[1].of_size(n).logs[0])
+
+
+def test_jobs_split_a_search_that_an_earlier_artifact_has_begun():
+    """What was found and bounded is taken over, where it stood is not, as it is in nobody's subtrees."""
+    earlier = found("best-subset", hard_problem(), effort=Effort(node_limit=40)).proofs
+    assert "best-found" in earlier.status
+    jobs = [
+        found(
+            "best-subset", hard_problem(), previous=earlier, part=Part(number, 2),
+            effort=Effort(subtrees=True),
+        ).proofs
+        for number in (1, 2)
+    ]  # fmt: skip
+    together = joined(jobs)
+    alone = found("best-subset", hard_problem()).proofs
+    assert together.status == alone.status
+    assert np.allclose(together.torque_error, alone.torque_error, rtol=1e-9)
+    open_ones = np.array([status == "best-found" for status in earlier.status])
+    assert any(one.dealt[open_ones].any() for one in jobs)

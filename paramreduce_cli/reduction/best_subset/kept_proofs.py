@@ -6,8 +6,10 @@ import numpy as np
 
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import FloatArray, Items, ProofItem, Proofs, ProofStatus
-from paramreduce_cli.reduction.best_subset.merging import joined
+from paramreduce_cli.reduction.best_subset.merging import joined, merged
 
+_SIZE, _SUBTREES = "n-", "subtrees-"
+"""Beginnings of the keys of one size's proof, and of one job's subtrees of all sizes."""
 _UNFINISHED = "-unfinished"
 """Ending of the keys of searches that Ctrl-C ended."""
 
@@ -26,35 +28,54 @@ class KeptProofs:
         self._by_subtrees = by_subtrees and not items.part.is_whole
 
     def is_finished(self, sizes: Sequence[int]) -> bool:
-        """Whether this job has nothing left to do for some sizes."""
-        keys = [self._key] if self._by_subtrees else map(_size_key, self._own(sizes))
-        return all(key in self._items.kept for key in keys)
+        """Whether this job has nothing left to do for some sizes.
 
-    def load(self) -> list[Proofs]:
-        """Return the proofs that can be gone on with.
+        Args:
+            sizes: Numbers of parameters that are searched, 1, 2, ... up to the largest.
+        """
+        keys = [self._key] if self._by_subtrees else [_size_key(n) for n in self._own(sizes)]
+        return all(key in self._items.kept and self._holds(self._items.kept[key]) for key in keys)
+
+    def load(self, earlier: Proofs | None) -> Proofs | None:
+        """Return the proofs that a search can continue from.
+
+        Args:
+            earlier: Proofs of an earlier artifact on the same data; None if there are none.
+
+        Returns:
+            The proof that says most, for every size; None if there is no proof.
 
         Raises:
-            DataError: Some jobs have searched their subtrees and others have not, or on other numbers.
+            DataError: Some jobs have not searched their subtrees, or have searched them on other numbers.
         """
+        found: list[Proofs] = []
         if self._by_subtrees:
             kept = self._items.kept.get(self._key) or self._items.kept.get(self._key + _UNFINISHED)
-            return self._usable([kept] if kept else [])
-        found = [self._items.kept.get(key) for key in self._items.kept if key.startswith("n-")]
-        jobs = [] if not self._items.part.is_whole else self._subtrees()
-        return self._usable([item for item in found if item]) + ([joined(jobs)] if jobs else [])
+            found = self._usable([kept])
+        else:
+            sizes = [key for key in self._items.kept if key.startswith(_SIZE)]
+            found = self._usable([self._items.kept.get(key) for key in sizes])
+            found += self._joined_subtrees() if self._items.part.is_whole else []
+        if earlier is not None and not (self._by_subtrees and found):
+            found.insert(0, earlier)
+        return merged(found) if found else None
 
-    def keep(self, proofs: Proofs, *, cut_short: bool = False) -> None:
+    def keep(self, proofs: Proofs, sizes: Sequence[int], *, cut_short: bool = False) -> None:
         """Keep what this job has proven.
 
         Args:
-            proofs: Proofs of any sizes.
+            proofs: Proofs of the sizes that have a subset.
+            sizes: Numbers of parameters that are searched; with groups some have no subset.
             cut_short: Whether Ctrl-C ended the searches that have not proven anything yet.
         """
         if self._by_subtrees:
             key = self._key + (_UNFINISHED if cut_short else "")
             self._items.kept[key] = ProofItem(self._factor, proofs)
             return
-        for n in self._own(proofs.n.tolist()):
+        for n in self._own(sizes):
+            if n not in proofs.n:
+                self._items.kept[_size_key(n)] = None
+                continue
             own = proofs.of_size(n)
             ended = own.status[0] is not ProofStatus.BEST_FOUND or not cut_short
             key = _size_key(n) + ("" if ended else _UNFINISHED)
@@ -72,45 +93,59 @@ class KeptProofs:
     def _own(self, sizes: Sequence[int]) -> list[int]:
         return self._items.part.select(sizes)
 
-    def _subtrees(self) -> list[Proofs]:
-        """Return what the jobs have found that have split the searches, the latest number of jobs first.
+    def _joined_subtrees(self) -> list[Proofs]:
+        """Return the proofs of jobs that have split the searches, joined for every number of jobs that is complete.
 
         Raises:
-            DataError: A job is missing, or its samples have other last digits.
+            DataError: No number of jobs is complete, and the largest one lacks a job or has other last digits.
         """
-        counts = {int(key.split("-")[3]) for key in self._items.kept if key.startswith("subtrees-")}
-        for count in sorted(counts, reverse=True):
-            found = {}
-            for number in range(1, count + 1):
-                key = _subtrees_key(number, count)
-                item = self._items.kept.get(key) or self._items.kept.get(key + _UNFINISHED)
-                if item is not None:
-                    found[number] = item
-            if not found:
-                continue
-            missing = [f"{k}/{count}" for k in range(1, count + 1) if k not in found]
-            if missing:
-                raise DataError(
-                    f"{len(missing)} of the {count} parts of the searches are missing. Do each with --part "
-                    f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}), or do without parts with --force."
-                )
-            usable = self._usable(list(found.values()))
-            if len(usable) < count and any(item.proofs.dealt.any() for item in found.values()):
-                raise DataError(
-                    f"{count - len(usable)} of the {count} parts are of samples that were added up to other last "
-                    "digits, as machines do that calculate differently. Make them again on machines of the kind of this "
-                    "one, or do without them with --force."
-                )
-            return usable
-        return []
+        keys = [key for key in self._items.kept if key.startswith(_SUBTREES)]
+        counts = sorted({int(key.split("-")[3]) for key in keys})
+        joint: list[Proofs] = []
+        incomplete: DataError | None = None
+        for count in counts:
+            try:
+                joint += self._joined_jobs(count)
+            except DataError as error:
+                incomplete = error
+        if incomplete is not None and not joint:
+            raise incomplete
+        return joint
 
-    def _usable(self, found: Sequence[ProofItem]) -> list[Proofs]:
-        return [item.proofs for item in found if np.array_equal(item.factor, self._factor)]
+    def _joined_jobs(self, count: int) -> list[Proofs]:
+        """Return the proofs of a number of jobs as one record in a list, which is empty if no job has ended."""
+        found: dict[int, ProofItem] = {}
+        for number in range(1, count + 1):
+            key = _subtrees_key(number, count)
+            item = self._items.kept.get(key) or self._items.kept.get(key + _UNFINISHED)
+            if item is not None:
+                found[number] = item
+        missing = [f"{k}/{count}" for k in range(1, count + 1) if k not in found]
+        if found and missing:
+            raise DataError(
+                f"{len(missing)} of the {count} parts of the searches are missing. Do each with --part "
+                f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}), or do without parts with --force."
+            )
+        usable = self._usable(list(found.values()))
+        if len(usable) < len(found) and any(item.proofs.dealt.any() for item in found.values()):
+            raise DataError(
+                f"{count - len(usable)} of the {count} parts are of samples that were added up to other last "
+                "digits, as machines do that calculate differently. Make them again on machines of the kind of this "
+                "one, or do without them with --force."
+            )
+        return [joined(usable)] if usable else []
+
+    def _holds(self, item: ProofItem | None) -> bool:
+        """Whether an item holds on the data at hand; None says that a size has no subset."""
+        return item is None or np.array_equal(item.factor, self._factor)
+
+    def _usable(self, found: Sequence[ProofItem | None]) -> list[Proofs]:
+        return [item.proofs for item in found if item is not None and self._holds(item)]
 
 
 def _size_key(n: int) -> str:
-    return f"n-{n:04d}"
+    return f"{_SIZE}{n:04d}"
 
 
 def _subtrees_key(number: int, count: int) -> str:
-    return f"subtrees-{number:04d}-of-{count:04d}"
+    return f"{_SUBTREES}{number:04d}-of-{count:04d}"

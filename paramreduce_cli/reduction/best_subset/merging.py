@@ -88,7 +88,7 @@ def merged(proofs: Sequence[Proofs]) -> Proofs:
 
     Returns:
         For every size the entry that says most: what is proven, else the smaller error; with the
-        largest bound of all, and all nodes.
+        largest bound of all.
     """
     units = proofs[-1].units
     usable = [one for one in proofs if _same_units(one.units, units)]
@@ -105,10 +105,7 @@ def _merged_size(proofs: Sequence[Proofs]) -> Proofs:
         return unfinished, error, -bound, -int(one.nodes[0])  # of equal ones the furthest search
 
     return replace(
-        min(proofs, key=worth),
-        lower_bound=np.max([one.lower_bound for one in proofs], axis=0),
-        seconds=np.sum([one.seconds for one in proofs], axis=0),
-        nodes=np.sum([one.nodes for one in proofs], axis=0),
+        min(proofs, key=worth), lower_bound=np.max([one.lower_bound for one in proofs], axis=0)
     )
 
 

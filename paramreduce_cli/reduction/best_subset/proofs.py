@@ -122,6 +122,9 @@ class ProofSearch:
             if previous.dealt[k] and not self._by_subtrees:
                 continue  # of a share of the tree
             proof.squared_bound = float(previous.lower_bound[k]) ** 2
+            unfinished = previous.status[k] is ProofStatus.BEST_FOUND
+            if unfinished and self._by_subtrees and not previous.dealt[k]:
+                continue  # its log is of the whole tree, which jobs are to split
             proof.status, proof.log = previous.status[k], previous.logs[k]
             proof.seconds, proof.nodes = float(previous.seconds[k]), int(previous.nodes[k])
             proof.dealt = int(previous.dealt[k])
