@@ -55,8 +55,8 @@ def main() -> None:
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         complain(
-            "\nInterrupted. Finished stages, trajectories and proofs are kept, of other stages nothing: the same command goes "
-            "on from there."
+            "\nInterrupted. Finished stages are kept, and of the stage at work its finished trajectories, samples, proofs and "
+            "functions. The same command does the rest."
         )
         code = INTERRUPTED
     except BrokenPipeError:

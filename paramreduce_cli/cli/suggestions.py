@@ -19,8 +19,8 @@ _OF_RESULTS = ("open", "inspect", "table")
 """Commands that take results."""
 _LIKE_ROBOT, _LIKE_COMMAND, _LIKE_OPTION = 0.8, 0.6, 0.75
 """How alike a name must be to the one that is suggested."""
-_RANGE = "..."
-"""Stands between the first and the last number of choices such as ``swap:1...7``."""
+_RANGE, _OR = "...", "|"
+"""Marks between the numbers of choices: ``swap:1...7`` has all from 1 to 7, ``swap:2|4`` those two."""
 
 
 @dataclass(frozen=True)
@@ -193,9 +193,9 @@ def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
 
     Args:
         rejected: Word that was typed, such as ``swop:9`` or ``9``.
-        choices: Words such as ``full`` or ``swap:1...7``; one with a single number is the default.
+        choices: Words such as ``full``, ``swap:1...7`` or ``swap:2|4|6``; one with a single number is the default.
     """
-    default = next((c for c in choices if ":" in c and _RANGE not in c), "")
+    default = next((c for c in choices if c.partition(":")[2].isdecimal()), "")
     others = [choice for choice in choices if choice != default]
     name, _, number = rejected.partition(":")
     digits = "".join(c for c in rejected.lstrip(":") if c.isdecimal())
@@ -208,13 +208,15 @@ def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
 
 
 def _in_range(choice: str, number: str) -> str:
-    """Return ``swap:1...7`` with the nearest number that it has."""
-    name, colon, numbers = choice.partition(":")
+    """Return ``swap:1...7`` or ``swap:2|4|6`` with the nearest number that it has."""
+    name, _, numbers = choice.partition(":")
     first, dots, last = numbers.partition(_RANGE)
-    if not (colon and dots and first.isdecimal() and last.isdecimal()):
+    listed = [first, last] if dots else numbers.split(_OR)
+    if not all(one.isdecimal() for one in listed):
         return choice
-    wanted = int(number) if number.isdecimal() else int(first)
-    return f"{name}:{min(max(wanted, int(first)), int(last))}"
+    known = range(int(first), int(last) + 1) if dots else [int(one) for one in listed]
+    wanted = int(number) if number.isdecimal() else known[0]
+    return f"{name}:{min(known, key=lambda one: abs(one - wanted))}"
 
 
 def _exchanged(words: Sequence[str], one: str, other: str) -> list[str] | None:

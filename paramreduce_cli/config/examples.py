@@ -26,13 +26,23 @@ def examples() -> dict[str, Path]:
     return {path.stem: path for path in sorted(files)}
 
 
-def exists_already(path: Path) -> ConfigError:
-    """Return the error that a config would replace a file, with a path that is free."""
-    names = (path.with_stem(f"{path.stem}_{k}") for k in range(2, 1000))
-    free = next((other for other in names if not other.exists()), path)
+def exists_already(path: Path, config: Path | None = None) -> ConfigError:
+    """Return the error that a command would replace a file, with a path for the config that is free.
+
+    Args:
+        path: File that would be replaced.
+        config: Config that comes with this file, and would have to be in another folder; None if it is the file.
+    """
+    numbers = range(2, 1000)
+    if config is None:
+        free = (path.with_stem(f"{path.stem}_{k}") for k in numbers)
+    else:
+        folder = config.parent.resolve()
+        free = (folder.with_name(f"{folder.name}_{k}") / config.name for k in numbers)
+    there = next((other for other in free if not other.exists()), path)
     return ConfigError(
         f"{path}: exists already; choose another place with --output.",
-        rejected=str(path), options=("--output", str(free)),
+        rejected=str(path), options=("--output", str(there)),
     )  # fmt: skip
 
 
@@ -62,7 +72,7 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
     taken = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
     if taken:
-        raise exists_already(taken[0])
+        raise exists_already(taken[0], None if taken[0] == path else path)
     try:
         for original, target in pairs:
             target.parent.mkdir(parents=True, exist_ok=True)

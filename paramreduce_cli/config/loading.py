@@ -64,7 +64,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         raise ConfigError(
             "\n".join(lines),
             rejected=rejected, choices=choices, remedy=remedy,
-            in_file=any(line.startswith(f"{document.source}, line ") for line in lines),
+            in_file=all(line.startswith(f"{document.source}, line ") for line in lines),
         )  # fmt: skip
     for text in remarks(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
@@ -356,7 +356,8 @@ def _unwrap(annotation: Any) -> Any:
         return _unwrap(annotation.__origin__)
     if get_origin(annotation) in (Union, UnionType):
         members = [_unwrap(a) for a in get_args(annotation) if a is not type(None)]
-        return members[0] if members else annotation
+        sections = [a for a in members if isinstance(a, type) and issubclass(a, BaseModel)]
+        return (sections or members or [annotation])[0]
     return annotation
 
 

@@ -256,6 +256,10 @@ def test_examples_bring_the_files_they_name(invoke, tmp_path, monkeypatch):
     for name in ("ur10.yaml", "logs/ur10.csv.gz", "logs/ur10.urdf"):
         assert (tmp_path / "configs" / name).read_bytes() == (CONFIGS / name).read_bytes()
         assert f"configs/{name}" in said
+    (tmp_path / "configs" / "logs" / "ur10.urdf").write_text("mine")
+    said = invoke("init", "--example", "ur10", code=2).err
+    assert "configs/logs/ur10.urdf: exists already" in said
+    invoke("init", "--example", "ur10", "--output", said.split("--output ")[-1].strip())
 
 
 def test_json_is_a_line_for_every_event(invoke, folder):

@@ -53,7 +53,9 @@ def test_what_is_meant(error, typed, meant, tmp_path, monkeypatch):
         (":3", ["qr:1...7", "swap:2...7"], "qr:3"),
         ("validation:9", ["estimation:1...10", "validation:1...2"], "validation:2"),
         ("a", ["b:c...d"], "b:c...d"),
-        ("swap", ["swap:1|3"], "swap:1|3"),
+        ("swap", ["swap:1|3"], "swap:1"),
+        ("swap:5", ["swap:2|4|8"], "swap:4"),
+        ("4", ["swap:4", "swap:2|4|8"], "swap:4"),
     ],
 )
 def test_the_nearest_choice(rejected, choices, nearest):

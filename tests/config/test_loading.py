@@ -241,6 +241,11 @@ def test_former_keys_say_what_stands_in_their_place(write_config, key):
         load_config(write_config(), [f"{'.'.join(key)}=1"])
 
 
+def test_a_misspelt_key_of_a_section_that_may_be_a_list_has_a_suggestion(write_config):
+    with pytest.raises(ConfigError, match=r"did you mean motion\?"):
+        load_config(write_config(), ["sampling.log.signs={motin: [1, -1]}"])
+
+
 def test_a_line_that_two_problems_share_is_a_config_error(write_config):
     path = write_config(
         ("com: [0.25, 0, 0]", "com: [99999999999999999999, 99999999999999999999, 0]")

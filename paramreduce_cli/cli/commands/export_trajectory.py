@@ -115,7 +115,7 @@ def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
     sets = {name: getattr(trajectories, name) for name in SETS}
     found = sets.get(name, ())
     if not number.isdecimal() or not 1 <= int(number) <= len(found):
-        there = [f"{key}:1...{len(own)}" for key, own in sets.items()]
+        there = [f"{key}:1...{len(own)}" for key, own in sets.items() if own]
         raise ConfigError(
             f"--which {which}: there is {', '.join(there)}.", rejected=which, choices=there
         )
