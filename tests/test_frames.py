@@ -35,7 +35,7 @@ def test_every_model_of_a_reduction_and_of_its_validation(results):
     assert [len(names) for names in own["parameters"]] == found.n.tolist()
     errors = judged[judged["heuristic"] == "swap"]["torque_error_estimation"]
     np.testing.assert_array_equal(
-        errors, results.validation.heuristics["swap"].torque_error_estimation
+        errors, results.validation.heuristics["swap"].torque_error.estimation
     )
 
 

@@ -17,6 +17,7 @@ from paramreduce_cli.artifacts.hdf5 import Reader, StoredRows, Writer
 from paramreduce_cli.artifacts.plain import dtype_of, from_plain, to_plain
 from paramreduce_cli.records import (
     Columns,
+    HeuristicValidation,
     MeasuredMotions,
     Model,
     Proofs,
@@ -25,6 +26,8 @@ from paramreduce_cli.records import (
     Selected,
     Stability,
     Subsets,
+    TermFront,
+    TermModel,
     Trajectories,
     Trajectory,
 )
@@ -35,11 +38,21 @@ _NAMES: dict[tuple[type, str], str] = {
     (Trajectory, "kappa"): "condition_number",
     (Trajectory, "kappa_variants"): "condition_number_variants",
     (Reduction, "columns"): "parameters",
+    **{
+        (record, f"{quantity}_error"): f"{quantity}_error_"
+        for record in (HeuristicValidation, TermModel, TermFront)
+        for quantity in ("torque", "acceleration")
+    },
+    (HeuristicValidation, "joint_torque_error"): "torque_error_joint_",
+    (HeuristicValidation, "joint_acceleration_error"): "acceleration_error_joint_",
+    (HeuristicValidation, "mass_matrix"): "mass_matrix_",
+    (HeuristicValidation, "operations"): "operations_",
     (Selected, "model"): "",
     (Stability, "variants"): "",
     (ReducedModel, "names"): "parameters",
 }
-"""Fields whose datasets have another name; a group without one is that of the record itself."""
+"""Fields whose datasets have another name. A group without a name is that of the record itself; one whose name ends
+with an underscore is no group, but the beginning of its datasets' names."""
 _ATTRIBUTES = {
     (Trajectories, name)
     for name in (
@@ -89,6 +102,8 @@ def _fields(record: type, prefix: str) -> Iterator[tuple[str, Any, str]]:
 
 
 def _joined(prefix: str, name: str) -> str:
+    if prefix.endswith("_"):
+        return prefix + name
     return "/".join(part for part in (prefix, name) if part)
 
 

@@ -62,6 +62,8 @@ def describe_error(error: ParamreduceError, call: Call) -> str:
 def suggest_after_error(error: ParamreduceError, call: Call) -> str:
     """Return lines that say what to type next; empty where the error says it."""
     words = list(call.words)
+    if not words:
+        return show_example(call)
     if meant := _other_place(error, words):
         return f"Next: {meant}"
     if error.command or error.remedy:

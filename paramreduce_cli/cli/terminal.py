@@ -177,6 +177,7 @@ class Interruption:
         """Take over the signals that ask for an end."""
         for number in (signal.SIGINT, signal.SIGTERM):
             signal.signal(number, self._note)
+        sys.unraisablehook = _show_unraisable
 
     def _note(self, number: int, _: object) -> None:
         if self._met != signal.SIGTERM:  # after a kill nothing is a wish to go on
@@ -197,6 +198,12 @@ class Interruption:
         """Raise an interruption that was met but did not get through."""
         if self._met is not None and threading.current_thread() is threading.main_thread():
             raise KeyboardInterrupt
+
+
+def _show_unraisable(problem: sys.UnraisableHookArgs) -> None:
+    """Show an exception that Python cannot raise, unless it is an interruption, which :class:`Interruption` remembers."""
+    if not issubclass(problem.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(problem)
 
 
 interruption = Interruption()

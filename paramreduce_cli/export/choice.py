@@ -72,9 +72,9 @@ def chosen_model(
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
     judged = validation and validation.heuristics.get(choice.heuristic)
     if judged and (known_row := judged.row(choice.n)) is not None:
-        other = float(judged.torque_error_validation[known_row])
+        other = float(judged.torque_error.validation[known_row])
         title += f", {format_percent(other)} on the validation set"
-        test = judged.torque_error_test[known_row]
+        test = judged.torque_error.test[known_row]
         if test.size:
             title += f", {format_percent_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
@@ -117,7 +117,7 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
             "something must be found within the budget.",
             command="reduce-terms",
         )
-    errors = [term.torque_error_estimation, term.torque_error_validation]
+    errors = [term.torque_error.estimation, term.torque_error.validation]
     known = " / ".join(format_percent(error) for error in errors if error == error)
     allowed = format_percent(found.torque_budget)
     if name == "direct" and found.acceleration_budget < float("inf"):
@@ -126,9 +126,9 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
-    if term.torque_error_test.size:
-        test = format_percent_range(*ErrorRange.of(term.torque_error_test))
-        title += f", {test} on {term.torque_error_test.size} motions that no search looked at"
+    if term.torque_error.test.size:
+        test = format_percent_range(*ErrorRange.of(term.torque_error.test))
+        title += f", {test} on {term.torque_error.test.size} motions that no search looked at"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)
     return model, term, title

@@ -33,10 +33,10 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
         "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are",
         *within(mechanism, term.lower, term.upper),
     ]
-    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if known := " / ".join(format_percent(error) for error in errors if np.isfinite(error)):
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
-    test = ErrorRange.of(term.acceleration_error_test)
+    test = ErrorRange.of(term.acceleration_error.test)
     if np.isfinite(test.median):
         lines.append(
             f"The same on motions that no search looked at: {format_percent_range(*test)}."

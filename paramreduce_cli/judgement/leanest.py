@@ -5,11 +5,13 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from paramreduce_cli.config.schema import SelectedSection
-from paramreduce_cli.records import TERMS, ErrorRange, HeuristicValidation, Leanest, TermReduction
+from paramreduce_cli.records import TERMS, HeuristicValidation, Leanest, ModelErrors, TermReduction
 
 _BOTH = ("estimation", "validation")
 
 Tolerances = Mapping[str, float]
+_Limits = Mapping[tuple[str, str], float]
+"""Largest errors by quantity and set."""
 Results = Mapping[str, HeuristicValidation]
 
 
@@ -40,12 +42,12 @@ def leanest(
         }
         tolerances = _tolerances(function, budget)
         looked_at = _BOTH[:1] if terms.held_out else _BOTH
-    columns = {
-        f"{key}_{part}": limit
+    limits = {
+        (key, part): limit
         for key, limit in (tolerances or SelectedSection.USUAL).items()
         for part in looked_at
     }
-    found = [*_alone(function, columns, results), *_without_terms(function, columns, terms)]
+    found = [*_alone(function, limits, results), *_without_terms(function, limits, terms)]
     return min(found, key=_rank, default=None)
 
 
@@ -57,36 +59,34 @@ def _tolerances(function: str, given: Tolerances) -> Tolerances:
 
 def _rank(one: Leanest) -> tuple[int, float]:
     """The less the better; of as many operations the most exact one."""
-    return one.operations, one.torque_error_estimation
+    return one.operations, one.torque_error.estimation
 
 
-def _alone(function: str, columns: Tolerances, results: Results) -> Iterator[Leanest]:
+def _alone(function: str, limits: _Limits, results: Results) -> Iterator[Leanest]:
     """Functions of models with parameters alone left out, as far as their operations are known."""
     for heuristic, result in results.items():
-        ways = [getattr(result, name) <= limit for name, limit in columns.items()]
+        kept = [getattr(result, key)[part] <= limit for (key, part), limit in limits.items()]
         if function == "direct":
-            ways.append(result.mass_matrix_smallest_eigenvalue > 0)
-        operations = getattr(result, f"operations_{function}")
-        ways.append(np.isfinite(operations))
-        for row in np.flatnonzero(np.all(ways, axis=0)):
+            kept.append(result.mass_matrix.smallest_eigenvalue > 0)
+        operations = result.operations[function]
+        kept.append(np.isfinite(operations))
+        for row in np.flatnonzero(np.all(kept, axis=0)):
             yield Leanest(
                 f"{heuristic}:{result.n[row]}",
                 int(operations[row]),
-                float(result.torque_error_estimation[row]),
-                float(result.torque_error_validation[row]),
-                ErrorRange.of(result.torque_error_test[row]),
+                ModelErrors(
+                    float(result.torque_error.estimation[row]),
+                    float(result.torque_error.validation[row]),
+                    result.torque_error.test[row],
+                ),
             )
 
 
 def _without_terms(
-    function: str, columns: Tolerances, terms: TermReduction | None
+    function: str, limits: _Limits, terms: TermReduction | None
 ) -> Iterator[Leanest]:
     one = None if terms is None else terms.functions.get(function)
-    if one is not None and all(getattr(one, name) <= limit for name, limit in columns.items()):
-        yield Leanest(
-            TERMS,
-            one.operations,
-            one.torque_error_estimation,
-            one.torque_error_validation,
-            ErrorRange.of(one.torque_error_test),
-        )
+    if one is not None and all(
+        getattr(one, key)[part] <= limit for (key, part), limit in limits.items()
+    ):
+        yield Leanest(TERMS, one.operations, one.torque_error)

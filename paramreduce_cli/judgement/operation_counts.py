@@ -5,12 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramreduce_cli.lean.counting import COUNTS, Counts, count_all, structure
+from paramreduce_cli.lean.counting import Counts, count_all, structure
 from paramreduce_cli.records import (
     CountedDynamics,
     HeuristicValidation,
     Model,
     ModelChoice,
+    Operations,
     Reduction,
     Run,
 )
@@ -60,11 +61,11 @@ class OperationCounts:
     def count(self, heuristics: Heuristics, shown: Sequence[ModelChoice]) -> Heuristics:
         """Return the validation of heuristics with the operations of some models, and of all that take the same."""
         known = {
-            self._structures[key]: tuple(getattr(result, name)[row] for name in COUNTS)
+            self._structures[key]: (result.operations.inverse[row], result.operations.direct[row])
             for key in self._models
             for result in [heuristics[key.heuristic]]
             for row in [result.row(key.n)]
-            if row is not None and np.isfinite(result.operations_inverse[row])
+            if row is not None and np.isfinite(result.operations.inverse[row])
         }
         asked = {self._structures[key]: self._models[key] for key in shown}
         missing = [key for key in asked if key not in known]
@@ -80,10 +81,10 @@ def _with_operations(
     heuristics: Heuristics, operations: Mapping[ModelChoice, tuple[float, ...]]
 ) -> Heuristics:
     """Return the validation of heuristics with operations by model, not a number for the others."""
-    unknown = (np.nan,) * len(COUNTS)
+    unknown = (np.nan, np.nan)
     found = {}
     for name, result in heuristics.items():
         rows = [operations.get(ModelChoice(name, n), unknown) for n in result.n.tolist()]
-        columns = np.array(rows, dtype=float).reshape(-1, len(COUNTS)).T
-        found[name] = replace(result, **dict(zip(COUNTS, columns, strict=True)))
+        inverse, direct = np.array(rows, dtype=float).reshape(-1, 2).T
+        found[name] = replace(result, operations=Operations(inverse, direct))
     return found

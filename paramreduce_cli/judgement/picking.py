@@ -4,25 +4,23 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from paramreduce_cli.records import FloatArray, HeuristicValidation, ModelChoice, Proofs, Selected
+from paramreduce_cli.records import (
+    FloatArray,
+    HeuristicValidation,
+    IntArray,
+    ModelChoice,
+    Proofs,
+    Selected,
+)
 from paramreduce_cli.reduction.problem import TIE
 from paramreduce_cli.texts import EXACT
 
 Pick = tuple[str, int]
 """A heuristic, and the row of one of its subsets."""
 
-_ON_BOTH_SETS = {
-    "torque_error": ("torque_error_estimation", "torque_error_validation"),
-    "acceleration_error": ("acceleration_error_estimation", "acceleration_error_validation"),
-    "operations": ("operations_inverse",),
-}
-_OBJECTIVES = (
-    "n",
-    "torque_error_estimation",
-    "acceleration_error_estimation",
-    "operations_inverse",
-    "operations_direct",
-)
+_BOTH_SETS = ("estimation", "validation")
+_PARTS = {"torque_error": _BOTH_SETS, "acceleration_error": _BOTH_SETS, "operations": ("inverse",)}
+"""What tolerances are on: sets of samples, or functions."""
 
 
 def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> FloatArray:
@@ -33,9 +31,9 @@ def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> Floa
         tolerances: By `torque_error`, `acceleration_error` and `operations`.
     """
     ratios = [
-        np.asarray(getattr(result, name), dtype=float) / limit
+        np.asarray(getattr(result, key)[part], dtype=float) / limit
         for key, limit in tolerances.items()
-        for name in _ON_BOTH_SETS[key]
+        for part in _PARTS[key]
     ]
     worst: FloatArray = np.max(ratios, axis=0)
     return worst
@@ -90,7 +88,7 @@ def _smallest_then_best(
 
 def _best(results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]) -> Pick:
     """Of the smallest torque error on the estimation set; of equal ones the last."""
-    errors = np.array([results[name].torque_error_estimation[row] for name, row in picks])
+    errors = np.array([results[name].torque_error.estimation[row] for name, row in picks])
     return picks[int(np.flatnonzero(errors <= errors.min() * (1 + TIE) + EXACT)[-1])]
 
 
@@ -113,7 +111,7 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoic
     if not picks:
         return ()
     values = np.array(
-        [[_resolved(getattr(results[h], key)[row]) for key in _OBJECTIVES] for h, row in picks]
+        [[_resolved(column[row]) for column in _compared(results[h])] for h, row in picks]
     )
     front = []
     for k, own in enumerate(values):
@@ -124,6 +122,17 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoic
             front.append(picks[k])
     order = np.argsort([results[h].n[row] for h, row in front], kind="stable")
     return tuple(ModelChoice(front[k][0], int(results[front[k][0]].n[front[k][1]])) for k in order)
+
+
+def _compared(result: HeuristicValidation) -> tuple[IntArray | FloatArray, ...]:
+    """Return what models are compared by, the less the better, (m,) each."""
+    return (
+        result.n,
+        result.torque_error.estimation,
+        result.acceleration_error.estimation,
+        result.operations.inverse,
+        result.operations.direct,
+    )
 
 
 def every_model(results: Mapping[str, HeuristicValidation]) -> list[ModelChoice]:
@@ -160,6 +169,6 @@ def _resolved(value: float) -> float:
 
 def _sensible(results: Mapping[str, HeuristicValidation]) -> Iterator[Pick]:
     for name, result in results.items():
-        sensible = (result.torque_error_estimation < 1) & (result.acceleration_error_estimation < 1)
-        sensible &= np.isfinite(result.operations_inverse)
+        sensible = (result.torque_error.estimation < 1) & (result.acceleration_error.estimation < 1)
+        sensible &= np.isfinite(result.operations.inverse)
         yield from ((name, int(row)) for row in np.flatnonzero(sensible))

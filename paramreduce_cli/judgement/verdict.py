@@ -20,6 +20,8 @@ _NEGLIGIBLE = 1e-6
 
 _CONDITION_FACTOR = 10.0
 """A mass matrix is unsafe if it is so many times worse conditioned than with all given parameters."""
+_WORST = "_worst"
+"""Ending of keys that limit the largest error over the motions of the test set, not the median."""
 _ERROR_FACTOR = 2.0
 """Errors on two sets part if one is so many times larger."""
 
@@ -51,13 +53,13 @@ def verdict(
 
 
 def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
-    """What a limit of the config is on, of the model of n parameters."""
-    what, test, worst = key.partition("_test")
-    own = getattr(result, what + test)[result.row(n)]
-    if not test:
+    """Return what a limit of the config is on, of the model of n parameters."""
+    quantity, part = key.removesuffix(_WORST).rsplit("_", 1)
+    own = getattr(result, quantity)[part][result.row(n)]
+    if part != "test":
         return float(own)
     errors = ErrorRange.of(own)
-    return errors.worst if worst else errors.median
+    return errors.worst if key.endswith(_WORST) else errors.median
 
 
 def _shown(value: float, relative: bool) -> str:
@@ -109,18 +111,17 @@ def _doubts(
 def _unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
     if not full:  # nothing is known but torques
         return np.zeros(result.n.size, dtype=bool)
-    smallest = result.mass_matrix_smallest_eigenvalue
+    smallest = result.mass_matrix.smallest_eigenvalue
     factor = _CONDITION_FACTOR
     near = smallest <= max(0.0, full["mass_matrix_smallest_eigenvalue"] / factor)
     unsafe: BoolArray = near | (
-        result.mass_matrix_condition > factor * full["mass_matrix_condition"]
+        result.mass_matrix.condition > factor * full["mass_matrix_condition"]
     )
     return unsafe
 
 
 def _apart(result: HeuristicValidation, what: str) -> BoolArray:
-    one = np.asarray(getattr(result, f"{what}_error_estimation"))
-    two = np.asarray(getattr(result, f"{what}_error_validation"))
+    one, two = result.error(what).estimation, result.error(what).validation
     smaller, larger = np.minimum(one, two), np.maximum(one, two)
     apart: BoolArray = (larger > _ERROR_FACTOR * smaller) & ((smaller > _NEGLIGIBLE) & (larger < 1))
     return apart

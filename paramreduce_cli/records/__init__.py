@@ -5,6 +5,15 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 """
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.errors import (
+    NO_MOTIONS,
+    ErrorRange,
+    JointErrors,
+    MassMatrices,
+    ModelErrors,
+    Operations,
+    SetErrors,
+)
 from paramreduce_cli.records.items import WHOLE, Items, Part, PartFinished
 from paramreduce_cli.records.logs import (
     Consistency,
@@ -82,12 +91,10 @@ from paramreduce_cli.records.trajectories import (
     Trajectory,
 )
 from paramreduce_cli.records.validation import (
-    NO_MOTIONS,
     About,
     CrossValidation,
     DataChange,
     DataVariant,
-    ErrorRange,
     HeuristicValidation,
     Leanest,
     Remark,

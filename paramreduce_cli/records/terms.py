@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.errors import ModelErrors, SetErrors
 
 TERMS = "terms"
 """What the model is called of which each function has terms left out."""
@@ -31,14 +32,9 @@ class TermFront:
     """Models of one function that no other one of as few operations beats; one row each."""
 
     operations: IntArray
-    torque_error_estimation: FloatArray
-    torque_error_validation: FloatArray
-    acceleration_error_estimation: FloatArray
+    torque_error: SetErrors
+    acceleration_error: SetErrors
     """Not numbers for the inverse dynamics."""
-    acceleration_error_validation: FloatArray
-    torque_error_test: FloatArray
-    """Errors on every motion of the test set, which no search looks at, (n_models, n_motions)."""
-    acceleration_error_test: FloatArray
 
 
 @dataclass(frozen=True)
@@ -67,14 +63,9 @@ class TermModel:
     """Sums, products and function calls that it takes."""
     operations_start: int
     """The same with all terms of the subset."""
-    torque_error_estimation: float
-    torque_error_validation: float
-    acceleration_error_estimation: float
-    """Not a number for the inverse dynamics, like all that is of accelerations."""
-    acceleration_error_validation: float
-    torque_error_test: FloatArray
-    """Errors on every motion of the test set, which no search looks at, (n_motions,)."""
-    acceleration_error_test: FloatArray
+    torque_error: ModelErrors
+    acceleration_error: ModelErrors
+    """Not numbers for the inverse dynamics, like all that is of accelerations."""
     random_torque_error: float
     """On random states inside the limits; not a number where the torques are not known there."""
     random_acceleration_error: float

@@ -3,58 +3,35 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray
+from paramreduce_cli.records.errors import (
+    JointErrors,
+    MassMatrices,
+    ModelErrors,
+    Operations,
+    SetErrors,
+)
 from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
-
-
-class ErrorRange(NamedTuple):
-    """Errors over the motions of the test set; not numbers where there are none."""
-
-    median: float
-    least: float
-    worst: float
-
-    @classmethod
-    def of(cls, errors: FloatArray) -> "ErrorRange":
-        """Return the range of one model's errors, (n_motions,)."""
-        if not errors.size:
-            return NO_MOTIONS
-        return cls(float(np.median(errors)), float(errors.min()), float(errors.max()))
-
-
-NO_MOTIONS = ErrorRange(np.nan, np.nan, np.nan)
 
 
 @dataclass(frozen=True)
 class HeuristicValidation(BySize):
     """Errors and costs of one heuristic's subsets; every array has one row per subset."""
 
-    torque_error_estimation: FloatArray
-    torque_error_validation: FloatArray
-    torque_error_joint_estimation: FloatArray
-    """(m, n_dof)"""
-    torque_error_joint_validation: FloatArray
-    acceleration_error_estimation: FloatArray
-    acceleration_error_validation: FloatArray
-    acceleration_error_joint_estimation: FloatArray
-    acceleration_error_joint_validation: FloatArray
-    torque_error_test: FloatArray
-    """Errors on every motion of the test set, (m, n_motions); no columns where there is no test set."""
-    acceleration_error_test: FloatArray
-    torque_error_joint_test: FloatArray
-    """Errors over all motions of the test set together, (m, n_dof)."""
-    acceleration_error_joint_test: FloatArray
-    mass_matrix_condition: FloatArray
-    """Largest over the samples."""
-    mass_matrix_smallest_eigenvalue: FloatArray
-    """Smallest over the samples."""
-    operations_inverse: FloatArray
-    """Not a number where a model is not shown, and so not counted."""
-    operations_direct: FloatArray
+    torque_error: SetErrors
+    acceleration_error: SetErrors
+    joint_torque_error: JointErrors
+    joint_acceleration_error: JointErrors
+    mass_matrix: MassMatrices
+    operations: Operations
+
+    def error(self, quantity: str) -> SetErrors:
+        """Return the errors of ``torque`` or ``acceleration``."""
+        return self.torque_error if quantity == "torque" else self.acceleration_error
 
 
 @dataclass(frozen=True)
@@ -82,9 +59,7 @@ class Leanest:
     model: str
     """``HEURISTIC:N``, or ``terms``."""
     operations: int
-    torque_error_estimation: float
-    torque_error_validation: float
-    torque_error_test: ErrorRange
+    torque_error: ModelErrors
 
 
 class DataChange(StrEnum):

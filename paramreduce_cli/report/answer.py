@@ -130,7 +130,7 @@ def _worst_joint(data: ReportData) -> str:
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
-    errors = getattr(result, f"torque_error_joint_{name}")[row] * rms
+    errors = result.joint_torque_error[name][row] * rms
     rated = data.known_model.nominal_torque_given
     sizes = data.known_model.nominal_torque if rated else np.maximum(rms, NO_TORQUE)
     shares = np.where(np.isfinite(errors), errors / sizes, -np.inf)

@@ -7,8 +7,6 @@ from dataclasses import fields
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from paramreduce_cli.records import (
     SETS,
     ErrorRange,
@@ -85,14 +83,20 @@ def _(record: Reduction) -> Iterator[Row]:
 @_rows.register
 def _(record: Validation) -> Iterator[Row]:
     for name, judged in record.heuristics.items():
-        columns = {key: value for key, value in vars(judged).items() if np.ndim(value) == 1}
+        columns = {
+            "n": judged.n,
+            **{f"{what}_error_{which}": judged.error(what)[which]
+               for what in ("torque", "acceleration") for which in ("estimation", "validation")},
+            **{f"mass_matrix_{key}": values for key, values in vars(judged.mass_matrix).items()},
+            **{f"operations_{key}": values for key, values in vars(judged.operations).items()},
+        }  # fmt: skip
         for k in range(judged.n.size):
             yield (
                 {"heuristic": name}
                 | {key: column[k] for key, column in columns.items()}
                 | {f"{what}_error_test{end}": value
                    for what in ("torque", "acceleration")
-                   for end, value in _ends(getattr(judged, f"{what}_error_test")[k])}
+                   for end, value in _ends(judged.error(what).test[k])}
             )  # fmt: skip
 
 

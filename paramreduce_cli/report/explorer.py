@@ -111,19 +111,17 @@ def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
     return {
         "torque": {s: packed(_drawn(result, "torque", s)) for s in SETS},
         "joints": {
-            s: packed((getattr(result, f"torque_error_joint_{s}") * rms).astype(np.float32))
+            s: packed((result.joint_torque_error[s] * rms).astype(np.float32))
             for s, rms in data.rms_torque.items()
         },
         "acceleration": {s: packed(_drawn(result, "acceleration", s)) for s in SETS},
-        "operations": {
-            f: _counted(getattr(result, f"operations_{f}")) if counted else None for f in _FUNCTIONS
-        },
+        "operations": {f: _counted(result.operations[f]) if counted else None for f in _FUNCTIONS},
     }
 
 
 def _drawn(result: HeuristicValidation, what: str, which: str) -> FloatArray:
     """Errors on a set, (m,); medians of the motions of the test set."""
-    errors: FloatArray = getattr(result, f"{what}_error_{which}")
+    errors: FloatArray = result.error(what)[which]
     if which != "test":
         return errors
     return np.array([ErrorRange.of(row).median for row in errors])
@@ -138,7 +136,7 @@ def _terms(data: ReportData) -> dict[str, Any]:
     """Operations and errors on the estimation set of functions with terms left out."""
     found = data.terms.functions if data.terms is not None else {}
     return {
-        name: [one.front.operations.tolist(), one.front.torque_error_estimation.tolist()]
+        name: [one.front.operations.tolist(), one.front.torque_error.estimation.tolist()]
         for name, one in found.items()
     }
 

@@ -173,12 +173,12 @@ def _result(data: ReportData) -> Iterator[str]:
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
-    errors = [f"{format_percent(float(result.torque_error_estimation[row]))} on the estimation set"]
+    errors = [f"{format_percent(float(result.torque_error.estimation[row]))} on the estimation set"]
     if "validation" in data.rms_torque:
         errors.append(
-            f"{format_percent(float(result.torque_error_validation[row]))} on the validation set"
+            f"{format_percent(float(result.torque_error.validation[row]))} on the validation set"
         )
-    test = result.torque_error_test[row]
+    test = result.torque_error.test[row]
     if test.size:
         errors.append(
             f"{format_percent_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
@@ -186,7 +186,7 @@ def _result(data: ReportData) -> Iterator[str]:
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
     if data.known_model is not None:
         full = data.validation.full["operations_inverse"]
-        reduced = int(result.operations_inverse[row])
+        reduced = int(result.operations.inverse[row])
         yield (
             f"Its inverse dynamics, recursive Newton-Euler equations [Luh1980] simplified symbolically, takes {reduced} "
             f"operations instead of {full:.0f}{_COUNTED[data.functions[0]]}, parameters being inputs."

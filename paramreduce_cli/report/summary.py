@@ -1,7 +1,6 @@
 """summary.json: the numbers that a regression job compares."""
 
 from collections.abc import Mapping
-from dataclasses import fields
 from typing import Any
 
 import numpy as np
@@ -10,14 +9,17 @@ from paramreduce_cli.records import (
     SETS,
     About,
     ErrorRange,
+    FloatArray,
     HeuristicValidation,
     Identification,
     IntArray,
+    JointErrors,
     Leanest,
     Model,
     ModelChoice,
     Provenance,
     Reduction,
+    SetErrors,
     Subsets,
     TermFront,
     TermModel,
@@ -83,9 +85,8 @@ def _leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
             "model": one.model,
             "operations": one.operations,
             "torque_error": {
-                "estimation": one.torque_error_estimation,
-                "validation": one.torque_error_validation,
-                "test": _range(one.torque_error_test),
+                **vars(one.torque_error),
+                "test": _range(ErrorRange.of(one.torque_error.test)),
             },
         }
         for name, one in found.items()
@@ -150,11 +151,10 @@ def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -
         "heuristic": heuristic,
         "parameters": [reduction.columns.names[k] for k in subset],
         "n": n,
-        "torque_error": result.torque_error_estimation[row],
-        "acceleration_error": result.acceleration_error_estimation[row],
+        "torque_error": result.torque_error.estimation[row],
+        "acceleration_error": result.acceleration_error.estimation[row],
         "operations": {
-            function: _whole(getattr(result, f"operations_{function}")[row])
-            for function in ("inverse", "direct")
+            function: _whole(result.operations[function][row]) for function in ("inverse", "direct")
         },
     }
 
@@ -239,7 +239,7 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
 
 def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]:
     def errors_on(part: str, what: str) -> Any:
-        value = getattr(of, f"{what}_error_{part}")
+        value = getattr(of, f"{what}_error")[part]
         own = value if row is None else value[row]
         return _range(ErrorRange.of(own)) if part == "test" else own
 
@@ -278,15 +278,13 @@ def _first(found: Subsets) -> int | None:
 
 
 def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
-    counts = [f.name for f in fields(found) if f.name.startswith("operations_")]
-    errors = {
-        f"{of}_error": {s: f"{of}_error_{s}" for s in SETS}
-        | {f"joints_{s}": f"{of}_error_joint_{s}" for s in SETS}
-        for of in ("torque", "acceleration")
-    }
-    names = errors | {
-        "operations": {name.removeprefix("operations_"): name for name in counts},
-        "mass_matrix": {key: f"mass_matrix_{key}" for key in ("condition", "smallest_eigenvalue")},
+    parts = {
+        "torque_error": _with_joints(found.torque_error, found.joint_torque_error),
+        "acceleration_error": _with_joints(
+            found.acceleration_error, found.joint_acceleration_error
+        ),
+        "operations": vars(found.operations),
+        "mass_matrix": vars(found.mass_matrix),
     }
 
     def entry(part: str, key: str, own: Any) -> Any:
@@ -297,11 +295,15 @@ def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     return [
         {"n": n}
         | {
-            part: {key: entry(part, key, getattr(found, name)[k]) for key, name in of.items()}
-            for part, of in names.items()
+            part: {key: entry(part, key, column[k]) for key, column in columns.items()}
+            for part, columns in parts.items()
         }
         for k, n in enumerate(found.n)
     ]
+
+
+def _with_joints(errors: SetErrors, joints: JointErrors) -> dict[str, FloatArray]:
+    return vars(errors) | {f"joints_{name}": values for name, values in vars(joints).items()}
 
 
 def _whole(operations: float) -> int | None:

@@ -16,10 +16,12 @@ from paramreduce_cli.records import (
     CountedDynamics,
     Items,
     Model,
+    ModelErrors,
     Progress,
     Reduction,
     Run,
     Samples,
+    SetErrors,
     TermFront,
     TermModel,
     TermReduction,
@@ -211,7 +213,7 @@ def _say_late(name: str) -> None:
 
 def _say_unfit(term: TermModel) -> None:
     """Of an M that is positive definite, but no more than that."""
-    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
             f"terms: accelerations from the direct dynamics are off by {format_percent(np.nanmax(errors))}, as nothing "
@@ -258,12 +260,8 @@ def _record(judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels) -
         projected=judge.projected,
         operations=program.n_operations,
         operations_start=whole.n_operations,
-        torque_error_estimation=estimation[0],
-        torque_error_validation=validation[0],
-        acceleration_error_estimation=estimation[1],
-        acceleration_error_validation=validation[1],
-        torque_error_test=test[0],
-        acceleration_error_test=test[1],
+        torque_error=ModelErrors(estimation[0], validation[0], test[0]),
+        acceleration_error=ModelErrors(estimation[1], validation[1], test[1]),
         random_torque_error=strayed.torque_error,
         random_acceleration_error=strayed.acceleration_error,
         random_states=strayed.states,
@@ -289,10 +287,6 @@ def _front(programs: list[Judged], judge: Judge) -> TermFront:
     test = np.array([judge.test_errors(one.program) for one in kept])
     return TermFront(
         operations=np.array([one.rank[0] for one in kept], dtype=np.int64),
-        torque_error_estimation=errors[:, 0, 0],
-        torque_error_validation=errors[:, 1, 0],
-        acceleration_error_estimation=errors[:, 0, 1],
-        acceleration_error_validation=errors[:, 1, 1],
-        torque_error_test=test[:, 0],
-        acceleration_error_test=test[:, 1],
+        torque_error=SetErrors(errors[:, 0, 0], errors[:, 1, 0], test[:, 0]),
+        acceleration_error=SetErrors(errors[:, 0, 1], errors[:, 1, 1], test[:, 1]),
     )

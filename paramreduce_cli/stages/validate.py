@@ -29,7 +29,10 @@ from paramreduce_cli.records import (
     FloatArray,
     HeuristicValidation,
     IntArray,
+    JointErrors,
+    MassMatrices,
     Model,
+    Operations,
     Progress,
     ReducedModel,
     Reduction,
@@ -38,6 +41,7 @@ from paramreduce_cli.records import (
     SampleSet,
     Selected,
     SelectionMethod,
+    SetErrors,
     Stability,
     Validation,
 )
@@ -311,25 +315,31 @@ def _judged(
     torques, accelerations = [one for one, _ in test], [one for _, one in test]
     return HeuristicValidation(
         n=n,
-        torque_error_estimation=estimation[0].two[rows],
-        torque_error_validation=validation[0].two[rows],
-        torque_error_joint_estimation=estimation[0].joints[rows],
-        torque_error_joint_validation=validation[0].joints[rows],
-        acceleration_error_estimation=estimation[1].error[rows],
-        acceleration_error_validation=validation[1].error[rows],
-        acceleration_error_joint_estimation=estimation[1].joints[rows],
-        acceleration_error_joint_validation=validation[1].joints[rows],
-        torque_error_test=np.column_stack([no_motion, *(one.two[rows] for one in torques)]),
-        acceleration_error_test=np.column_stack(
-            [no_motion, *(one.error[rows] for one in accelerations)]
+        torque_error=SetErrors(
+            estimation[0].two[rows],
+            validation[0].two[rows],
+            np.column_stack([no_motion, *(one.two[rows] for one in torques)]),
         ),
-        torque_error_joint_test=(joint_errors(torques) if test else no_joint)[rows],
-        acceleration_error_joint_test=(joint_errors(accelerations) if test else no_joint)[rows],
-        mass_matrix_condition=np.max([one.condition[rows] for one in every], axis=0),
-        mass_matrix_smallest_eigenvalue=np.min(
-            [one.smallest_eigenvalue[rows] for one in every], axis=0
+        acceleration_error=SetErrors(
+            estimation[1].error[rows],
+            validation[1].error[rows],
+            np.column_stack([no_motion, *(one.error[rows] for one in accelerations)]),
         ),
-        **dict.fromkeys(COUNTS, np.full(n.size, np.nan)),
+        joint_torque_error=JointErrors(
+            estimation[0].joints[rows],
+            validation[0].joints[rows],
+            (joint_errors(torques) if test else no_joint)[rows],
+        ),
+        joint_acceleration_error=JointErrors(
+            estimation[1].joints[rows],
+            validation[1].joints[rows],
+            (joint_errors(accelerations) if test else no_joint)[rows],
+        ),
+        mass_matrix=MassMatrices(
+            condition=np.max([one.condition[rows] for one in every], axis=0),
+            smallest_eigenvalue=np.min([one.smallest_eigenvalue[rows] for one in every], axis=0),
+        ),
+        operations=Operations(np.full(n.size, np.nan), np.full(n.size, np.nan)),
     )
 
 

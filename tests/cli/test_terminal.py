@@ -3,6 +3,7 @@
 import contextlib
 import io
 import signal
+import sys
 import warnings
 
 import pytest
@@ -129,3 +130,21 @@ def test_an_error_after_a_signal_is_an_interruption(interrupted, code, monkeypat
     with warnings.catch_warnings(), pytest.raises(SystemExit) as ended:
         command_line.main()
     assert ended.value.code == code
+
+
+def test_an_interruption_of_a_finaliser_is_not_shown(monkeypatch, capsys):
+    """Python shows exceptions there with their traceback; the handler of the signal has noted it."""
+    monkeypatch.setattr(sys, "unraisablehook", terminal._show_unraisable)
+
+    class Interrupted:
+        def __del__(self):
+            raise KeyboardInterrupt
+
+    class Failing:
+        def __del__(self):
+            raise ValueError("shown")
+
+    Interrupted()
+    assert capsys.readouterr().err == ""
+    Failing()
+    assert "shown" in capsys.readouterr().err

@@ -22,7 +22,7 @@ from paramreduce_cli.export.term_sizes import estimate_term_sizes
 from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.records import TermModel
+from paramreduce_cli.records import ModelErrors, TermModel
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 needs_octave = pytest.mark.skipif(shutil.which("octave-cli") is None, reason="needs Octave")
@@ -244,16 +244,12 @@ def test_any_name_of_a_robot_is_one_in_cpp(tmp_path, name):
 
 def function_without_terms(chosen, graph, outputs, n, **more):
     """As reduce-terms leaves one, of the parameters of a model."""
-    errors = [
-        f"{kind}_error_{part}"
-        for kind in ("torque", "acceleration")
-        for part in ("estimation", "validation")
-    ]
-    known = dict.fromkeys([*errors, "random_torque_error"], 0.0) | {
+    exact = ModelErrors(0.0, 0.0, np.zeros(0))
+    known = {
+        "torque_error": exact, "acceleration_error": exact, "random_torque_error": 0.0,
         "random_acceleration_error": np.nan, "random_states": 1, "largest_difference": np.zeros(n),
         "worst_joint": 0, "worst_state": np.zeros((3, n)), "smallest_eigenvalue": np.nan, "mass_states": 0,
         "lower": -np.ones((3, n)), "upper": np.ones((3, n)), "drawn": np.zeros((2, 3, n)), "projected": False,
-        "torque_error_test": np.zeros(0), "acceleration_error_test": np.zeros(0),
     }  # fmt: skip
     program = Program.of_graph(graph, outputs)
     return TermModel(

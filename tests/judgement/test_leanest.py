@@ -7,29 +7,34 @@ import pytest
 
 from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.judgement.leanest import leanest
+from paramreduce_cli.records import ModelErrors, Operations, SetErrors
 
 RESULTS = {
     "qr": SimpleNamespace(
         n=np.array([1, 3, 5]),
-        torque_error_estimation=np.array([0.9, 0.02, 0.004]),
-        torque_error_validation=np.array([0.9, 0.03, 0.005]),
-        torque_error_test=np.array([[0.9, 0.8], [0.03, 0.01], [0.006, 0.002]]),
-        acceleration_error_estimation=np.array([np.inf, 0.05, 0.01]),
-        acceleration_error_validation=np.array([np.inf, 0.05, 0.02]),
-        operations_inverse=np.array([2, 100, 200]),
-        operations_direct=np.array([3, 150, 300]),
-        mass_matrix_smallest_eigenvalue=np.array([0.0, -0.1, 0.1]),
+        torque_error=SetErrors(
+            np.array([0.9, 0.02, 0.004]),
+            np.array([0.9, 0.03, 0.005]),
+            np.array([[0.9, 0.8], [0.03, 0.01], [0.006, 0.002]]),
+        ),
+        acceleration_error=SetErrors(
+            np.array([np.inf, 0.05, 0.01]), np.array([np.inf, 0.05, 0.02]), np.zeros((0, 0))
+        ),
+        operations=Operations(np.array([2, 100, 200]), np.array([3, 150, 300])),
+        mass_matrix=SimpleNamespace(smallest_eigenvalue=np.array([0.0, -0.1, 0.1])),
     ),
     "swap": SimpleNamespace(
         n=np.array([6, 4]),
-        torque_error_estimation=np.array([0.0085, 0.008]),
-        torque_error_validation=np.array([0.009, 0.009]),
-        torque_error_test=np.array([[0.01, 0.02], [0.01, 0.03]]),
-        acceleration_error_estimation=np.array([0.03, 0.03]),
-        acceleration_error_validation=np.array([0.04, 0.04]),
-        operations_inverse=np.array([140, 140]),
-        operations_direct=np.array([250, 250]),
-        mass_matrix_smallest_eigenvalue=np.array([0.1, 0.1]),
+        torque_error=SetErrors(
+            np.array([0.0085, 0.008]),
+            np.array([0.009, 0.009]),
+            np.array([[0.01, 0.02], [0.01, 0.03]]),
+        ),
+        acceleration_error=SetErrors(
+            np.array([0.03, 0.03]), np.array([0.04, 0.04]), np.zeros((0, 0))
+        ),
+        operations=Operations(np.array([140, 140]), np.array([250, 250])),
+        mass_matrix=SimpleNamespace(smallest_eigenvalue=np.array([0.1, 0.1])),
     ),
 }
 
@@ -38,11 +43,8 @@ def terms(torque, acceleration, operations=50, held_out=None, budget=0.1):
     """Both functions with such errors, of a budget of 4 % and so much of accelerations."""
     one = SimpleNamespace(
         operations=operations,
-        torque_error_estimation=torque,
-        torque_error_validation=torque if held_out is None else held_out,
-        torque_error_test=np.zeros(0),
-        acceleration_error_estimation=acceleration,
-        acceleration_error_validation=acceleration,
+        torque_error=ModelErrors(torque, torque if held_out is None else held_out, np.zeros(0)),
+        acceleration_error=ModelErrors(acceleration, acceleration, np.zeros(0)),
     )
     return SimpleNamespace(
         torque_budget=0.04, acceleration_budget=budget, held_out=held_out is not None,
@@ -84,7 +86,7 @@ def test_the_fewest_operations_within_what_is_asked_for(wanted, found, inverse, 
         if expected is not None and expected != "terms":
             heuristic, _, n = expected.partition(":")
             row = RESULTS[heuristic].n.tolist().index(int(n))
-            assert one.operations == getattr(RESULTS[heuristic], f"operations_{function}")[row]
-            assert one.torque_error_validation == RESULTS[heuristic].torque_error_validation[row]
-            test = RESULTS[heuristic].torque_error_test[row]
-            assert one.torque_error_test == (np.median(test), test.min(), test.max())
+            assert one.operations == RESULTS[heuristic].operations[function][row]
+            assert one.torque_error.validation == RESULTS[heuristic].torque_error.validation[row]
+            test = RESULTS[heuristic].torque_error.test[row]
+            assert one.torque_error.test.tolist() == test.tolist()

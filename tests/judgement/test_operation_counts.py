@@ -31,9 +31,9 @@ def test_counts_are_those_of_each_model_by_itself(validated):
     counts = Counts(model, CountedDynamics.GENERALISED)
     counted = 0
     for name, result in validation.heuristics.items():
-        for row in np.flatnonzero(np.isfinite(result.operations_inverse)):
+        for row in np.flatnonzero(np.isfinite(result.operations.inverse)):
             expected = counts.lean(reduction.model(name, int(row)))
-            assert [result.operations_inverse[row], result.operations_direct[row]] == expected
+            assert [result.operations.inverse[row], result.operations.direct[row]] == expected
             counted += 1
     assert counted > 10
 
@@ -42,13 +42,13 @@ def test_what_is_shown_is_counted_and_the_front_is_of_it(validated):
     _, _, validation = validated
     selected = validation.selected
     for name, result in validation.heuristics.items():
-        known = np.isfinite(result.operations_inverse)
+        known = np.isfinite(result.operations.inverse)
         assert known[result.row(selected.n)]
         if name in (selected.heuristic, "forward-selection"):
             assert known.all()
     assert not all(
-        np.isfinite(result.operations_inverse).all() for result in validation.heuristics.values()
+        np.isfinite(result.operations.inverse).all() for result in validation.heuristics.values()
     )
     for choice in validation.pareto:
         result = validation.heuristics[choice.heuristic]
-        assert np.isfinite(result.operations_inverse[result.row(choice.n)])
+        assert np.isfinite(result.operations.inverse[result.row(choice.n)])

@@ -12,22 +12,27 @@ from paramreduce_cli.judgement.picking import (
     proven_necessary,
     smallest_within,
 )
-from paramreduce_cli.records import HeuristicValidation, ModelChoice, Proofs
+from paramreduce_cli.records import HeuristicValidation, ModelChoice, Operations, Proofs, SetErrors
 
 
 def judged(n, torque, torque_validation=None, acceleration=None, inverse=None, direct=None):
     """Errors and costs of one heuristic; what is not given does not matter."""
     n = np.asarray(n)
+    none = np.zeros((n.size, 0))
+    held_out = torque if torque_validation is None else torque_validation
     values = dict.fromkeys((f.name for f in dataclasses.fields(HeuristicValidation)), 0 * n)
     values |= {
         "n": n,
-        "torque_error_estimation": torque,
-        "torque_error_validation": torque if torque_validation is None else torque_validation,
-        "acceleration_error_estimation": 0 * n if acceleration is None else acceleration,
-        "operations_inverse": 10 * n if inverse is None else inverse,
-        "operations_direct": 10 * n if direct is None else direct,
+        "torque_error": SetErrors(np.asarray(torque), np.asarray(held_out), none),
+        "acceleration_error": SetErrors(
+            np.asarray(0 * n if acceleration is None else acceleration), 0 * n, none
+        ),
+        "operations": Operations(
+            np.asarray(10 * n if inverse is None else inverse),
+            np.asarray(10 * n if direct is None else direct),
+        ),
     }
-    return HeuristicValidation(**{k: np.asarray(v) for k, v in values.items()})
+    return HeuristicValidation(**values)
 
 
 def test_the_smallest_model_keeps_its_tolerance_on_both_sets():
@@ -84,9 +89,10 @@ def test_the_front_is_what_nothing_beats(seed):
     }  # fmt: skip
 
     def values(name, row):
-        fields = ("n", "torque_error_estimation", "acceleration_error_estimation",
-                  "operations_inverse", "operations_direct")  # fmt: skip
-        return tuple(getattr(results[name], field)[row] for field in fields)
+        found = results[name]
+        columns = (found.n, found.torque_error.estimation, found.acceleration_error.estimation,
+                   found.operations.inverse, found.operations.direct)  # fmt: skip
+        return tuple(column[row] for column in columns)
 
     everything = {values(name, row) for name in results for row in range(8)}
 

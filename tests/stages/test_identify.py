@@ -69,8 +69,8 @@ def test_the_size_is_chosen_without_the_held_out_part(measured_copy, invoke):
     assert np.array_equal(
         after.cross_validation[name].torque_error, before.cross_validation[name].torque_error
     )
-    worse = after.heuristics[name].torque_error_validation
-    assert np.all(worse > before.heuristics[name].torque_error_validation)
+    worse = after.heuristics[name].torque_error.validation
+    assert np.all(worse > before.heuristics[name].torque_error.validation)
 
 
 @pytest.mark.draws

@@ -210,25 +210,25 @@ def test_a_function_for_which_nothing_is_found_stops_no_run(tmp_path, monkeypatc
 @pytest.mark.parametrize("name", ["inverse", "direct"])
 def test_errors_are_what_they_are_defined_as_and_within_the_budget(two_link, name):
     term, (estimation, validation) = errors_by_definition(two_link, name)
-    assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-9)
-    assert term.torque_error_validation == pytest.approx(validation, rel=1e-9)
+    assert term.torque_error.estimation == pytest.approx(estimation, rel=1e-9)
+    assert term.torque_error.validation == pytest.approx(validation, rel=1e-9)
     assert max(estimation, validation) <= 0.05
     assert 0 < term.operations < term.operations_start
     assert term.operations == Program.of_stored(term.program).n_operations
     if name == "direct":
         assert term.smallest_eigenvalue > 0
         assert term.mass_states == 100_000
-        assert max(term.acceleration_error_estimation, term.acceleration_error_validation) <= 0.2
+        assert max(term.acceleration_error.estimation, term.acceleration_error.validation) <= 0.2
     front = term.front
     assert np.all(np.diff(front.operations) > 0)
-    assert front.torque_error_estimation[-1] < front.torque_error_estimation[0]
+    assert front.torque_error.estimation[-1] < front.torque_error.estimation[0]
 
 
 @pytest.mark.parametrize("name", ["inverse", "direct"])
 def test_loops(four_bar, name):
     term, (estimation, validation) = errors_by_definition(four_bar, name)
-    assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
-    assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+    assert term.torque_error.estimation == pytest.approx(estimation, rel=1e-8)
+    assert term.torque_error.validation == pytest.approx(validation, rel=1e-8)
     assert max(estimation, validation) <= 0.05
     assert 0 < term.random_states <= 1000
     assert np.isnan(term.random_acceleration_error) == (name == "inverse")
@@ -387,9 +387,9 @@ def recomputed_in_c(runner, name):
 )
 def test_the_exported_c_has_the_reported_errors_on_the_validation_set(robot, name, run_of):
     term, (torque_error, acceleration_error) = recomputed_in_c(run_of(robot), name)
-    assert term.torque_error_validation == pytest.approx(torque_error, rel=1e-9)
+    assert term.torque_error.validation == pytest.approx(torque_error, rel=1e-9)
     if name == "direct":
-        assert term.acceleration_error_validation == pytest.approx(acceleration_error, rel=1e-9)
+        assert term.acceleration_error.validation == pytest.approx(acceleration_error, rel=1e-9)
 
 
 @pytest.mark.parametrize("robot", OTHERS)
@@ -398,8 +398,8 @@ def test_friction_and_floating_bases(robot, run_of):
     others = run_of(robot)
     for name, term in loaded(others, TermReduction).functions.items():
         _, (estimation, validation) = errors_by_definition(others, name)
-        assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
-        assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+        assert term.torque_error.estimation == pytest.approx(estimation, rel=1e-8)
+        assert term.torque_error.validation == pytest.approx(validation, rel=1e-8)
         assert max(estimation, validation) <= 0.05
         assert term.operations < term.operations_start
         assert 0 < term.random_torque_error < 0.5
@@ -442,7 +442,7 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
     values = values_file(chosen, title, "", model.mechanism, term)["parameters.json"].decode()
     for line in json.loads(values)["holds"]:
         assert " ".join(line.split()) in header
-    errors = (term.acceleration_error_estimation, term.acceleration_error_validation)
+    errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     assert (" / ".join(map(format_percent, errors)) in header) == (name == "direct")
 
 
@@ -473,7 +473,7 @@ def test_a_search_that_its_time_ended_is_said(two_link, tmp_path):
     for name, whole in before.functions.items():
         found = after.functions[name]
         assert whole.operations <= found.operations < whole.operations_start
-        assert found.torque_error_validation <= config.terms.torque_error
+        assert found.torque_error.validation <= config.terms.torque_error
 
 
 def share_of(row, kind, part, budget):
@@ -540,8 +540,8 @@ def test_measured_torques_are_fitted_and_what_is_held_out_is_not_looked_at(measu
     runner.run(STAGES["reduce-terms"])
     for name in ("inverse", "direct"):
         term, (estimation, validation) = errors_by_definition(runner, name)
-        assert term.torque_error_estimation == pytest.approx(estimation, rel=1e-8)
-        assert term.torque_error_validation == pytest.approx(validation, rel=1e-8)
+        assert term.torque_error.estimation == pytest.approx(estimation, rel=1e-8)
+        assert term.torque_error.validation == pytest.approx(validation, rel=1e-8)
         assert estimation <= 0.2
         assert np.isnan(term.random_torque_error), "torques at other states are not known"
         assert term.random_states == 0

@@ -10,4 +10,4 @@ from paramreduce_cli.report.style import error_figure
 @placed(PageSection.ACCELERATIONS, 1)
 def acceleration_error(data: ReportData) -> Figure:
     """Acceleration error against the number of parameters, on both sets. What several heuristics found is drawn once, for the first of them."""
-    return error_figure(data, "acceleration_error", r"$\varepsilon_{\ddot z}$")
+    return error_figure(data, "acceleration", r"$\varepsilon_{\ddot z}$")

@@ -21,12 +21,12 @@ def cross_validation(data: ReportData) -> Figure | None:
     result, own = data.validation.heuristics[name], crossed[name]
     drawn = new_figure()
     axes = drawn.subplots()
-    axes.plot(result.n, 100 * result.torque_error_estimation, color="#7d8590", label="learned from")
+    axes.plot(result.n, 100 * result.torque_error.estimation, color="#7d8590", label="learned from")
     axes.errorbar(
         own.n, 100 * own.mean, 100 * own.standard_error, color="#0b62c4", capsize=2, linewidth=1.2,
         label="parts left out in turn",
     )  # fmt: skip
-    axes.plot(result.n, 100 * result.torque_error_validation, color="#d9730d", label="held out")
+    axes.plot(result.n, 100 * result.torque_error.validation, color="#d9730d", label="held out")
     k = int(own.mean.argmin())
     limit = 100 * float(own.mean[k] + own.standard_error[k])
     axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")

@@ -15,16 +15,16 @@ def error_vs_operations(data: ReportData) -> Figure:
     drawn, *axes = pair_of_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
         for curve in curves(data):
-            values = curve.drawn(visible(curve.result.torque_error_estimation))
+            values = curve.drawn(visible(curve.result.torque_error.estimation))
             one.semilogy(
-                getattr(curve.result, f"operations_{key}"), values,
+                curve.result.operations[key], values,
                 color=curve.colour, marker=curve.marker, markersize=3, linewidth=0.8, label=curve.label,
             )  # fmt: skip
         front = [
             (float(cost), float(error))
             for r in data.validation.heuristics.values()
             for cost, error in zip(
-                getattr(r, f"operations_{key}"), visible(r.torque_error_estimation), strict=True
+                r.operations[key], visible(r.torque_error.estimation), strict=True
             )
             if np.isfinite(cost)
         ]

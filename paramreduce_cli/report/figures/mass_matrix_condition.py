@@ -16,8 +16,8 @@ def mass_matrix_condition(data: ReportData) -> Figure:
     axes = drawn.subplots()
     for curve in curves(data):
         result, colour = curve.result, curve.colour
-        condition = curve.drawn(visible(result.mass_matrix_condition))
-        positive = result.mass_matrix_smallest_eigenvalue > 0
+        condition = curve.drawn(visible(result.mass_matrix.condition))
+        positive = result.mass_matrix.smallest_eigenvalue > 0
         axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=curve.label)
         for chosen, fill in ((positive, colour), (~positive, "white")):
             axes.semilogy(

@@ -15,7 +15,7 @@ def operations(data: ReportData) -> Figure:
     axes = drawn.subplots()
     for curve in curves(data):
         for key, _, line in FUNCTIONS:
-            values = curve.drawn(getattr(curve.result, f"operations_{key}"))
+            values = curve.drawn(curve.result.operations[key])
             axes.plot(
                 curve.result.n, values, line, color=curve.colour, marker=curve.marker, markersize=2.5,
                 label=curve.label if line == "-" else None,

@@ -20,9 +20,9 @@ def terms(data: ReportData) -> Figure | None:
             (float(cost), float(error))
             for result in data.validation.heuristics.values()
             for cost, error, eigenvalue in zip(
-                getattr(result, f"operations_{key}"),
-                visible(result.torque_error_estimation),
-                result.mass_matrix_smallest_eigenvalue,
+                result.operations[key],
+                visible(result.torque_error.estimation),
+                result.mass_matrix.smallest_eigenvalue,
                 strict=True,
             )
             if key == "inverse" or eigenvalue > 0
@@ -36,11 +36,11 @@ def terms(data: ReportData) -> Figure | None:
             continue
         front = term.front
         one.semilogy(
-            front.operations, visible(front.torque_error_estimation),
+            front.operations, visible(front.torque_error.estimation),
             color="#0969da", marker="o", markersize=3, linewidth=1.0, label="terms left out too",
         )  # fmt: skip
         one.semilogy(
-            front.operations, visible(front.torque_error_validation),
+            front.operations, visible(front.torque_error.validation),
             color="#0969da", marker="o", markersize=4, markerfacecolor="none", linestyle="none",
         )  # fmt: skip
         one.axhline(data.terms.torque_budget, color="#cf222e", linewidth=0.8, label="budget")

@@ -10,4 +10,4 @@ from paramreduce_cli.report.style import error_figure
 @placed(PageSection.HEURISTICS, 2)
 def torque_error(data: ReportData) -> Figure:
     """Torque error against the number of parameters, on both sets. What several heuristics found is drawn once, for the first of them."""
-    return error_figure(data, "torque_error", r"$\varepsilon_\tau$")
+    return error_figure(data, "torque", r"$\varepsilon_\tau$")

@@ -18,7 +18,7 @@ def joint_errors(data: ReportData) -> Table:
     for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist():
         cells = [data.joint_label(j)]
         for which, rms in data.rms_torque.items():
-            relative = float(getattr(result, f"torque_error_joint_{which}")[row][j])
+            relative = float(result.joint_torque_error[which][row][j])
             unit = data.force_unit(j)
             cells.append(f"{relative * rms[j]:.2g} {unit}" if unit else "")
             cells.append(format_percent(relative) if rms[j] > NO_TORQUE else "no torque")

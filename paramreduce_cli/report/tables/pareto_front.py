@@ -19,11 +19,11 @@ def pareto_front(data: ReportData) -> Table:
             text
             for what in ("torque", "acceleration")
             for text in (
-                format_percent(float(getattr(r, f"{what}_error_estimation")[k])),
-                format_percent(float(getattr(r, f"{what}_error_validation")[k])),
-                format_percent_range(*ErrorRange.of(getattr(r, f"{what}_error_test")[k])),
+                format_percent(float(r.error(what).estimation[k])),
+                format_percent(float(r.error(what).validation[k])),
+                format_percent_range(*ErrorRange.of(r.error(what).test[k])),
             )
         ]
-        counts = (r.operations_inverse, r.operations_direct)
+        counts = (r.operations.inverse, r.operations.direct)
         rows.append((model.heuristic, str(model.n), *errors, *(str(int(c[k])) for c in counts)))
     return Table("Pareto front", header, tuple(rows))

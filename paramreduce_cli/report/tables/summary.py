@@ -21,10 +21,10 @@ def summary(data: ReportData) -> Table:
                 function_cells(
                     key,
                     full.get(f"operations_{key}"),
-                    getattr(r, f"operations_{key}")[k],
-                    getattr(r, f"{error}_error_estimation")[k],
-                    getattr(r, f"{error}_error_validation")[k],
-                    ErrorRange.of(getattr(r, f"{error}_error_test")[k]),
+                    r.operations[key][k],
+                    r.error(error).estimation[k],
+                    r.error(error).validation[k],
+                    ErrorRange.of(r.error(error).test[k]),
                 )
                 for key, error in (("inverse", "torque"), ("direct", "acceleration"))
             )

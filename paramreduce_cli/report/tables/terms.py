@@ -21,10 +21,10 @@ def terms(data: ReportData) -> Table:
     labels = {key: label for key, label, _ in FUNCTIONS}
     for name, one in (data.terms.functions if data.terms is not None else {}).items():
         shown = (
-            _known(one.torque_error_estimation), _known(one.torque_error_validation),
-            format_percent_range(*ErrorRange.of(one.torque_error_test)),
-            _known(one.acceleration_error_estimation), _known(one.acceleration_error_validation),
-            format_percent_range(*ErrorRange.of(one.acceleration_error_test)),
+            _known(one.torque_error.estimation), _known(one.torque_error.validation),
+            format_percent_range(*ErrorRange.of(one.torque_error.test)),
+            _known(one.acceleration_error.estimation), _known(one.acceleration_error.validation),
+            format_percent_range(*ErrorRange.of(one.acceleration_error.test)),
             _known(one.random_torque_error), _known(one.random_acceleration_error),
         )  # fmt: skip
         eigenvalue = one.smallest_eigenvalue

@@ -1,0 +1,82 @@
+"""Errors and costs of models, by set and by function."""
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from paramreduce_cli.records.arrays import FloatArray
+
+
+class ErrorRange(NamedTuple):
+    """Errors over the motions of the test set; not numbers where there are none."""
+
+    median: float
+    least: float
+    worst: float
+
+    @classmethod
+    def of(cls, errors: FloatArray) -> "ErrorRange":
+        """Return the range of one model's errors, (n_motions,)."""
+        if not errors.size:
+            return NO_MOTIONS
+        return cls(float(np.median(errors)), float(errors.min()), float(errors.max()))
+
+
+NO_MOTIONS = ErrorRange(np.nan, np.nan, np.nan)
+
+
+@dataclass(frozen=True)
+class _Named:
+    """A record whose fields can be taken by a name that is known only at run time."""
+
+    def __getitem__(self, name: str) -> Any:
+        return getattr(self, name)
+
+
+@dataclass(frozen=True)
+class ModelErrors(_Named):
+    """Relative errors of one model on each set."""
+
+    estimation: float
+    validation: float
+    test: FloatArray
+    """Errors on every motion of the test set, which no search looks at, (n_motions,)."""
+
+
+@dataclass(frozen=True)
+class SetErrors(_Named):
+    """Relative errors of several models on each set, a row for each model."""
+
+    estimation: FloatArray
+    """(m,)"""
+    validation: FloatArray
+    """(m,)"""
+    test: FloatArray
+    """Errors on every motion of the test set, (m, n_motions); no columns where there is no test set."""
+
+
+@dataclass(frozen=True)
+class JointErrors(_Named):
+    """Relative errors of single joints on each set, (m, n_dof); over all motions of the test set together."""
+
+    estimation: FloatArray
+    validation: FloatArray
+    test: FloatArray
+
+
+@dataclass(frozen=True)
+class Operations(_Named):
+    """Operations of the lean functions, (m,); not a number where a model is not shown, and so not counted."""
+
+    inverse: FloatArray
+    direct: FloatArray
+
+
+@dataclass(frozen=True)
+class MassMatrices(_Named):
+    """Properties of the mass matrices of models over the samples, (m,)."""
+
+    condition: FloatArray
+    """Largest condition number."""
+    smallest_eigenvalue: FloatArray
