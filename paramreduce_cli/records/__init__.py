@@ -5,6 +5,7 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 """
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.artifacts import Artifacts
 from paramreduce_cli.records.errors import (
     NO_MOTIONS,
     ErrorRange,

@@ -68,7 +68,7 @@ def answer(data: ReportData, asked: str) -> Answer:
         ),
         as_identified=_as_identified(data),
         weighted=_WEIGHTED[data.weighting],
-        command=export if data.known_model is not None else f"{export} --format values",
+        command=export if data.model is not None else f"{export} --format values",
     )
 
 
@@ -105,9 +105,9 @@ _KINDS = {
 
 def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
     """Of the parameters that are shown."""
-    if data.known_model is None:
+    if data.model is None:
         return ()
-    parameters = data.known_model.mechanism.parameters
+    parameters = data.model.mechanism.parameters
     symbols = {parameters[k].kind.symbol for k in data.validation.selected.model.first}
     both = {f"I{a}{b}" for a in "xyz" for b in "xyz"}
     return tuple(
@@ -124,18 +124,18 @@ def _as_identified(data: ReportData) -> bool:
 
 def _worst_joint(data: ReportData) -> str:
     """By the share of its rating, or of its torques where that is not given, on the validation set if there is one."""
-    if data.known_model is None:
+    if data.model is None:
         return ""
     name, rms = list(data.rms_torque.items())[-1]
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.row(selected.n)
     errors = result.joint_torque_error[name][row] * rms
-    rated = data.known_model.nominal_torque_given
-    sizes = data.known_model.nominal_torque if rated else np.maximum(rms, NO_TORQUE)
+    rated = data.model.nominal_torque_given
+    sizes = data.model.nominal_torque if rated else np.maximum(rms, NO_TORQUE)
     shares = np.where(np.isfinite(errors), errors / sizes, -np.inf)
     j = int(shares.argmax())
-    label = data.known_model.mechanism.coordinate_names[j]
+    label = data.model.mechanism.coordinate_names[j]
     whole = _two_digits(rms[j]) if rms[j] > NO_TORQUE else "no"
     unit = data.force_unit(j)
     rating = f" (rated {_two_digits(sizes[j])} {unit})" if rated else ""
@@ -151,6 +151,6 @@ def _nanoseconds(data: ReportData, speed: Speed | None, of_loops: str) -> str:
     if speed is None:
         return ""
     full, reduced = (1e9 * seconds for seconds in speed.seconds.values())
-    assert data.known_model is not None
-    given = "" if data.known_model.mechanism.loops is None else f"{of_loops} handed in: "
+    assert data.model is not None
+    given = "" if data.model.mechanism.loops is None else f"{of_loops} handed in: "
     return f"{given}{reduced:.3g} ns instead of {full:.3g} ns in {speed.language}"

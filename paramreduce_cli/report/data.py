@@ -6,20 +6,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paramreduce_cli.records import (
+    Artifacts,
     Block,
     CountedDynamics,
     FloatArray,
-    Identification,
-    MeasuredLog,
     Model,
     ReducedModel,
-    Reduction,
     Samples,
     Speed,
-    TermReduction,
     Tracking,
-    Trajectories,
-    Validation,
 )
 from paramreduce_cli.report.skeleton import Animation, Skeleton
 
@@ -50,17 +45,12 @@ class ShownMotion:
 
 
 @dataclass(frozen=True)
-class ReportData:
-    """What the report is made from."""
+class ReportData(Artifacts):
+    """What the report is made from; without a model the sections of a mechanism are left out."""
 
     title: str
-    known_model: Model | None
-    """None of samples that were brought without a robot; sections of a mechanism are then left out."""
-    trajectories: Trajectories | None
     symmetries: int
     """How many symmetries complete the estimation set."""
-    reduction: Reduction
-    validation: Validation
     weighting: str
     """Of the residuals in fits, as the config names it."""
     counted: CountedDynamics
@@ -80,59 +70,53 @@ class ReportData:
     """Of their direct dynamics."""
     tracking: Tracking | None
     """Where it was asked for."""
-    log: MeasuredLog | None
-    """Where there is one."""
-    identification: Identification | None
-    """Where torques were measured."""
-    terms: TermReduction | None
-    """Where terms were left out."""
 
     @property
     def n_affecting(self) -> int:
         """How many parameters act on the torques: columns of the observation matrix that are not zero."""
-        if self.known_model is None:
+        if self.model is None:
             return self.reduction.n_affecting
-        return int(self.known_model.affecting.sum())
+        return int(self.model.affecting.sum())
 
     def unit(self, parameter: int) -> str:
         """Of a standard parameter; empty for columns that were brought without a robot."""
-        if self.known_model is None:
+        if self.model is None:
             return ""
-        return self.known_model.mechanism.parameters[parameter].unit
+        return self.model.mechanism.parameters[parameter].unit
 
     def force_unit(self, joint: int) -> str:
         """Of what acts on a joint; nothing is known of those that were brought without a robot."""
-        if self.known_model is None:
+        if self.model is None:
             return ""
-        mechanism = self.known_model.mechanism
+        mechanism = self.model.mechanism
         kind = mechanism.bodies[mechanism.independent[joint]].joint
         return "N m" if kind == "revolute" else "N"
 
     def joint_label(self, joint: int) -> str:
         """Name of a joint's coordinate."""
-        if self.known_model is None:
+        if self.model is None:
             return f"joint {joint + 1}"
-        return self.known_model.mechanism.coordinate_names[joint]
+        return self.model.mechanism.coordinate_names[joint]
 
     @property
     def functions(self) -> tuple[str, str]:
         """What is counted: inverse and direct dynamics."""
-        if self.known_model is None or self.known_model.mechanism.loops is None:
+        if self.model is None or self.model.mechanism.loops is None:
             return "d", "[M | δ]"
         if self.counted is CountedDynamics.INDEPENDENT:
             return "d_z", "[M_zz | δ_z]"
         return "d_q", "[M_qq | δ_q]"
 
     @property
-    def model(self) -> Model:
+    def robot_model(self) -> Model:
         """The model, for what is of a mechanism.
 
         Raises:
             LookupError: There is none.
         """
-        if self.known_model is None:
+        if self.model is None:
             raise LookupError("a figure or a table of a mechanism, and there is none")
-        return self.known_model
+        return self.model
 
 
 def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:

@@ -38,7 +38,7 @@ def explorer(data: ReportData) -> dict[str, Any]:
     return {
         "selected": {"heuristic": selected.heuristic, "n": selected.n},
         "measured": data.identification is not None,
-        "counted": data.known_model is not None,
+        "counted": data.model is not None,
         "functions": data.functions,
         "joints": _joints(data),
         "columns": _columns(data, shown),
@@ -107,7 +107,7 @@ def _curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
 
 
 def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
-    counted = data.known_model is not None
+    counted = data.model is not None
     return {
         "torque": {s: packed(_drawn(result, "torque", s)) for s in SETS},
         "joints": {
@@ -157,10 +157,10 @@ def _joints(data: ReportData) -> list[dict[str, Any]]:
 def _columns(data: ReportData, shown: IntArray) -> list[dict[str, str]]:
     """What is chosen among, with the body or drive that each belongs to."""
     columns = data.reduction.columns
-    if data.known_model is None:
+    if data.model is None:
         return [{"name": columns.names[k], "symbol": columns.names[k], "owner": "", "unit": ""}
                 for k in shown]  # fmt: skip
-    parameters = data.known_model.mechanism.parameters
+    parameters = data.model.mechanism.parameters
     result = []
     for k in shown:
         first = parameters[int(np.flatnonzero(columns.column == k)[0])]

@@ -65,7 +65,7 @@ def methods(data: ReportData) -> tuple[str, str]:
 
 
 def _sentences(data: ReportData) -> Iterator[str]:
-    if data.known_model is not None:
+    if data.model is not None:
         yield from _model(data)
     yield from _excitation(data)
     yield from _selection(data)
@@ -78,7 +78,7 @@ def _sentences(data: ReportData) -> Iterator[str]:
 
 
 def _model(data: ReportData) -> Iterator[str]:
-    model = data.model
+    model = data.robot_model
     mechanism = model.mechanism
     freedom = f"{mechanism.n_dof} degree{'s' if mechanism.n_dof > 1 else ''} of freedom"
     loops = ", closed kinematic loops" if mechanism.loops is not None else ""
@@ -96,7 +96,7 @@ def _excitation(data: ReportData) -> Iterator[str]:
         yield _measured(data.log)
     elif data.trajectories is not None:
         yield _trajectories(data.trajectories)
-    elif data.known_model is None:
+    elif data.model is None:
         yield "The observation matrix and the forces were given."
     elif data.simulated:
         yield "The states of all sets are those of simulated motions of the full model."
@@ -184,7 +184,7 @@ def _result(data: ReportData) -> Iterator[str]:
             f"{format_percent_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
         )
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
-    if data.known_model is not None:
+    if data.model is not None:
         full = data.validation.full["operations_inverse"]
         reduced = int(result.operations.inverse[row])
         yield (

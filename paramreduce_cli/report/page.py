@@ -60,7 +60,7 @@ def render_page(
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["percent"] = format_percent
-    model = data.known_model
+    model = data.model
     loops = model is not None and model.mechanism.loops is not None
     context = {"s": summary, "loops": loops, "answer": answer(data, provenance.asked)}
     items = _items(images, made)

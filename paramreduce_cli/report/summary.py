@@ -8,6 +8,7 @@ import numpy as np
 from paramreduce_cli.records import (
     SETS,
     About,
+    Artifacts,
     ErrorRange,
     FloatArray,
     HeuristicValidation,
@@ -31,18 +32,12 @@ from paramreduce_cli.records import (
 
 
 def summary_of(
-    model: Model | None,
-    trajectories: Trajectories | None,
-    reduction: Reduction,
-    validation: Validation,
-    identification: Identification | None,
-    terms: TermReduction | None,
-    leanest: Mapping[str, Leanest],
-    provenance: Provenance,
+    artifacts: Artifacts, leanest: Mapping[str, Leanest], provenance: Provenance
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite ones become None, and so do those
     that only a mechanism tells where there is none.
     """
+    model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
     chosen = validation.heuristics[selected.heuristic]
     data = {
@@ -51,7 +46,7 @@ def summary_of(
         "versions": dict(provenance.versions),
         "seconds": dict(provenance.seconds),
         "model": _brought(reduction) if model is None else _model(model),
-        "trajectories": _trajectories(trajectories),
+        "trajectories": _trajectories(artifacts.trajectories),
         "reduction": {
             **{name: _subsets(reduction, found) for name, found in reduction.heuristics.items()},
             "proofs": _proofs(reduction),
@@ -59,8 +54,8 @@ def summary_of(
         },
         "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
         "full": dict(validation.full),
-        "identification": _identification(identification),
-        "terms": _terms(model, terms),
+        "identification": _identification(artifacts.identification),
+        "terms": _terms(model, artifacts.terms),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,

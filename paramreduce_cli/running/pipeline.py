@@ -13,6 +13,7 @@ from paramreduce_cli.artifacts.store import LAYOUTS
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.sections import has_default, is_section
 from paramreduce_cli.records import (
+    Artifacts,
     Coefficients,
     Identification,
     Items,
@@ -43,6 +44,8 @@ class StageInput:
     name: str
     type: type
     optional: bool
+    parameter: str = ""
+    """Parameter that takes this input as a field of :class:`Artifacts`; empty for a parameter of its own."""
 
 
 @dataclass(frozen=True)
@@ -80,6 +83,18 @@ class Stage:
         """Whether several jobs can do its items."""
         return any(entry.type is Items for entry in self.inputs)
 
+    def call(self, values: dict[str, Any]) -> Any:
+        """Call the stage's function.
+
+        Args:
+            values: Values of its inputs by name.
+        """
+        arguments = {entry.name: values[entry.name] for entry in self.inputs if not entry.parameter}
+        for parameter in {entry.parameter for entry in self.inputs if entry.parameter}:
+            own = {e.name: values[e.name] for e in self.inputs if e.parameter == parameter}
+            arguments[parameter] = Artifacts(**own)
+        return self.function(**arguments)
+
     @property
     def needs_config(self) -> bool:
         """Whether it cannot run on brought samples alone."""
@@ -92,13 +107,20 @@ def describe_stage(name: str, function: Callable[..., Any]) -> Stage:
     """Read a stage's signature."""
     hints = typing.get_type_hints(function)
     output = hints.pop("return")
-    inputs = []
+    inputs: list[StageInput] = []
     for parameter in inspect.signature(function).parameters:
-        hint = hints[parameter]
-        optional = isinstance(hint, types.UnionType)
-        members = [a for a in typing.get_args(hint) if a is not type(None)] if optional else [hint]
-        inputs.append(StageInput(parameter, members[0], optional))
+        if hints[parameter] is Artifacts:
+            fields = typing.get_type_hints(Artifacts).items()
+            inputs += [_describe_input(field, hint, parameter) for field, hint in fields]
+        else:
+            inputs.append(_describe_input(parameter, hints[parameter]))
     return Stage(name, function, tuple(inputs), output)
+
+
+def _describe_input(name: str, hint: Any, parameter: str = "") -> StageInput:
+    optional = isinstance(hint, types.UnionType)
+    members = [a for a in typing.get_args(hint) if a is not type(None)] if optional else [hint]
+    return StageInput(name, members[0], optional, parameter)
 
 
 @cache

@@ -55,7 +55,7 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
         ParamreduceError: It fails.
     """
     try:
-        return stage.function(**arguments)
+        return stage.call(arguments)
     except ConcernError as error:
         raise explained(error) from error
 

@@ -22,10 +22,9 @@ from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
     SETS,
+    Artifacts,
     CountedDynamics,
     FloatArray,
-    Identification,
-    MeasuredLog,
     Model,
     Progress,
     Provenance,
@@ -34,9 +33,7 @@ from paramreduce_cli.records import (
     Run,
     Samples,
     Selected,
-    TermReduction,
     Tracking,
-    Trajectories,
     Validation,
 )
 from paramreduce_cli.reduction.models import full_model
@@ -63,14 +60,8 @@ def report(
     search: ReductionSection,
     wanted: SelectedSection,
     counted: CountedDynamics,
-    model: Model | None,
-    trajectories: Trajectories | None,
+    artifacts: Artifacts,
     samples: Samples,
-    reduction: Reduction,
-    validation: Validation,
-    log: MeasuredLog | None,
-    identification: Identification | None,
-    terms: TermReduction | None,
     provenance: Provenance,
     run: Run,
 ) -> Report:
@@ -83,6 +74,7 @@ def report(
     from paramreduce_cli.report.page import render_page
     from paramreduce_cli.report.rendering import rendered
 
+    model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.blocks(), selected.model)
@@ -90,12 +82,9 @@ def report(
     direct = _running(model, selected, Exported.DDM) if running else {}
     states = {} if model is None else _states(model, motion)
     data = ReportData(
+        **vars(artifacts),
         title=section.title or provenance.robot,
-        known_model=model,
-        trajectories=trajectories,
         symmetries=len(sampling.symmetries),
-        reduction=reduction,
-        validation=validation,
         weighting=search.weighting,
         counted=counted,
         simulated=sampling.simulation is not None,
@@ -106,18 +95,13 @@ def report(
         speed=speed(running, states) if running else None,
         speed_direct=speed(direct, states) if direct else None,
         tracking=_tracking(section, model, running, motion),
-        log=log,
-        identification=identification,
-        terms=terms,
     )
     lean = {
         name: found
         for name in (("inverse", "direct") if model is not None else ())
-        if (found := leanest(name, wanted, validation.heuristics, terms)) is not None
+        if (found := leanest(name, wanted, validation.heuristics, artifacts.terms)) is not None
     }
-    summary = summary_of(
-        model, trajectories, reduction, validation, identification, terms, lean, provenance
-    )
+    summary = summary_of(artifacts, lean, provenance)
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _shown(figures, model)]
 

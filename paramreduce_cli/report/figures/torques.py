@@ -16,7 +16,7 @@ _ANY = "#7d8590"
 def torques(data: ReportData) -> Figure:
     """Torques as they were given or measured, and those of the selected model, along the validation set."""
     modelled = data.identification is None
-    label = ("full" if data.known_model is not None else "given") if modelled else "measured"
+    label = ("full" if data.model is not None else "given") if modelled else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
     n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1

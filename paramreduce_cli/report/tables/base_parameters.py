@@ -8,11 +8,11 @@ from paramreduce_cli.texts.table import Table
 @placed(PageSection.BASE, 1, tall=True)
 def base_parameters(data: ReportData) -> Table:
     """The base parameters with the relations that regroup the others."""
-    base = data.model.base
+    base = data.robot_model.base
     rows = [
         (str(k + 1), expression, f"{value:.6g}")
         for k, (expression, value) in enumerate(
-            zip(base.expressions, data.model.base_values, strict=True)
+            zip(base.expressions, data.robot_model.base_values, strict=True)
         )
     ]
     return Table("Base parameters", ("no.", "expression", "value"), tuple(rows))

@@ -9,12 +9,12 @@ from paramreduce_cli.texts.table import Table
 @placed(PageSection.MECHANISM, 4)
 def drives(data: ReportData) -> Table:
     """Rotors, friction and springs; motions are coordinates with weights."""
-    mechanism = data.model.mechanism
+    mechanism = data.robot_model.mechanism
     rows = []
     for drive in mechanism.drives:
         columns = mechanism.drive_columns(drive)
         cells = [
-            _cell(mechanism.parameters[columns[kind]], data.model.values[columns[kind]])
+            _cell(mechanism.parameters[columns[kind]], data.robot_model.values[columns[kind]])
             if kind in columns
             else ""
             for kind in DRIVE

@@ -9,10 +9,10 @@ from paramreduce_cli.texts.table import Table
 @placed(PageSection.MECHANISM, 3)
 def dynamic_parameters(data: ReportData) -> Table:
     """The parameters of every body and payload."""
-    values = data.model.values
+    values = data.robot_model.values
     rows = [
         (rigid.name, *(f"{values[rigid.columns[kind]]:g}" for kind in INERTIAL))
-        for rigid in data.model.mechanism.rigid
+        for rigid in data.robot_model.mechanism.rigid
     ]
     units = ", ".join(dict.fromkeys(kind.unit for kind in INERTIAL)).replace("^2", "²")
     header = ("body", *(kind.symbol for kind in INERTIAL))

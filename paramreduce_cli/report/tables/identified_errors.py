@@ -19,8 +19,8 @@ def identified_errors(data: ReportData) -> Table:
     )  # fmt: skip
     rows = []
     if found is not None:
-        nominal = data.model.nominal_torque if data.model.nominal_torque_given else None
-        for j, name in enumerate(data.model.mechanism.coordinate_names):
+        nominal = data.robot_model.nominal_torque if data.robot_model.nominal_torque_given else None
+        for j, name in enumerate(data.robot_model.mechanism.coordinate_names):
             if not math.isfinite(found.torque_deviation[j]):
                 continue
             error = float(found.reduced.joint_held_out[j])

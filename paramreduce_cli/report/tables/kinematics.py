@@ -8,5 +8,5 @@ from paramreduce_cli.texts.table import Table
 @placed(PageSection.MECHANISM, 2)
 def kinematics(data: ReportData) -> Table:
     """The geometry as the config gives it."""
-    header, *rows = data.model.mechanism.table
+    header, *rows = data.robot_model.mechanism.table
     return Table("Kinematic parameters (m, rad)", header, tuple(rows))

@@ -14,7 +14,7 @@ def operations(data: ReportData) -> Table:
         for function in ("inverse", "direct")
         for rule in ("", "_plain", "_paper_rule")
     )
-    affecting, base = int(data.model.affecting.sum()), data.model.base.columns.size
+    affecting, base = int(data.robot_model.affecting.sum()), data.robot_model.base.columns.size
     named = [("full", affecting, ""), ("base", base, "base_")]
     named.append((selected.heuristic, selected.n, "selected_"))
     rows = [

@@ -17,7 +17,7 @@ def term_differences(data: ReportData) -> Table:
     header = ("function", "joint", "largest", "of nominal", "position", "velocity", "acceleration")
     rows = []
     for name, one in functions.items():
-        for j, joint in enumerate(data.model.mechanism.coordinate_names):
+        for j, joint in enumerate(data.robot_model.mechanism.coordinate_names):
             largest, nominal = one.largest_difference[j], data.reduction.nominal_torque[j]
             star = " *" if j == one.worst_joint else ""
             sizes = (

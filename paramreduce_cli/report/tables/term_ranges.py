@@ -16,7 +16,7 @@ def term_ranges(data: ReportData) -> Table:
     rows: list[tuple[str, ...]] = []
     if functions:
         one = max(functions.values(), key=lambda one: one.mass_states)
-        mechanism = data.model.mechanism
+        mechanism = data.robot_model.mechanism
         for j, joint in enumerate(mechanism.coordinate_names):
             extremes = (*zip(one.lower[:, j], one.upper[:, j], strict=True), *one.drawn[:, :, j].T)
             unit = mechanism.bodies[mechanism.independent[j]].unit

@@ -1,0 +1,24 @@
+"""What stages have made of one robot."""
+
+from dataclasses import dataclass
+
+from paramreduce_cli.records.logs import Identification, MeasuredLog
+from paramreduce_cli.records.model import Model
+from paramreduce_cli.records.reduction import Reduction
+from paramreduce_cli.records.terms import TermReduction
+from paramreduce_cli.records.trajectories import Trajectories
+from paramreduce_cli.records.validation import Validation
+
+
+@dataclass(frozen=True)
+class Artifacts:
+    """Artifacts of one robot, without its samples; None where a stage has nothing to do."""
+
+    model: Model | None
+    """None where samples were brought without a robot."""
+    trajectories: Trajectories | None
+    reduction: Reduction
+    validation: Validation
+    log: MeasuredLog | None
+    identification: Identification | None
+    terms: TermReduction | None
