@@ -13,10 +13,11 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.expressions.scaling import rescaled
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
 from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.pruning import Pruning
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import Step, TermSearch
 from paramreduce_cli.terms.starts import Start
-from paramreduce_cli.terms.tape import Outputs, Remains, Tape
+from paramreduce_cli.terms.tape import Outputs, Tape
 
 _LEG = 0.88
 """Share of the operations that are left when a program is rewritten on its way down."""
@@ -87,7 +88,7 @@ class Passed:
 
     tape: Tape
     """The program that it is what is left of."""
-    left: Remains
+    pruning: Pruning
     beta: FloatArray
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
@@ -114,7 +115,7 @@ class Way:
 
     def simplified(self, passed: Passed, dice: int = 0) -> Simplified:
         """A program on the way, its sums and products rearranged; how hangs on the dice."""
-        program, sizes = rescaled(passed.tape.rebuilt(passed.left), passed.beta.size)
+        program, sizes = rescaled(passed.tape.rebuilt(passed.pruning), passed.beta.size)
         graph = Graph()
         program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))], dice))
         return Simplified(self.start, program, passed.beta / sizes, passed.units * sizes)
@@ -220,7 +221,9 @@ class Descent:
         known = self.visited.get(step.count)
         if known is None or step.fit.excess < known.excess:
             fit = step.fit
-            passed = Passed(self.search.tape, fit.left, fit.beta, self.units, fit.cost, fit.excess)
+            passed = Passed(
+                self.search.tape, fit.pruning, fit.beta, self.units, fit.cost, fit.excess
+            )
             self.visited[step.count] = passed
 
 
@@ -237,7 +240,7 @@ def gone_on(way: Way, searching: Callable[[Tape], TermSearch]) -> Way | None:
     tried: list[Way] = []
     for count, passed in sorted(way.visited.items()):
         search = searching(passed.tape)
-        end = search.mended(passed.left, passed.beta)
+        end = search.mended(passed.pruning, passed.beta)
         if not end.fit.within:
             continue
         descent = Descent(way.start, searching, search, end, passed.units, {})

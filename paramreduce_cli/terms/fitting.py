@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.terms.kernels import WHOLE
 from paramreduce_cli.terms.likeness import Ways, alike
 from paramreduce_cli.terms.matrices import positive_definite, roots, times, whitening
+from paramreduce_cli.terms.pruning import WHOLE, Pruning
 from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.tape import Outputs, Remains, Tape
+from paramreduce_cli.terms.tape import Outputs, Tape
 
 _LARGEST = 1e100
 """Share of an allowed error from which on it does not matter how large it is."""
@@ -86,9 +86,9 @@ class Linear:
         lengths = np.linalg.norm(directions, axis=1)
         e = combinations[one] @ beta / lengths
         t = e - np.einsum("cn,cn->c", C[one], directions) / lengths
-        left = t**2 + np.maximum(size[one] - explained[one], 0.0)
-        gone = left <= _NOTHING * (e**2 + size[one])
-        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, left)
+        pruning = t**2 + np.maximum(size[one] - explained[one], 0.0)
+        gone = pruning <= _NOTHING * (e**2 + size[one])
+        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, pruning)
         again[one] = sure[one] = e**2 - np.where(gone, 0.0, regained)
         return Costs(again, plain, sure)
 
@@ -101,7 +101,7 @@ class Linear:
 class TermFit:
     """What remains of a program, its parameters fitted."""
 
-    left: Remains
+    pruning: Pruning
     beta: FloatArray
     """(n_parameters,)"""
     torque_error: float
@@ -159,22 +159,22 @@ class Fitting:
         inputs[: self.n], inputs[self.n :] = beta[:, None], samples.states
         return inputs
 
-    def fit(self, left: Remains, beta: FloatArray, looks: int = 1) -> TermFit:
+    def fit(self, pruning: Pruning, beta: FloatArray, looks: int = 1) -> TermFit:
         """Fit the parameters.
 
         Args:
-            left: Of the program.
+            pruning: Of the program.
             beta: Values to start from, for the mass matrices that accelerations are found with.
             looks: How often these are found anew.
         """
         samples = self.samples
-        needed = self.tape.needed(left)
-        values = self.tape.values(left, self._inputs(beta, samples), needed)
+        needed = self.tape.needed(pruning)
+        values = self.tape.values(pruning, self._inputs(beta, samples), needed)
         present = self._parameters >= 0
-        present[present] = left.kept[self._parameters[present], WHOLE]
+        present[present] = pruning.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
         W[present] = self.tape.adjoints_of(
-            left, values, samples.seeds, self._in_parameters, self._parameters[present]
+            pruning, values, samples.seeds, self._in_parameters, self._parameters[present]
         )
         inverse = samples.inverse_masses(self.tape.outputs(values))
         for _ in range(looks):
@@ -186,27 +186,27 @@ class Fitting:
             if not samples.direct:
                 break
             # Accelerations go with the mass matrices of the fitted values.
-            values = self.tape.values(left, self._inputs(beta, samples), needed)
+            values = self.tape.values(pruning, self._inputs(beta, samples), needed)
             inverse = samples.inverse_masses(self.tape.outputs(values))
         residual = self._weighed(off[None], metric)[0]
         errors = self._errors(off, inverse)
-        return self._judged(left, beta, errors, Linear(rows, factor, residual, metric))
+        return self._judged(pruning, beta, errors, Linear(rows, factor, residual, metric))
 
     def _judged(
-        self, left: Remains, beta: FloatArray, errors: tuple[float, float], linear: Linear
+        self, pruning: Pruning, beta: FloatArray, errors: tuple[float, float], linear: Linear
     ) -> TermFit:
         shares = self._shares(errors)
         cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
         strain = cost
         if self._watched is not None and max(shares) <= 1.0:
-            watched = self._shares(self.errors(left, beta, self._watched))
+            watched = self._shares(self.errors(pruning, beta, self._watched))
             strain += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
             shares += watched
         if self._poses is not None and max(shares) <= 1.0:
-            masses = self._poses.mass_matrices(self._outputs(left, beta, self._poses))
+            masses = self._poses.mass_matrices(self._outputs(pruning, beta, self._poses))
             if not positive_definite(masses):
                 shares.append(np.inf)
-        return TermFit(left, beta, *errors, cost, strain, float(np.max(shares)), linear)
+        return TermFit(pruning, beta, *errors, cost, strain, float(np.max(shares)), linear)
 
     def _shares(self, errors: tuple[float, float]) -> list[float]:
         """Errors over the allowed ones."""
@@ -227,19 +227,21 @@ class Fitting:
         caused = np.einsum("mij,jm->im", inverse, off) * self._acceleration_scale[:, None]
         return torque, float(np.linalg.norm(caused))
 
-    def errors(self, left: Remains, beta: FloatArray, samples: TermSamples) -> tuple[float, float]:
+    def errors(
+        self, pruning: Pruning, beta: FloatArray, samples: TermSamples
+    ) -> tuple[float, float]:
         """Errors of torques and of accelerations on other samples."""
-        return samples.errors(self._outputs(left, beta, samples))
+        return samples.errors(self._outputs(pruning, beta, samples))
 
-    def _outputs(self, left: Remains, beta: FloatArray, samples: TermSamples) -> Outputs:
+    def _outputs(self, pruning: Pruning, beta: FloatArray, samples: TermSamples) -> Outputs:
         """Of the program."""
-        values = self.tape.values(left, self._inputs(beta, samples), self.tape.needed(left))
+        values = self.tape.values(pruning, self._inputs(beta, samples), self.tape.needed(pruning))
         return self.tape.outputs(values)
 
     def effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
         """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
         values, own, adjoints = self._derived(fit)
-        found = self.tape.effects(fit.left, candidates, values, own, adjoints)
+        found = self.tape.effects(fit.pruning, candidates, values, own, adjoints)
         return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
     def stand_ins(self, fit: TermFit) -> tuple[Ways, FloatArray, FloatArray]:
@@ -249,7 +251,7 @@ class Fitting:
         """
         values, _, adjoints = self._derived(fit)
         pulls = self._weighed(adjoints, fit.linear.metric).reshape(adjoints.shape)
-        itself = fit.left.kept[:, WHOLE] & (fit.left.source == np.arange(self.tape.size))
+        itself = fit.pruning.kept[:, WHOLE] & (fit.pruning.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
         ways = alike(values, pulls, residual, self._made & itself, self._in_parameters)
         constants = self.tape.constants()
@@ -258,9 +260,9 @@ class Fitting:
     def _derived(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Values of the nodes, what they would be, and derivatives of the torques by them."""
         inputs, everywhere = self._inputs(fit.beta, self.samples), np.ones(self.tape.size, np.bool_)
-        values = self.tape.values(fit.left, inputs, everywhere)
-        adjoints = self.tape.adjoints(fit.left, values, self.samples.seeds, everywhere)
-        return values, self.tape.own_values(fit.left, inputs, values), adjoints
+        values = self.tape.values(fit.pruning, inputs, everywhere)
+        adjoints = self.tape.adjoints(fit.pruning, values, self.samples.seeds, everywhere)
+        return values, self.tape.own_values(fit.pruning, inputs, values), adjoints
 
     def _metric(self, inverse: FloatArray | None) -> FloatArray | None:
         """Square roots of the quadratic forms that take differences of torques to the cost.

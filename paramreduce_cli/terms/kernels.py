@@ -1,6 +1,6 @@
 """What a :class:`paramreduce_cli.terms.tape.Tape` computes again and again, compiled by Numba.
 
-Of a program in arrays: codes of the operations, signed operands, which of them are kept, and what nodes stand for.
+Each takes the program before pruning, and the pruning.
 """
 
 from __future__ import annotations
@@ -9,6 +9,15 @@ import numpy as np
 
 from paramreduce_cli.expressions.loops import compiled, inlined
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
+from paramreduce_cli.terms.pruning import (
+    FIRST,
+    ITSELF,
+    NUMBER,
+    SECOND,
+    WHOLE,
+    Instructions,
+    Pruning,
+)
 
 CONSTANT, INPUT, SUM, PRODUCT, SIN, COS, TANH, SIGN = range(8)
 CODES = {
@@ -18,19 +27,15 @@ CODES = {
 NONE = -1
 SEVERAL = -2
 """In place of a number where there is more than one."""
-FIRST, SECOND, WHOLE, ITSELF = range(4)
-"""What of a node can be otherwise: its operands in a sum, whether it is zero, what it stands for."""
-NUMBER = -1
-"""What a node stands for that is a number."""
 
 
 @compiled()
-def needed(
-    codes: IntArray, operands: IntArray, outputs: IntArray, kept: BoolArray, source: IntArray
-) -> BoolArray:
+def needed(program: Instructions, pruning: Pruning) -> BoolArray:
     """Nodes that outputs are made of, (n_nodes,)."""
+    codes, operands = program.codes, program.operands
+    kept, source = pruning.kept, pruning.source
     used = np.zeros(codes.size, dtype=np.bool_)
-    for value in outputs:
+    for value in program.outputs:
         used[value >> 1] = True
     for k in range(codes.size - 1, -1, -1):
         code = codes[k]
@@ -56,15 +61,15 @@ def _multiple(factor: float, values: FloatArray, result: FloatArray) -> None:
 @compiled(within=True)
 def _made(
     k: int,
-    codes: IntArray,
-    operands: IntArray,
-    numbers: FloatArray,
-    kept: BoolArray,
+    program: Instructions,
+    pruning: Pruning,
     inputs: FloatArray,
     v: FloatArray,
     result: FloatArray,
 ) -> None:
     """What node k makes of its operands."""
+    codes, operands = program.codes, program.operands
+    numbers, kept = program.numbers, pruning.kept
     code, m = codes[k], inputs.shape[1]
     a, b = operands[k, 0] >> 1, operands[k, 1] >> 1
     s = -1.0 if operands[k, 0] & 1 else 1.0
@@ -98,22 +103,16 @@ def _made(
 
 @compiled()
 def values(
-    codes: IntArray,
-    operands: IntArray,
-    numbers: FloatArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
-    inputs: FloatArray,
-    which: BoolArray,
+    program: Instructions, pruning: Pruning, inputs: FloatArray, which: BoolArray
 ) -> FloatArray:
     """Of the nodes that are asked for, zero for others, (n_nodes, n_samples)."""
-    v = np.zeros((codes.size, inputs.shape[1]))
-    for k in range(codes.size):
+    kept, source, factor = pruning
+    v = np.zeros((program.codes.size, inputs.shape[1]))
+    for k in range(program.codes.size):
         if not which[k] or not kept[k, WHOLE]:
             continue
         if source[k] == k:
-            _made(k, codes, operands, numbers, kept, inputs, v, v[k])
+            _made(k, program, pruning, inputs, v, v[k])
         elif source[k] == NUMBER:
             v[k] = factor[k]
         else:
@@ -123,17 +122,12 @@ def values(
 
 @compiled()
 def own_values(
-    codes: IntArray,
-    operands: IntArray,
-    numbers: FloatArray,
-    kept: BoolArray,
-    inputs: FloatArray,
-    v: FloatArray,
+    program: Instructions, pruning: Pruning, inputs: FloatArray, v: FloatArray
 ) -> FloatArray:
     """What nodes would be if they were kept as they are, (n_nodes, n_samples)."""
     own = np.empty(v.shape)
-    for k in range(codes.size):
-        _made(k, codes, operands, numbers, kept, inputs, v, own[k])
+    for k in range(program.codes.size):
+        _made(k, program, pruning, inputs, v, own[k])
     return own
 
 
@@ -148,15 +142,7 @@ def _reach(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
 
 @compiled()
 def adjoints(
-    codes: IntArray,
-    operands: IntArray,
-    outputs: IntArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
-    v: FloatArray,
-    seeds: FloatArray,
-    which: BoolArray,
+    program: Instructions, pruning: Pruning, v: FloatArray, seeds: FloatArray, which: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
     """Derivatives by the nodes that are asked for.
 
@@ -164,6 +150,9 @@ def adjoints(
         Derivatives, (n_nodes, n_quantities, n_samples), and which of them there are, (n_nodes, n_quantities): to
         clear the others takes longer than all that is done here.
     """
+    codes, operands = program.codes, program.operands
+    outputs = program.outputs
+    kept, source, factor = pruning
     n, quantities, m = codes.size, seeds.shape[1], v.shape[1]
     found = np.empty((n, quantities, m))
     reached = np.zeros((n, quantities), dtype=np.bool_)
@@ -226,16 +215,16 @@ def adjoints(
 
 @compiled()
 def effects(
-    operands: IntArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
+    program: Instructions,
+    pruning: Pruning,
     candidates: IntArray,
     v: FloatArray,
     own: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
     """What terms give to quantities, (n_candidates, n_quantities n_samples)."""
+    operands = program.operands
+    kept, source, factor = pruning
     _, quantities, m = adjoints.shape
     result = np.empty((candidates.shape[0], quantities * m))
     given = np.empty(m)
@@ -263,21 +252,16 @@ def effects(
 
 
 @compiled()
-def combinations(
-    codes: IntArray,
-    operands: IntArray,
-    numbers: FloatArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
-    n: int,
-) -> tuple[IntArray, FloatArray]:
+def combinations(program: Instructions, pruning: Pruning, n: int) -> tuple[IntArray, FloatArray]:
     """Of which linear combination of the first n inputs nodes are a multiple.
 
     Returns:
         Nodes that are such combinations, NONE or SEVERAL, (n_nodes,); coefficients where a node is one,
         (n_nodes, n).
     """
+    codes, operands = program.codes, program.operands
+    numbers = program.numbers
+    kept, source, factor = pruning
     found = np.full(codes.size, NONE)
     coefficients = np.zeros((codes.size, n))
     number = np.zeros(codes.size)
@@ -327,15 +311,10 @@ def combinations(
 
 
 @compiled()
-def count(
-    codes: IntArray,
-    operands: IntArray,
-    outputs: IntArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
-) -> int:
+def count(program: Instructions, pruning: Pruning) -> int:
     """Operations that are left."""
+    codes, operands = program.codes, program.operands
+    kept, source, factor = pruning
     n = codes.size
     stands_for = np.arange(n)
     for k in range(n):
@@ -369,7 +348,7 @@ def count(
             elif a == NONE and code != COS:
                 stands_for[k] = NONE
     used = np.zeros(n, dtype=np.bool_)
-    for value in outputs:
+    for value in program.outputs:
         node = stands_for[value >> 1]
         if node != NONE:
             used[node] = True
@@ -390,16 +369,9 @@ def count(
 
 
 @compiled()
-def counts(
-    codes: IntArray,
-    operands: IntArray,
-    outputs: IntArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
-    candidates: IntArray,
-) -> IntArray:
+def counts(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
     """The same with one more term the other way round, (n_candidates,)."""
+    kept, source, factor = pruning
     result = np.empty(candidates.shape[0], dtype=np.int64)
     changed, sources = kept.copy(), source.copy()
     for c in range(candidates.shape[0]):
@@ -408,7 +380,7 @@ def counts(
             sources[k] = k
         else:
             changed[k, what] = not changed[k, what]
-        result[c] = count(codes, operands, outputs, changed, sources, factor)
+        result[c] = count(program, Pruning(changed, sources, factor))
         if what == ITSELF:
             sources[k] = source[k]
         else:
@@ -418,22 +390,19 @@ def counts(
 
 @compiled()
 def counts_standing(
-    codes: IntArray,
-    operands: IntArray,
-    outputs: IntArray,
-    kept: BoolArray,
-    source: IntArray,
-    factor: FloatArray,
+    program: Instructions,
+    pruning: Pruning,
     nodes: IntArray,
     standing_for: IntArray,
     times: FloatArray,
 ) -> IntArray:
     """The same with one more node standing for another one, (n_ways,)."""
+    kept, source, factor = pruning
     result = np.empty(nodes.size, dtype=np.int64)
     sources, factors = source.copy(), factor.copy()
     for c in range(nodes.size):
         k = nodes[c]
         sources[k], factors[k] = standing_for[c], times[c]
-        result[c] = count(codes, operands, outputs, kept, sources, factors)
+        result[c] = count(program, Pruning(kept, sources, factors))
         sources[k], factors[k] = source[k], factor[k]
     return result

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
-from paramreduce_cli.terms.kernels import NUMBER
+from paramreduce_cli.terms.pruning import NUMBER
 
 _OTHERS = 3
 """Nodes that are offered for each one."""

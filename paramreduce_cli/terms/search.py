@@ -12,8 +12,7 @@ import numpy as np
 
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.fitting import Costs, Fitting, TermFit
-from paramreduce_cli.terms.kernels import ITSELF
-from paramreduce_cli.terms.tape import Remains
+from paramreduce_cli.terms.pruning import ITSELF, Pruning
 
 _TRIED = 8
 """Most promising terms that are tried: by the error with parameters fitted again, and without."""
@@ -91,14 +90,14 @@ class TermSearch:
             visit(step)
         return step
 
-    def mended(self, left: Remains, beta: FloatArray) -> Step:
+    def mended(self, pruning: Pruning, beta: FloatArray) -> Step:
         """What is left of a program, with as many terms put back as errors need to be allowed, if that is enough.
 
         Args:
-            left: Of the program.
+            pruning: Of the program.
             beta: Values to start from.
         """
-        fit = self._fitting.fit(left, beta, looks=2)
+        fit = self._fitting.fit(pruning, beta, looks=2)
         back: list[int] = []
         while not fit.within:
             number = self._most_helpful(fit, back)
@@ -167,7 +166,7 @@ class TermSearch:
         """The program with one node that stands for another one, None if all are too dear."""
         fit = step.fit
         ways, values, pulls = self._fitting.stand_ins(fit)
-        counts = self.tape.counts_standing(fit.left, ways.nodes, ways.sources, ways.factors)
+        counts = self.tape.counts_standing(fit.pruning, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero(counts < step.count)
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
@@ -179,40 +178,40 @@ class TermSearch:
         ]
         tried = []
         for place in np.unique(np.concatenate(lists)):
-            changed = self._fitting.fit(fit.left.standing(*ways.one(place)), fit.beta)
+            changed = self._fitting.fit(fit.pruning.replace(*ways.one(place)), fit.beta)
             if changed.within:
                 tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
 
     def _useful(self, step: Step) -> tuple[IntArray, FloatArray]:
         """Numbers of terms without which there are fewer operations, and how many fewer."""
-        left = step.fit.left
+        pruning = step.fit.pruning
         # That a node is itself is no term to be left out: see stand-ins.
-        numbers = np.flatnonzero(self._droppable & left.has(self._candidates))
-        saved = step.count - self.tape.counts(left, self._candidates[numbers])
+        numbers = np.flatnonzero(self._droppable & pruning.has(self._candidates))
+        saved = step.count - self.tape.counts(pruning, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
     def _step(self, fit: TermFit) -> Step:
-        return Step(fit, self.tape.count(fit.left))
+        return Step(fit, self.tape.count(fit.pruning))
 
-    def _with(self, fit: TermFit, flipped: IntArray) -> TermFit:
+    def _with(self, fit: TermFit, flip: IntArray) -> TermFit:
         """Fitted with some terms the other way round."""
-        return self._fitting.fit(fit.left.flipped(flipped), fit.beta)
+        return self._fitting.fit(fit.pruning.flip(flip), fit.beta)
 
     def _costs(self, fit: TermFit, live: IntArray) -> Costs:
         """What leaving each term out costs."""
-        combinations = self.tape.combinations(fit.left, live, self._fitting.n)
+        combinations = self.tape.combinations(fit.pruning, live, self._fitting.n)
         return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
 
     def _most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
         """The number of the term to put back that helps most for what it costs, none of some; None if none helps."""
-        gone = ~fit.left.has(self._candidates)
+        gone = ~fit.pruning.has(self._candidates)
         gone[but] = False
         numbers = np.flatnonzero(gone)
         if not numbers.size:
             return None
         terms = self._candidates[numbers]
-        dearer = self.tape.counts(fit.left, terms) - self.tape.count(fit.left)
+        dearer = self.tape.counts(fit.pruning, terms) - self.tape.count(fit.pruning)
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.explained(G)

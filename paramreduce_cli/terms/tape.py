@@ -7,7 +7,6 @@ parameters, which are their first inputs, and stay so.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -16,51 +15,16 @@ from paramreduce_cli.expressions.graph import ZERO, Graph, Node
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms import kernels
-from paramreduce_cli.terms.kernels import (
-    CODES,
-    CONSTANT,
+from paramreduce_cli.terms.kernels import CODES, CONSTANT, INPUT, NONE, SUM
+from paramreduce_cli.terms.pruning import (
     FIRST,
-    INPUT,
     ITSELF,
-    NONE,
     NUMBER,
     SECOND,
-    SUM,
     WHOLE,
+    Instructions,
+    Pruning,
 )
-
-
-@dataclass(frozen=True)
-class Remains:
-    """What is left of a program."""
-
-    kept: BoolArray
-    """Of every node whether its first and its second operand are kept, which matters to sums, and whether
-    it is kept itself, (n_nodes, 3)."""
-    source: IntArray
-    """The node before it that a node stands for, mostly itself; NUMBER for a number, (n_nodes,)."""
-    factor: FloatArray
-    """By which that is multiplied, or the number, (n_nodes,)."""
-
-    def has(self, terms: IntArray) -> BoolArray:
-        """Which terms, as :meth:`Tape.candidates` gives them, are as in the whole program."""
-        nodes, what = terms.T
-        kept: BoolArray = self.kept[nodes, np.minimum(what, WHOLE)]
-        return np.where(what == ITSELF, self.source[nodes] == nodes, kept)
-
-    def flipped(self, terms: IntArray) -> Remains:
-        """The same with some terms the other way round; nodes can only come to stand for themselves."""
-        kept, source, factor = self.kept.copy(), self.source.copy(), self.factor.copy()
-        own = terms[:, 1] == ITSELF
-        kept[tuple(terms[~own].T)] ^= True
-        source[terms[own, 0]], factor[terms[own, 0]] = terms[own, 0], 1.0
-        return Remains(kept, source, factor)
-
-    def standing(self, node: int, source: int, factor: float) -> Remains:
-        """The same with a node standing for another one times a factor, or for a number."""
-        sources, factors = self.source.copy(), self.factor.copy()
-        sources[node], factors[node] = source, factor
-        return Remains(self.kept, sources, factors)
 
 
 class Outputs(NamedTuple):
@@ -93,19 +57,19 @@ class Tape:
             codes.append(CODES[operation])
             operands.append([*values, ZERO, ZERO][:2])
             numbers.append(number)
-        self._codes = np.array(codes, dtype=np.int64)
-        self._operands = np.array(operands, dtype=np.int64).reshape(-1, 2)
-        self._numbers = np.array(numbers)
-        self._outputs = np.array(program.outputs, dtype=np.int64)
+        self._instructions = Instructions(
+            codes=np.array(codes, dtype=np.int64),
+            operands=np.array(operands, dtype=np.int64).reshape(-1, 2),
+            numbers=np.array(numbers),
+            outputs=np.array(program.outputs, dtype=np.int64),
+        )
         zero = [program.nodes[value >> 1] == Node("constant") for value in program.outputs]
         self._live = np.flatnonzero(~np.array(zero, dtype=np.bool_))
-        self._signs = np.where(self._outputs[self._live] & 1, -1.0, 1.0)
+        self._signs = np.where(self._instructions.outputs[self._live] & 1, -1.0, 1.0)
 
-    def everything(self) -> Remains:
+    def everything(self) -> Pruning:
         """The whole program."""
-        return Remains(
-            np.ones((self.size, 3), dtype=np.bool_), np.arange(self.size), np.ones(self.size)
-        )
+        return Pruning.nothing(self.size)
 
     def candidates(self) -> IntArray:
         """Terms: numbers of nodes and what of them, (n_candidates, 2).
@@ -113,23 +77,23 @@ class Tape:
         All but the last ones can be left out. These are nodes as what they are, which can be put back
         where they stand for others.
         """
-        sums = np.flatnonzero(self._codes == SUM)
-        whole = np.flatnonzero(self._codes != CONSTANT)
+        sums = np.flatnonzero(self._instructions.codes == SUM)
+        whole = np.flatnonzero(self._instructions.codes != CONSTANT)
         terms = [
             *((k, side) for k in sums for side in (FIRST, SECOND)),
             *((k, WHOLE) for k in whole),
-            *((k, ITSELF) for k in np.flatnonzero(self._codes != INPUT)),
+            *((k, ITSELF) for k in np.flatnonzero(self._instructions.codes != INPUT)),
         ]
         return np.array(terms, dtype=np.int64).reshape(-1, 2)
 
     def made(self) -> BoolArray:
         """Which nodes are computed, neither constants nor inputs, (n_nodes,)."""
-        result: BoolArray = self._codes > INPUT
+        result: BoolArray = self._instructions.codes > INPUT
         return result
 
     def constants(self) -> IntArray:
         """Nodes that are constants, (n_constants,)."""
-        return np.flatnonzero(self._codes == CONSTANT)
+        return np.flatnonzero(self._instructions.codes == CONSTANT)
 
     def linear(self, n: int) -> BoolArray:
         """Of which nodes the first n inputs are part, (n_nodes,)."""
@@ -143,58 +107,54 @@ class Tape:
     def parameters(self, n: int) -> IntArray:
         """Nodes of the first inputs, -1 for those that the program does not use, (n,)."""
         result = np.full(n, NONE)
-        inputs = np.flatnonzero(self._codes == INPUT)
-        positions = self._numbers[inputs].astype(np.int64)
+        inputs = np.flatnonzero(self._instructions.codes == INPUT)
+        positions = self._instructions.numbers[inputs].astype(np.int64)
         first = positions < n
         result[positions[first]] = inputs[first]
         return result
 
-    def needed(self, left: Remains) -> BoolArray:
+    def needed(self, pruning: Pruning) -> BoolArray:
         """Nodes that outputs are made of, (n_nodes,)."""
-        needed: BoolArray = kernels.needed(
-            self._codes, self._operands, self._outputs, left.kept, left.source
-        )
+        needed: BoolArray = kernels.needed(self._instructions, pruning)
         return needed
 
-    def values(self, left: Remains, inputs: FloatArray, which: BoolArray) -> FloatArray:
+    def values(self, pruning: Pruning, inputs: FloatArray, which: BoolArray) -> FloatArray:
         """Of nodes, (n_nodes, n_samples); zero where they are left out, or not asked for.
 
         Args:
-            left: Of the program.
+            pruning: Of the program.
             inputs: By position, (n_inputs, n_samples).
             which: Nodes that are asked for, with all that they are made of, (n_nodes,).
         """
         values: FloatArray = kernels.values(
-            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor,
+            self._instructions, pruning,
             inputs, which,
         )  # fmt: skip
         return values
 
     def outputs(self, values: FloatArray) -> Outputs:
         """Outputs from the values of nodes, (n_nodes, n_samples)."""
-        nodes = self._outputs[self._live] >> 1
+        nodes = self._instructions.outputs[self._live] >> 1
         return Outputs(values[nodes] * self._signs[:, None], self._live)
 
-    def own_values(self, left: Remains, inputs: FloatArray, values: FloatArray) -> FloatArray:
+    def own_values(self, pruning: Pruning, inputs: FloatArray, values: FloatArray) -> FloatArray:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
 
         Args:
-            left: Of the program.
+            pruning: Of the program.
             inputs: By position, (n_inputs, n_samples).
             values: Of all nodes.
         """
-        own: FloatArray = kernels.own_values(
-            self._codes, self._operands, self._numbers, left.kept, inputs, values
-        )
+        own: FloatArray = kernels.own_values(self._instructions, pruning, inputs, values)
         return own
 
     def adjoints(
-        self, left: Remains, values: FloatArray, seeds: FloatArray, which: BoolArray
+        self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> FloatArray:
         """Derivatives of quantities that are linear in the outputs, by nodes.
 
         Args:
-            left: Of the program.
+            pruning: Of the program.
             values: Of the nodes.
             seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
             which: Nodes that are asked for, with all that is made of them, (n_nodes,).
@@ -202,36 +162,36 @@ class Tape:
         Returns:
             Zero for other nodes, (n_nodes, n_quantities, n_samples).
         """
-        found, reached = self._adjoints(left, values, seeds, which)
+        found, reached = self._adjoints(pruning, values, seeds, which)
         found[~reached] = 0.0
         return found
 
     def adjoints_of(
         self,
-        left: Remains,
+        pruning: Pruning,
         values: FloatArray,
         seeds: FloatArray,
         which: BoolArray,
         nodes: IntArray,
     ) -> FloatArray:
         """The same for some of the nodes that are asked for, (k, n_quantities, n_samples)."""
-        found, reached = self._adjoints(left, values, seeds, which)
+        found, reached = self._adjoints(pruning, values, seeds, which)
         some = found[nodes]
         some[~reached[nodes]] = 0.0
         return some
 
     def _adjoints(
-        self, left: Remains, values: FloatArray, seeds: FloatArray, which: BoolArray
+        self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> tuple[FloatArray, BoolArray]:
         """Anything where there are none."""
         return kernels.adjoints(
-            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            self._instructions, pruning,
             values, seeds, which,
         )  # fmt: skip
 
     def effects(
         self,
-        left: Remains,
+        pruning: Pruning,
         candidates: IntArray,
         values: FloatArray,
         own: FloatArray,
@@ -242,52 +202,44 @@ class Tape:
         Terms that are left out get what they would give, nodes that stand for others what they would
         give beyond that as what they are.
         """
-        return kernels.effects(
-            self._operands, left.kept, left.source, left.factor, candidates, values, own, adjoints
-        )
+        return kernels.effects(self._instructions, pruning, candidates, values, own, adjoints)
 
-    def combinations(self, left: Remains, terms: IntArray, n: int) -> FloatArray:
+    def combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
         """Linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
 
         Zero for terms that are no multiple of one, or for which that cannot be seen.
         """
-        found, coefficients = kernels.combinations(
-            self._codes, self._operands, self._numbers, left.kept, left.source, left.factor, n
-        )
+        found, coefficients = kernels.combinations(self._instructions, pruning, n)
         nodes, what = terms.T
-        operands = self._operands[nodes, np.minimum(what, SECOND)] >> 1
+        operands = self._instructions.operands[nodes, np.minimum(what, SECOND)] >> 1
         node = found[np.where(what == WHOLE, nodes, operands)]
         known = (node >= 0) & (what != ITSELF)
         return np.where(known[:, None], coefficients[node], 0.0)
 
-    def count(self, left: Remains) -> int:
+    def count(self, pruning: Pruning) -> int:
         """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
-        return int(
-            kernels.count(
-                self._codes, self._operands, self._outputs, left.kept, left.source, left.factor
-            )
-        )
+        return int(kernels.count(self._instructions, pruning))
 
-    def counts(self, left: Remains, candidates: IntArray) -> IntArray:
+    def counts(self, pruning: Pruning, candidates: IntArray) -> IntArray:
         """Operations left when one more term is the other way round, (n_candidates,).
 
         Nodes that stand for themselves and could only stand for others stay as they are.
         """
         return kernels.counts(
-            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            self._instructions, pruning,
             candidates,
         )  # fmt: skip
 
     def counts_standing(
-        self, left: Remains, nodes: IntArray, sources: IntArray, factors: FloatArray
+        self, pruning: Pruning, nodes: IntArray, sources: IntArray, factors: FloatArray
     ) -> IntArray:
         """Operations left when one more node stands for another one, (n_ways,)."""
         return kernels.counts_standing(
-            self._codes, self._operands, self._outputs, left.kept, left.source, left.factor,
+            self._instructions, pruning,
             nodes, sources, factors,
         )  # fmt: skip
 
-    def rebuilt(self, left: Remains) -> Program:
+    def rebuilt(self, pruning: Pruning) -> Program:
         """The program that is left."""
         nodes = [Node("constant")]
         stands_for: list[int] = []
@@ -297,8 +249,8 @@ class Tape:
             return 2 * (len(nodes) - 1) + (number < 0)
 
         for k, (operation, operands, number) in enumerate(self.program.nodes):
-            source, factor = int(left.source[k]), float(left.factor[k])
-            if not left.kept[k, WHOLE]:
+            source, factor = int(pruning.source[k]), float(pruning.factor[k])
+            if not pruning.kept[k, WHOLE]:
                 stands_for.append(ZERO)
             elif source == NUMBER:
                 stands_for.append(constant(factor))
@@ -308,7 +260,9 @@ class Tape:
                 nodes.append(Node("*", (constant(factor), stands_for[source])))
                 stands_for.append(2 * (len(nodes) - 1))
             else:
-                left_out = (operation == "+" and not left.kept[k, s] for s in range(len(operands)))
+                left_out = (
+                    operation == "+" and not pruning.kept[k, s] for s in range(len(operands))
+                )
                 nodes.append(
                     Node(
                         operation,

@@ -45,7 +45,7 @@ def fitting_of(model, direct, budget, count=60, reduced=None):
 
 def predicted(fitting, fit, samples, direct):
     """Torques, and mass matrices, from the program that is left, written out."""
-    program = fitting.tape.rebuilt(fit.left)
+    program = fitting.tape.rebuilt(fit.pruning)
     m = samples.tau.shape[1]
     given = program.evaluated(
         [*np.broadcast_to(fit.beta[:, None], (fit.beta.size, m)), *samples.states]
@@ -84,8 +84,8 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
         )
         flat = rows.reshape(found.beta.size, -1).T
         best = np.linalg.lstsq(flat, (samples.tau / weights).ravel(), rcond=None)[0]
-        left = np.linalg.norm(flat @ best - (samples.tau / weights).ravel())
-        assert error == pytest.approx(left / np.linalg.norm(samples.tau / weights), rel=1e-6)
+        pruning = np.linalg.norm(flat @ best - (samples.tau / weights).ravel())
+        assert error == pytest.approx(pruning / np.linalg.norm(samples.tau / weights), rel=1e-6)
         return
     accelerations = np.linalg.solve(
         np.moveaxis(M, 2, 0), np.moveaxis(samples.tau - tau, 1, 0)[..., None]
@@ -104,12 +104,12 @@ def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
     terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
     missed = helped = 0
     for term in terms:
-        broken = fitting.fit(whole.fit.left.flipped(term[None]), whole.fit.beta)
+        broken = fitting.fit(whole.fit.pruning.flip(term[None]), whole.fit.beta)
         missed += not broken.within
-        mended = search.mended(broken.left, broken.beta)
+        mended = search.mended(broken.pruning, broken.beta)
         helped += mended.fit.within and not broken.within
         assert mended.count <= whole.count
-        assert np.all(mended.fit.left.has(terms)[broken.left.has(terms)]), "nothing else goes"
+        assert np.all(mended.fit.pruning.has(terms)[broken.pruning.has(terms)]), "nothing else goes"
     assert missed > 5
     # A square whose root is gone, or a parameter whose only term is, does not tell that it helps.
     assert helped >= 0.7 * missed
@@ -122,15 +122,15 @@ def test_costs_of_combinations_of_parameters_are_exact(arm):
     fit = fitting.fit(tape.everything(), reduced.values)
     for chosen in (None, 7, 12):
         if chosen is not None:
-            fit = fitting.fit(fit.left.flipped(terms[chosen][None]), fit.beta)
-        live = terms[fit.left.has(terms)]
-        combinations = tape.combinations(fit.left, live, fitting.n)
+            fit = fitting.fit(fit.pruning.flip(terms[chosen][None]), fit.beta)
+        live = terms[fit.pruning.has(terms)]
+        combinations = tape.combinations(fit.pruning, live, fitting.n)
         costs = fit.linear.costs(fitting.effects(fit, live), fit.beta, combinations)
         known = np.flatnonzero(combinations.any(axis=1))
         assert known.size > 10
         for k in known:
             # Numbers of one sum that cancel are lost in the square of their size.
-            cost = fitting.fit(fit.left.flipped(live[k][None]), fit.beta).cost - fit.cost
+            cost = fitting.fit(fit.pruning.flip(live[k][None]), fit.beta).cost - fit.cost
             assert costs.again[k] == pytest.approx(cost, rel=1e-6, abs=1e-8 * costs.plain.max())
             assert costs.sure[k] == costs.again[k]
         others = np.setdiff1d(np.arange(len(live)), known)
@@ -158,10 +158,10 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, direct):
     assert 5 <= len(sums) <= 10, "an arm of this size can be searched exhaustively"
     fewest = tape.count(tape.everything())
     for ways in itertools.product(((True, True), (True, False), (False, True)), repeat=len(sums)):
-        left = tape.everything()
-        left.kept[sums, :2] = ways
-        if tape.count(left) < fewest and fitting.fit(left, values).within:
-            fewest = tape.count(left)
+        pruning = tape.everything()
+        pruning.kept[sums, :2] = ways
+        if tape.count(pruning) < fewest and fitting.fit(pruning, values).within:
+            fewest = tape.count(pruning)
     search = TermSearch(fitting, 0)
     start = search.start(values)
     noisy = (search.descended(start, noise=noise) for noise in [0.0] + [NOISE] * 20)

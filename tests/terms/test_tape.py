@@ -32,37 +32,37 @@ def random_remains(tape, seed):
     """Some terms left out, and some nodes that stand for others, times a factor, or for numbers."""
     rng = np.random.default_rng(seed)
     candidates = tape.candidates()
-    left = tape.everything().flipped(candidates[rng.random(len(candidates)) < 0.12])
+    pruning = tape.everything().flip(candidates[rng.random(len(candidates)) < 0.12])
     linear, made = tape.linear(2), tape.made()
     for k in np.flatnonzero(made & (rng.random(tape.size) < 0.15)):
         like = np.flatnonzero(linear[:k] == linear[k])
         factor = rng.choice([1.0, -1.0, 0.37, -2.2])
         if not linear[k] and rng.random() < 0.3:
-            left = left.standing(k, NUMBER, factor)
+            pruning = pruning.replace(k, NUMBER, factor)
         elif like.size:
-            left = left.standing(k, int(rng.choice(like)), factor)
+            pruning = pruning.replace(k, int(rng.choice(like)), factor)
     for k in tape.constants()[rng.random(tape.constants().size) < 0.3]:
-        left = left.standing(k, NUMBER, 1.0)
-    return left
+        pruning = pruning.replace(k, NUMBER, 1.0)
+    return pruning
 
 
 def everywhere(tape):
     return np.ones(tape.size, dtype=bool)
 
 
-def outputs_of(tape, left, inputs):
-    values = tape.values(left, inputs, tape.needed(left))
+def outputs_of(tape, pruning, inputs):
+    values = tape.values(pruning, inputs, tape.needed(pruning))
     return [values[o >> 1] * (-1 if o & 1 else 1) for o in tape.program.outputs]
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_left_is_the_program_with_terms_set_to_zero(program, inputs, seed):
     tape = Tape(program)
-    left = random_remains(tape, seed)
-    rebuilt = tape.rebuilt(left)
+    pruning = random_remains(tape, seed)
+    rebuilt = tape.rebuilt(pruning)
     expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluated(list(inputs))]
-    np.testing.assert_allclose(outputs_of(tape, left, inputs), expected, atol=1e-14)
-    assert rebuilt.n_operations <= tape.count(left) <= program.n_operations
+    np.testing.assert_allclose(outputs_of(tape, pruning, inputs), expected, atol=1e-14)
+    assert rebuilt.n_operations <= tape.count(pruning) <= program.n_operations
 
 
 def test_a_constant_that_stands_for_one_saves_all_products_with_it():
@@ -72,22 +72,22 @@ def test_a_constant_that_stands_for_one_saves_all_products_with_it():
     lengths = g.add(g.multiply(length, x), g.multiply(x, g.multiply(length, y)))
     tape = Tape(Program.of_graph(g, [g.multiply(p, lengths)]))
     (constant,) = tape.constants()
-    left = tape.everything().standing(constant, NUMBER, 1.0)
-    assert tape.count(left) == tape.count(tape.everything()) - 2
-    assert tape.rebuilt(left).n_operations == tape.count(left)
+    pruning = tape.everything().replace(constant, NUMBER, 1.0)
+    assert tape.count(pruning) == tape.count(tape.everything()) - 2
+    assert tape.rebuilt(pruning).n_operations == tape.count(pruning)
     itself = np.array([[constant, ITSELF]])
     assert itself[0].tolist() in tape.candidates().tolist()
-    assert tape.count(left.flipped(itself)) == tape.count(tape.everything())
+    assert tape.count(pruning.flip(itself)) == tape.count(tape.everything())
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_left_is_linear_in_the_parameters(program, inputs, seed):
     tape = Tape(program)
-    left = random_remains(tape, seed)
+    pruning = random_remains(tape, seed)
 
     def at(a, b):
         return np.array(
-            outputs_of(tape, left, np.vstack([np.full(20, a), np.full(20, b), inputs[2:]]))
+            outputs_of(tape, pruning, np.vstack([np.full(20, a), np.full(20, b), inputs[2:]]))
         )
 
     np.testing.assert_allclose(at(0, 0), 0, atol=1e-14)
@@ -97,32 +97,34 @@ def test_what_is_left_is_linear_in_the_parameters(program, inputs, seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_adjoints_are_derivatives(program, inputs, seed):
     tape = Tape(program)
-    left = random_remains(tape, seed) if seed else tape.everything()
-    values = tape.values(left, inputs, everywhere(tape))
+    pruning = random_remains(tape, seed) if seed else tape.everything()
+    values = tape.values(pruning, inputs, everywhere(tape))
     seeds = np.eye(2)[:, :, None] * np.ones(20)
-    adjoints = tape.adjoints(left, values, seeds, everywhere(tape))
+    adjoints = tape.adjoints(pruning, values, seeds, everywhere(tape))
     places = {int(n.number): k for k, n in enumerate(program.nodes) if n.operation == "input"}
     for position in (0, 1, 3):
-        if not left.kept[places[position], WHOLE]:
+        if not pruning.kept[places[position], WHOLE]:
             continue
         ahead, behind = inputs.copy(), inputs.copy()
         ahead[position] += 1e-6
         behind[position] -= 1e-6
-        change = np.subtract(outputs_of(tape, left, ahead), outputs_of(tape, left, behind)) / 2e-6
+        change = (
+            np.subtract(outputs_of(tape, pruning, ahead), outputs_of(tape, pruning, behind)) / 2e-6
+        )
         np.testing.assert_allclose(adjoints[places[position]], change, atol=1e-8)
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_nodes_that_are_not_asked_for_change_nothing(program, inputs, seed):
     tape = Tape(program)
-    left = random_remains(tape, seed)
+    pruning = random_remains(tape, seed)
     seeds, linear = np.eye(2)[:, :, None] * np.ones(20), tape.linear(2)
-    values = tape.values(left, inputs, everywhere(tape))
-    some = tape.values(left, inputs, tape.needed(left))
-    np.testing.assert_array_equal(some[tape.needed(left)], values[tape.needed(left)])
+    values = tape.values(pruning, inputs, everywhere(tape))
+    some = tape.values(pruning, inputs, tape.needed(pruning))
+    np.testing.assert_array_equal(some[tape.needed(pruning)], values[tape.needed(pruning)])
     np.testing.assert_array_equal(
-        tape.adjoints(left, some, seeds, linear)[linear],
-        tape.adjoints(left, values, seeds, everywhere(tape))[linear],
+        tape.adjoints(pruning, some, seeds, linear)[linear],
+        tape.adjoints(pruning, values, seeds, everywhere(tape))[linear],
     )
 
 
@@ -131,7 +133,7 @@ def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
     program, inputs, seed, monkeypatch
 ):
     tape = Tape(program)
-    left = random_remains(tape, seed)
+    pruning = random_remains(tape, seed)
     swept = kernels.adjoints
 
     def spoilt(*arguments):
@@ -140,8 +142,8 @@ def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
         return found, reached
 
     monkeypatch.setattr(kernels, "adjoints", spoilt)
-    values = tape.values(left, inputs, everywhere(tape))
-    given = (left, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
+    values = tape.values(pruning, inputs, everywhere(tape))
+    given = (pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
     adjoints, nodes = tape.adjoints(*given), tape.parameters(2)
     assert np.all(np.isfinite(adjoints))
     np.testing.assert_array_equal(tape.adjoints_of(*given, nodes), adjoints[nodes])
@@ -151,16 +153,16 @@ def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
 def test_effects_are_what_outputs_lose_or_gain(program, inputs, seed):
     """Exactly, where the parameters are part of a node: outputs are linear in those."""
     tape = Tape(program)
-    left = random_remains(tape, seed) if seed else tape.everything()
-    values = tape.values(left, inputs, everywhere(tape))
-    own = tape.own_values(left, inputs, values)
-    adjoints = tape.adjoints(left, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
+    pruning = random_remains(tape, seed) if seed else tape.everything()
+    values = tape.values(pruning, inputs, everywhere(tape))
+    own = tape.own_values(pruning, inputs, values)
+    adjoints = tape.adjoints(pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
     candidates = tape.candidates()
     candidates = candidates[tape.linear(2)[candidates[:, 0]]]
-    effects = tape.effects(left, candidates, values, own, adjoints).reshape(-1, 2, 20)
-    now = np.array(outputs_of(tape, left, inputs))
-    for term, here, effect in zip(candidates, left.has(candidates), effects, strict=True):
-        other = outputs_of(tape, left.flipped(term[None]), inputs)
+    effects = tape.effects(pruning, candidates, values, own, adjoints).reshape(-1, 2, 20)
+    now = np.array(outputs_of(tape, pruning, inputs))
+    for term, here, effect in zip(candidates, pruning.has(candidates), effects, strict=True):
+        other = outputs_of(tape, pruning.flip(term[None]), inputs)
         lost = now - other if here and term[1] != ITSELF else other - now
         np.testing.assert_allclose(effect, lost, atol=1e-13)
 
@@ -169,11 +171,11 @@ def test_nodes_that_stand_for_others_can_be_what_they_are_again(program, inputs)
     tape = Tape(program)
     everything = tape.everything()
     last = int(np.flatnonzero(tape.made() & tape.linear(2))[-1])
-    left = everything.standing(last, last - 1, 0.7)
+    pruning = everything.replace(last, last - 1, 0.7)
     back = np.array([[last, ITSELF]])
-    again = left.flipped(back)
+    again = pruning.flip(back)
     assert again.has(back).all()
-    assert not left.has(back).any()
+    assert not pruning.has(back).any()
     np.testing.assert_array_equal(
         outputs_of(tape, again, inputs), outputs_of(tape, everything, inputs)
     )
@@ -182,22 +184,22 @@ def test_nodes_that_stand_for_others_can_be_what_they_are_again(program, inputs)
 @pytest.mark.parametrize("seed", range(5))
 def test_counts_of_single_changes(program, seed):
     tape = Tape(program)
-    left = random_remains(tape, seed)
+    pruning = random_remains(tape, seed)
     candidates = tape.candidates()
-    for term, count in zip(candidates, tape.counts(left, candidates), strict=True):
-        assert count == tape.count(left.flipped(term[None]))
+    for term, count in zip(candidates, tape.counts(pruning, candidates), strict=True):
+        assert count == tape.count(pruning.flip(term[None]))
     nodes = np.flatnonzero(tape.made())
     sources, factors = np.maximum(nodes - 3, NUMBER), np.tile([1.0, 0.3], nodes.size)[: nodes.size]
-    counts = tape.counts_standing(left, nodes, sources, factors)
+    counts = tape.counts_standing(pruning, nodes, sources, factors)
     for *way, count in zip(nodes, sources, factors, counts, strict=True):
-        assert count == tape.count(left.standing(*way))
+        assert count == tape.count(pruning.replace(*way))
 
 
 def test_outputs_are_those_that_are_not_zero(inputs):
     g = Graph()
     a, x = g.input(0), g.input(2)
     tape = Tape(Program.of_graph(g, [g.constant(0.0), g.negate(g.multiply(a, x)), g.constant(0.0)]))
-    left = tape.everything()
-    found = tape.outputs(tape.values(left, inputs, tape.needed(left)))
+    pruning = tape.everything()
+    found = tape.outputs(tape.values(pruning, inputs, tape.needed(pruning)))
     assert found.places.tolist() == [1]
     np.testing.assert_allclose(found.values, -inputs[:1] * inputs[2:3])
