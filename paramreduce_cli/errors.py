@@ -1,8 +1,8 @@
 """The errors a user can meet; each message is complete as it stands.
 
 Every class carries the exit code its kind of failure has at the shell. Numerics know no config:
-what of it stands in their way they name as a :class:`Concern`, and
-:mod:`paramreduce_cli.config.concerns` says which key that is.
+what of it stands in their way they name as a :class:`Cause`, and
+:mod:`paramreduce_cli.config.error_keys` says which key that is.
 """
 
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ Key = tuple[str | int, ...]
 """Where something stands in a config: names of keys, and numbers of items in lists."""
 
 
-class Concern(Enum):
+class Cause(Enum):
     """What a numerical error is about, whatever it is called in a config."""
 
     ASSEMBLY = auto()
@@ -129,7 +129,7 @@ class DataError(ParamreduceError):
     """Data brought by the user that does not fit the robot or is not usable."""
 
 
-class ConcernError(ParamreduceError):
+class NumericalError(ParamreduceError):
     """A calculation that something in the description or the settings does not allow.
 
     Args:
@@ -137,10 +137,10 @@ class ConcernError(ParamreduceError):
         concern: What stands in the way.
     """
 
-    def __init__(self, message: str, concern: Concern) -> None:
+    def __init__(self, message: str, cause: Cause) -> None:
         super().__init__(message)
-        self.concern = concern
-        self.args = (message, concern)
+        self.cause = cause
+        self.args = (message, cause)
 
 
 class FormulationError(ParamreduceError):
@@ -148,4 +148,4 @@ class FormulationError(ParamreduceError):
 
 
 class ParamreduceWarning(UserWarning):
-    """A remark for the user that does not stop the work."""
+    """A sentence on something that is off, which does not stop the work."""

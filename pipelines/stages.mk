@@ -37,7 +37,7 @@ $(RESULTS)/%/validation.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5 sampl
 $(RESULTS)/%/identification.h5: $(CONFIGS)/%.yaml $$(call if_made,$$*,log.h5 model.h5 samples.h5 validation.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) identify $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
-$(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5 trajectories.h5 samples.h5 reduction.h5 validation.h5 log.h5 identification.h5 terms.h5) | $(PARAMREDUCE_READY)
+$(RESULTS)/%/report/summary.json: $(CONFIGS)/%.yaml $$(call if_made,$$*,model.h5 trajectories.h5 reduction.h5 validation.h5 log.h5 identification.h5 terms.h5 samples.h5) | $(PARAMREDUCE_READY)
 	$(PARAMREDUCE) report $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)
 
 .PRECIOUS: $(RESULTS)/%/model.h5 $(RESULTS)/%/trajectories.h5 $(RESULTS)/%/log.h5 $(RESULTS)/%/samples.h5 $(RESULTS)/%/reduction.h5 $(RESULTS)/%/terms.h5 $(RESULTS)/%/validation.h5 $(RESULTS)/%/identification.h5 $(RESULTS)/%/report/summary.json

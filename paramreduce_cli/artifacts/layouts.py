@@ -18,6 +18,7 @@ from paramreduce_cli.artifacts.plain import dtype_of, from_plain, to_plain
 from paramreduce_cli.records import (
     Columns,
     HeuristicValidation,
+    MeasuredLog,
     MeasuredMotions,
     Model,
     Proofs,
@@ -30,6 +31,7 @@ from paramreduce_cli.records import (
     TermModel,
     Trajectories,
     Trajectory,
+    Validation,
 )
 
 _NAMES: dict[tuple[type, str], str] = {
@@ -47,6 +49,8 @@ _NAMES: dict[tuple[type, str], str] = {
     (HeuristicValidation, "joint_acceleration_error"): "acceleration_error_joint_",
     (HeuristicValidation, "mass_matrix"): "mass_matrix_",
     (HeuristicValidation, "operations"): "operations_",
+    (MeasuredLog, "warnings"): "doubts",
+    (Validation, "warnings"): "remarks",
     (Selected, "model"): "",
     (Stability, "variants"): "",
     (ReducedModel, "names"): "parameters",

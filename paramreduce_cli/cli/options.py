@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import Store
-from paramreduce_cli.cli.terminal import interruption, remark
+from paramreduce_cli.cli.terminal import interruption, warn_user
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.records import Part, Progress
@@ -92,4 +92,4 @@ def results_store(config: Config | None, results: Path | None) -> Store:
 
 def callbacks(progress: Callable[[Progress], None]) -> Callbacks:
     """Return what a run calls at the terminal."""
-    return Callbacks(progress, remark, interruption.heeded, interruption.check)
+    return Callbacks(progress, warn_user, interruption.heeded, interruption.check)

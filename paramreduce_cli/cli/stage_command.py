@@ -22,7 +22,7 @@ from paramreduce_cli.cli.options import (
     results_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
-from paramreduce_cli.cli.terminal import LOG, VERBOSE, remark, show_progress
+from paramreduce_cli.cli.terminal import LOG, VERBOSE, show_progress, warn_user
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
@@ -113,6 +113,6 @@ def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
         return 0
     record = outcome.record or load_file(outcome.path, Validation, None, stage.name)[0]
     if not quiet:
-        for entry in record.remarks:
-            remark(entry.text.rstrip("."))
+        for entry in record.warnings:
+            warn_user(entry.text.rstrip("."))
     return say_verdict(record.accepted, record.verdict, quiet)

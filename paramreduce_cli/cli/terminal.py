@@ -85,7 +85,7 @@ class Journal:
                 self._file.flush()
             except OSError as error:
                 self._file = None  # the work matters more than its log
-                remark(f"--log: cannot be written any more: {error.strerror}")
+                warn_user(f"--log: cannot be written any more: {error.strerror}")
 
 
 journal = Journal()
@@ -152,7 +152,7 @@ def show_errors(text: str) -> None:
         complain(f"Error: {line}")
 
 
-def remark(message: str) -> None:
+def warn_user(message: str) -> None:
     """Tell the user something that does not stop the work."""
     complain(f"Warning: {message}{'' if message.endswith('?') else '.'}")
 
@@ -160,7 +160,7 @@ def remark(message: str) -> None:
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
     """Show this project's warnings and no others; takes the place of warnings.showwarning."""
     if issubclass(category, ParamreduceWarning):
-        remark(str(message))
+        warn_user(str(message))
 
 
 class Interruption:
@@ -257,10 +257,10 @@ def _moving_line(label: str) -> Iterator[Callable[[Progress], None]]:
         rich.progress.BarColumn(24),
         rich.progress.TaskProgressColumn(),
         rich.progress.TimeRemainingColumn(),
-        rich.progress.TextColumn("{task.fields[remark]}"),
+        rich.progress.TextColumn("{task.fields[detail]}"),
     )
     with rich.progress.Progress(*columns, console=err, transient=True) as bars:
-        line = bars.add_task(label, total=None, remark="")
+        line = bars.add_task(label, total=None, detail="")
         shown = ""
 
         def show(p: Progress) -> None:
@@ -268,8 +268,8 @@ def _moving_line(label: str) -> Iterator[Callable[[Progress], None]]:
             total = p.total if p.done or p.total > 1 else None  # of a single step nothing is known
             if p.task != shown:
                 shown = p.task
-                bars.reset(line, description=f"{label}: {p.task}", total=total, remark=p.remark)
-            bars.update(line, completed=p.done, total=total, remark=p.remark)
+                bars.reset(line, description=f"{label}: {p.task}", total=total, detail=p.detail)
+            bars.update(line, completed=p.done, total=total, detail=p.detail)
 
         yield show
 
@@ -340,7 +340,7 @@ class _Lines:
         if p.done >= p.total:
             told = self._told.pop(p.task, None) is not None
             del self._begun[p.task]
-            if not (told or p.remark) and now - begun < self._pause:
+            if not (told or p.detail) and now - begun < self._pause:
                 return
         else:
             self._told[p.task] = now
@@ -351,4 +351,4 @@ def _plain_line(p: Progress, left: float | None) -> str:
     share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
     state = "done" if p.done >= p.total else share if p.done else "begun"
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""
-    return f"{p.task}: {state}{rest}{', ' + p.remark if p.remark else ''}"
+    return f"{p.task}: {state}{rest}{', ' + p.detail if p.detail else ''}"

@@ -31,7 +31,7 @@ def check(config: Config) -> list[Problem]:
     return [problem for one in _CHECKS for problem in one(config)]
 
 
-def remarks(config: Config) -> list[str]:
+def find_warnings(config: Config) -> list[str]:
     """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
     kinds = (
         _odd_bodies,

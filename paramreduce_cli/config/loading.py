@@ -14,7 +14,7 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from paramreduce_cli.config import reading
-from paramreduce_cli.config.checks import check, remarks
+from paramreduce_cli.config.checks import check, find_warnings
 from paramreduce_cli.config.cutting import cut_to_independent
 from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import Document
@@ -66,7 +66,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
             rejected=rejected, choices=choices, remedy=remedy,
             in_file=all(line.startswith(f"{document.source}, line ") for line in lines),
         )  # fmt: skip
-    for text in remarks(config):
+    for text in find_warnings(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
     return _with_paths(_without_unused_tests(config), path.parent)
 

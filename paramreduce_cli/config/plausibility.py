@@ -31,7 +31,7 @@ def find_implausible_bodies(config: Config) -> Iterator[str]:
     size = max(_SMALLEST, extent) if extent > 0 else np.inf
     found: dict[str, list[tuple[float, str]]] = {}
     for name, body in config.body_parameters().items():
-        for what, number in _doubts(body, size):
+        for what, number in _check_body(body, size):
             found.setdefault(what, []).append((number, name))
     for what, bodies in found.items():
         names = [name for _, name in bodies]
@@ -53,7 +53,7 @@ _DENSE = (
 )
 
 
-def _doubts(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
+def _check_body(body: BodyParameters, size: float) -> Iterator[tuple[str, float]]:
     """Yield a sentence for each unlikely property of a body, and the number that goes into the sentence.
 
     Args:

@@ -7,7 +7,7 @@ points is mended by drawing the motion together towards a resting position insid
 import numpy as np
 import scipy  # whose optimize is loaded when it is used
 
-from paramreduce_cli.errors import Concern, ConcernError, DataError
+from paramreduce_cli.errors import Cause, DataError, NumericalError
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
 from paramreduce_cli.multibody.loops.follower import Follower
@@ -40,7 +40,7 @@ def resting_position(
         wanted: Where to look first, (n_dof,).
 
     Raises:
-        ConcernError: There is none to be found; says which bound stands in the way.
+        NumericalError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * margin * limits.reach
@@ -68,11 +68,11 @@ def resting_position(
         tried.append(found.x)
     nearest = min((worst(z) for z in tried), key=lambda bound: bound.excess)
     if np.isinf(nearest.excess):
-        raise ConcernError(nearest.name, Concern.REACH)
-    raise ConcernError(
+        raise NumericalError(nearest.name, Cause.REACH)
+    raise NumericalError(
         "no position of the mechanism was found that keeps all of them within the position limits: "
         f"{nearest.name} stands in the way. Loosen it or the position limits.",
-        Concern.BOUNDS,
+        Cause.BOUNDS,
     )
 
 
@@ -91,7 +91,7 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         objective: Not a number outside the bounds.
 
     Raises:
-        ConcernError: Even the smallest motion does not keep them.
+        NumericalError: Even the smallest motion does not keep them.
     """
     share = 1.0
     while share > _SMALLEST_SHARE:
@@ -101,19 +101,19 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         share *= _SHRINKS
     nearest = objective.worst_bound(drawn.ravel())
     if nearest.excess < 0:
-        raise ConcernError(
+        raise NumericalError(
             "leave no motion: even the smallest about a position that keeps all bounds needs more. Raise "
             "them and the power limits, or move the position limits to where gravity is weaker.",
-            Concern.LOADS,
+            Cause.LOADS,
         )
     if np.isinf(nearest.excess):
-        raise ConcernError(
-            f"no motion was found that keeps the loops closed; {nearest.name}", Concern.FULL_RANGE
+        raise NumericalError(
+            f"no motion was found that keeps the loops closed; {nearest.name}", Cause.FULL_RANGE
         )
-    raise ConcernError(
+    raise NumericalError(
         "no motion was found that keeps them; even the smallest about a position that does is stopped "
         f"by {nearest.name}.",
-        Concern.BOUNDED_MOTION,
+        Cause.BOUNDED_MOTION,
     )
 
 
@@ -129,7 +129,7 @@ def drawn_inside(
         basis: The series on the fine grid.
 
     Raises:
-        ConcernError: Hardly any motion keeps them there.
+        NumericalError: Hardly any motion keeps them there.
     """
     still = np.zeros_like(coefficients)
     still[:, 0] = rest
@@ -156,8 +156,8 @@ def drawn_inside(
         middle = (low + high) / 2
         low, high = (middle, high) if inside(middle) else (low, middle)
     if low == 0.0:
-        raise ConcernError(
+        raise NumericalError(
             "the grid is too coarse to keep the constraints between its points. Use more.",
-            Concern.GRID,
+            Cause.GRID,
         )
     return drawn(low)

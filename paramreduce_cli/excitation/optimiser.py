@@ -18,7 +18,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.errors import Concern, ConcernError, DataError, ParamreduceError
+from paramreduce_cli.errors import Cause, DataError, NumericalError, ParamreduceError
 from paramreduce_cli.excitation.feasibility import drawn_inside, feasible_start, resting_position
 from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
@@ -153,7 +153,7 @@ def optimise_trajectory(
         seed: Of the random starts; the result depends on nothing else.
 
     Raises:
-        ConcernError: No motion keeps the bounds; says which one stops it.
+        NumericalError: No motion keeps the bounds; says which one stops it.
     """
     started = time.process_time()
     search = _Search(excitation, settings)
@@ -174,9 +174,9 @@ def optimise_trajectory(
         except ParamreduceError as error:  # one of several may fail
             failures.append(error)
     if not results:
-        if isinstance(failures[0], ConcernError):
+        if isinstance(failures[0], NumericalError):
             raise failures[0]
-        raise ConcernError(str(failures[0]), Concern.REACH) from failures[0]
+        raise NumericalError(str(failures[0]), Cause.REACH) from failures[0]
     best, series, _ = min(results, key=lambda result: result[2])
     return describe(
         excitation,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.errors import Concern, ConcernError
+from paramreduce_cli.errors import Cause, NumericalError
 from paramreduce_cli.records import FloatArray
 
 _MOST = 200
@@ -45,7 +45,7 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
         names: Of the independent coordinates, (n_dof,).
 
     Raises:
-        ConcernError: They generate too many.
+        NumericalError: They generate too many.
     """
     generators = [
         Symmetry(
@@ -63,10 +63,10 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
                 known.add(product)
                 found.append(product)
         if len(found) > _MOST:
-            raise ConcernError(
+            raise NumericalError(
                 f"they generate more than {_MOST} images of every trajectory; that is no symmetry of a "
                 "mechanism.",
-                Concern.SYMMETRIES,
+                Cause.SYMMETRIES,
             )
     return found
 

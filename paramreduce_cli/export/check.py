@@ -211,7 +211,7 @@ def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str
     return result
 
 
-def doubtful_mass_matrices(M: FloatArray) -> str:
+def find_unsafe_mass_matrices(M: FloatArray) -> str:
     """What is wrong with the mass matrices of random states; empty if nothing is."""
     values = np.linalg.eigvalsh(M)
     bad = int(np.sum(values[:, 0] <= SINGULAR_MASS * np.abs(values).max()))

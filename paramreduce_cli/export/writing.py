@@ -12,7 +12,7 @@ from paramreduce_cli.export.check import (
     check,
     check_against_mechanism,
     check_closures,
-    doubtful_mass_matrices,
+    find_unsafe_mass_matrices,
     random_cases,
     single_precision_errors,
 )
@@ -110,7 +110,7 @@ def exported_model(
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
     if simplified is None and "direct" in _FUNCTIONS[what]:
-        unsafe = doubtful_mass_matrices(checked["M"])
+        unsafe = find_unsafe_mass_matrices(checked["M"])
     if unsafe:
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
     worth = _worth(model, unsafe, simplified, validation)

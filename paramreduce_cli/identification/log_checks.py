@@ -27,7 +27,7 @@ _PER_PERIOD = 20
 """Samples of that."""
 
 
-def doubts(
+def find_log_warnings(
     piece: Signals, rate: float, names: Sequence[str], unmeasured: Collection[str] = ()
 ) -> Iterator[str]:
     """Sentences on joints that stand still, units, signs and order of columns, and limits.

@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.config.logs import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
-from paramreduce_cli.identification.log_checks import doubts
+from paramreduce_cli.identification.log_checks import find_log_warnings
 from paramreduce_cli.identification.outliers import replace_outliers
 from paramreduce_cli.identification.pieces import Piece, moving, split
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
@@ -94,11 +94,15 @@ def processed(
             f"{rate:.6g} Hz. Bring logs of one rate."
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
-    suspected = dict.fromkeys(
+    warnings = dict.fromkeys(
         [
-            *files.doubts,
-            *others.doubts,
-            *(text for piece in recorded for text in doubts(piece, rate, names, unmeasured)),
+            *files.warnings,
+            *others.warnings,
+            *(
+                text
+                for piece in recorded
+                for text in find_log_warnings(piece, rate, names, unmeasured)
+            ),
         ]
     )
     learned_from, tested_on = _parts(training, held_out, wanted)
@@ -148,7 +152,7 @@ def processed(
         ),
         spectra=spectra,
         steps=tuple(steps),
-        doubts=tuple(suspected),
+        warnings=tuple(warnings),
     )
     begin(4)
     return found
@@ -161,7 +165,7 @@ class _Files:
     motions: list[list[Signals]] = field(default_factory=list)
     sources: list[str] = field(default_factory=list)
     outliers: list[Outliers] = field(default_factory=list)
-    doubts: list[str] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
     """Sentences on positions that jump."""
     rate: float = 0.0
     """Samples per second of them all."""
@@ -182,7 +186,7 @@ def _read(
         del log  # the next one is read while this name would hold it
         try:
             recorded, parted, jumps = _cut_out_jumps(recorded, wanted, names, first_line)
-            files.doubts += [f"{source}: {text}" for text in jumps]
+            files.warnings += [f"{source}: {text}" for text in jumps]
             if wanted.delay:
                 _undelay(recorded, wanted.delay, source)
             pieces, rate, said = evened(recorded, parted)

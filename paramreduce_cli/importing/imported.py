@@ -163,5 +163,5 @@ class ImportedRobot:
     closures: tuple[ImportedClosure, ...] = ()
     independent: tuple[tuple[str, int], ...] = ()
     """Joints, and which of their coordinates, that determine all others; where there are closures."""
-    remarks: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
     """What was changed while reading, such as angles taken for what they were rounded from."""

@@ -12,10 +12,10 @@ _FAR = 0.5
 """Square of the distance to the centre of mass, in squares of the radius of gyration, from which on it
 matters about which point an inertia is."""
 _MOST = 8
-"""Links that are named in one remark."""
+"""Links that are named in one warning."""
 
 
-def doubts(links: Mapping[str, Inertial | None]) -> Iterator[str]:
+def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]:
     """Sentences about masses and inertias that no body can have, or that look misplaced."""
     given = {name: inertial for name, inertial in links.items() if inertial is not None}
     heavy = {name: one for name, one in given.items() if one.mass > 0}

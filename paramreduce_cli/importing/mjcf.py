@@ -50,8 +50,8 @@ def read_mjcf(path: Path) -> ImportedRobot:
             remedy="Install it with `pip install 'paramreduce[mjcf]'`.",
         )
     reader = compiled(path)
-    remarks = [*reader.found.remarks, *(f"MuJoCo says: {text}" for text in reader.said)]
-    return replace(reader.found, remarks=tuple(remarks))
+    warnings = [*reader.found.warnings, *(f"MuJoCo says: {text}" for text in reader.said)]
+    return replace(reader.found, warnings=tuple(warnings))
 
 
 def compiled(path: Path) -> MjcfReader:
@@ -87,7 +87,7 @@ class MjcfReader:
     def __init__(self, path: Path, mujoco: Any, model: Any, said: list[str]) -> None:
         self.said = said
         self._path, self._mujoco, self._model = path, mujoco, model
-        self._remarks: list[str] = []
+        self._warnings: list[str] = []
         self._massless: set[str] = set()
         self._anchors = np.zeros((model.nbody, 3))
         """Of the last joints, in the bodies' frames."""
@@ -133,7 +133,7 @@ class MjcfReader:
             gravity=(0.0, 0.0, 0.0) if weightless else tuple(model.opt.gravity.tolist()),
             closures=closures,
             independent=self._independent() if closures else (),
-            remarks=tuple(self._remarks),
+            warnings=tuple(self._warnings),
         )
 
     def _chain(self, body: int) -> Iterator[ImportedJoint]:
@@ -207,12 +207,12 @@ class MjcfReader:
         single = kind in ("prismatic", "revolute")
         if not single:
             if any(drive.values()):
-                self._remarks.append(f"rotor, friction and spring of {name} are left out")
+                self._warnings.append(f"rotor, friction and spring of {name} are left out")
             return ImportedJoint(name, kind, parent, child, steps_of(frame), (0.0, 0.0, 1.0))
         at = int(model.jnt_qposadr[k])
         reference = float(model.qpos0[at])
         if reference:
-            self._remarks.append(
+            self._warnings.append(
                 f"{name} counts from the pose of the file, where MuJoCo has it at {reference:g}"
             )
         if drive["stiffness"]:
@@ -262,12 +262,14 @@ class MjcfReader:
         for k in range(model.neq):
             name, kind = self._name("EQUALITY", k) or f"closure_{k}", kinds(int(model.eq_type[k]))
             if not model.eq_active0[k]:
-                self._remarks.append(f"the equality {name} is not active in the file, so left out")
+                self._warnings.append(f"the equality {name} is not active in the file, so left out")
             elif kind == kinds.mjEQ_JOINT:
                 follower, mimic = self._coupling(k, name)
                 followers[follower] = mimic
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD) and self._leads(k):
-                self._remarks.append(f"the equality {name} leads a body by hand, so it is left out")
+                self._warnings.append(
+                    f"the equality {name} leads a body by hand, so it is left out"
+                )
             elif kind in (kinds.mjEQ_CONNECT, kinds.mjEQ_WELD):
                 closures.append(self._closure(k, name, welded=kind == kinds.mjEQ_WELD))
             else:
@@ -380,8 +382,8 @@ class MjcfReader:
         off = [bit.name.removeprefix("mjDSBL_").lower() for bit in flags
                if bit is not None and model.opt.disableflags & int(bit)]  # fmt: skip
         if off:
-            self._remarks.append(f"switched off in the file, and yet taken over: {', '.join(off)}")
-        self._remarks += [f"{what} are left out" for what, there in left.items() if there]
+            self._warnings.append(f"switched off in the file, and yet taken over: {', '.join(off)}")
+        self._warnings += [f"{what} are left out" for what, there in left.items() if there]
 
 
 def _given(model: Any, name: str) -> bool:

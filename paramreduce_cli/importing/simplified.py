@@ -23,7 +23,7 @@ from paramreduce_cli.importing.imported import (
     steps_of,
     together,
 )
-from paramreduce_cli.importing.inertia_checks import doubts
+from paramreduce_cli.importing.inertia_checks import find_inertia_warnings
 from paramreduce_cli.records import JOINT_COORDINATES, ClosureKind, FloatArray
 from paramreduce_cli.robots.tree import rotation_to
 
@@ -104,7 +104,7 @@ class SimplifiedRobot:
     """Links that move with a body of another name, by name in the file."""
     frames: Mapping[str, FloatArray]
     """Of all links in those of the bodies they move with, (4, 4), by name in the file."""
-    remarks: tuple[str, ...]
+    warnings: tuple[str, ...]
     guess: Mapping[str, float] = field(default_factory=dict)
     """Coordinates with which loops are closed, rad or m; those that are not zero."""
 
@@ -132,7 +132,7 @@ class _Simplification:
     def __init__(self, robot: ImportedRobot, choice: SourceSection) -> None:
         self._robot, self._choice = robot, choice
         self._asked_closures = tuple(_asked_closure(text) for text in choice.closed)
-        self._remarks = [*robot.remarks, *doubts(robot.links)]
+        self._warnings = [*robot.warnings, *find_inertia_warnings(robot.links)]
         self._children: dict[str, list[ImportedJoint]] = {}
         for joint in robot.joints:
             self._children.setdefault(joint.parent, []).append(joint)
@@ -143,7 +143,7 @@ class _Simplification:
             self._lock_beside(choice.tip)
         self._joints = {joint.name: joint for joint in robot.joints}
         self._lock_followers()
-        self._names = _Names(self._remarks)
+        self._names = _Names(self._warnings)
         self._carried: dict[str, str] = {}
         self._frames: dict[str, FloatArray] = {}
 
@@ -184,7 +184,7 @@ class _Simplification:
         for name in beside:
             self._locked.setdefault(name, 0.0)
         if beside:
-            self._remarks.append(f"not on the way to {tip}, so locked at 0: {', '.join(beside)}")
+            self._warnings.append(f"not on the way to {tip}, so locked at 0: {', '.join(beside)}")
 
     def result(self) -> SimplifiedRobot:
         bodies: list[ImportedBody] = []
@@ -233,7 +233,7 @@ class _Simplification:
             self._robot.gravity,
             merged,
             self._frames,
-            tuple(self._remarks),
+            tuple(self._warnings),
         )
 
     def _closures(self) -> tuple[Closure, ...]:
@@ -243,7 +243,7 @@ class _Simplification:
             if left_out and closure in self._asked_closures:
                 raise ConfigError(f"--close {'='.join(closure.links)}: {left_out[0]} is left out.")
             if left_out:
-                self._remarks.append(f"{closure.name} holds a link that is left out, so it is too")
+                self._warnings.append(f"{closure.name} holds a link that is left out, so it is too")
                 continue
             one, other = (self._carried[link] for link in closure.links)
             if one == other and closure in self._asked_closures:
@@ -251,7 +251,7 @@ class _Simplification:
                     f"--close {'='.join(closure.links)}: both links move with {one}, so there is nothing to close."
                 )
             if one == other:
-                self._remarks.append(f"{closure.name} holds {one} to itself, so it is left out")
+                self._warnings.append(f"{closure.name} holds {one} to itself, so it is left out")
                 continue
             first, second = (
                 steps_of(self._frames[link] @ frame)
@@ -326,12 +326,12 @@ class _Simplification:
         if body.massless or inertial.mass:
             return replace(body, inertial=inertial)
         if self._robot.closures or self._asked_closures:
-            self._remarks.append(
+            self._warnings.append(
                 f"{body.name} has no mass in the file, and is taken for massless, as links between the joints of a loop are"
             )
             body = replace(body, massless=True)
         else:
-            self._remarks.append(f"{body.name} has no mass in the file: TODO")
+            self._warnings.append(f"{body.name} has no mass in the file: TODO")
         return replace(body, inertial=inertial)
 
     def _led(self, joint: ImportedJoint) -> tuple[ImportedJoint, float, float]:
@@ -350,7 +350,7 @@ class _Simplification:
             if leader.kind == "fixed" or leader.name in self._locked or not ratio:
                 value = ratio * self._locked.get(leader.name, 0.0) + offset
                 if joint is not leader and leader.kind == "fixed":
-                    self._remarks.append(
+                    self._warnings.append(
                         f"{joint.name} follows {leader.name}, which is fixed, and so is locked at {value:g}"
                     )
                 if joint is not leader:
@@ -366,9 +366,9 @@ class _Simplification:
             if leader.name in moved:
                 result.append(Coupling(moved[leader.name], follower, ratio, offset))
                 text = f"{ratio:g} times {leader.name}" + (f" plus {offset:g}" if offset else "")
-                self._remarks.append(f"{name} is {text}, as in the file; --uncouple lets it move")
+                self._warnings.append(f"{name} is {text}, as in the file; --uncouple lets it move")
             else:
-                self._remarks.append(
+                self._warnings.append(
                     f"{name} follows {leader.name}, which is not here: it moves on its own"
                 )
         return tuple(result)
@@ -417,8 +417,8 @@ def _motion(joint: ImportedJoint, value: float) -> Steps:
 class _Names:
     """Names that configs allow, each once."""
 
-    def __init__(self, remarks: list[str]) -> None:
-        self._remarks = remarks
+    def __init__(self, warnings: list[str]) -> None:
+        self._warnings = warnings
         self._bodies: dict[str, str] = {BASE: BASE}
         self._coordinates: dict[str, str] = {}
         self._closures: dict[str, str] = {}
@@ -438,7 +438,7 @@ class _Names:
             own += "_"
         taken[own] = name
         if own != name:
-            self._remarks.append(f"the {kind} {name!r} is called {own} here")
+            self._warnings.append(f"the {kind} {name!r} is called {own} here")
         return own
 
     def clean(self, name: str) -> str:

@@ -46,7 +46,7 @@ def read_urdf(path: Path) -> ImportedRobot:
 class _Reader:
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._remarks: list[str] = []
+        self._warnings: list[str] = []
         self._root = self._parsed()
 
     def _parsed(self) -> Any:
@@ -101,7 +101,7 @@ class _Reader:
         self._check_tree(joints)
         joints = self._followed(joints)
         name = self._root.get("name") or self._path.stem
-        return ImportedRobot(name, str(self._path), links, joints, remarks=tuple(self._remarks))
+        return ImportedRobot(name, str(self._path), links, joints, warnings=tuple(self._warnings))
 
     def _name(self, element: Any) -> str:
         name = element.get("name")
@@ -127,7 +127,7 @@ class _Reader:
             return None
         value = float(self._numbers(element, key, 1, "")[0])
         if value < 0 and key in ("velocity", "effort"):
-            self._remarks.append(
+            self._warnings.append(
                 f"line {element.sourceline}: {key}={value:g} is taken for {-value:g}"
             )
         return value if abs(value) <= most else None
@@ -145,9 +145,9 @@ class _Reader:
         for key, text in reversed(list(zip(("rx", "ry", "rz"), texts, strict=True))):
             angle = unround_angle(text)
             if abs(angle - float(text)) > _SNAPPED:
-                self._remarks.append(f"{owner}: {key} {text} is taken for {angle:.15g}")
+                self._warnings.append(f"{owner}: {key} {text} is taken for {angle:.15g}")
             elif (near := near_angle(text)) is not None:
-                self._remarks.append(
+                self._warnings.append(
                     f"{owner}: {key} {text} is kept; it is near {angle_text(near)}, but not what that is rounded to. "
                     f"Write {near:.10g} into the file if that is meant"
                 )
@@ -224,7 +224,7 @@ class _Reader:
         for joint in joints:
             lost = joint.mimic is not None and joint.mimic.joint not in names
             if lost and joint.mimic is not None:
-                self._remarks.append(
+                self._warnings.append(
                     f"{joint.name} follows {joint.mimic.joint!r}, which is no joint: it moves on its own"
                 )
             result.append(dataclasses.replace(joint, mimic=None) if lost else joint)

@@ -52,9 +52,9 @@ def _head(robot: SimplifiedRobot) -> str:
         f"{robot.name}: from {robot.source} by `paramreduce init`; this file is the robot from now on.",
         "Units are SI; numbers may be written as 1e-3 or pi/2. `paramreduce schema` lists every key.",
     ]
-    if robot.remarks:
+    if robot.warnings:
         lines += ["", "What was done, or is left to do:"]
-        lines += [f"- {remark}." for remark in robot.remarks]
+        lines += [f"- {warning}." for warning in robot.warnings]
     text = "".join(_comment(line) for line in lines)
     return f"{text}robot: {_name(robot.name)}\n"
 

@@ -10,7 +10,7 @@ from paramreduce_cli.records import (
     BoolArray,
     ErrorRange,
     HeuristicValidation,
-    Remark,
+    ModelWarning,
     Selected,
 )
 from paramreduce_cli.texts import format_percent
@@ -66,29 +66,29 @@ def _shown(value: float, relative: bool) -> str:
     return format_percent(value) if relative else f"{value:g}"
 
 
-def remarks(
+def find_model_warnings(
     heuristics: Mapping[str, HeuristicValidation],
     full: Mapping[str, int | float],
     selected: Selected,
-) -> Iterator[Remark]:
+) -> Iterator[ModelWarning]:
     """Where reduced models should not be trusted; the same of several heuristics once."""
     common: dict[str, list[str]] = {}
     who = f"The selected model ({selected.heuristic}, n = {selected.n})"
     for name, result in heuristics.items():
         chosen = result.row(selected.n) if name == selected.heuristic else None
-        for flags, text, consequence in _doubts(full, result):
+        for flags, text, consequence in _check_subsets(full, result):
             if flags.any():
                 common.setdefault(text, []).append(name)
             if chosen is not None and flags[chosen]:
-                yield Remark(About.SELECTED, f"{who} {consequence}")
+                yield ModelWarning(About.SELECTED, f"{who} {consequence}")
     for text, names in common.items():
-        yield Remark(About.HEURISTICS, f"{', '.join(names)}: {text}")
+        yield ModelWarning(About.HEURISTICS, f"{', '.join(names)}: {text}")
 
 
-def _doubts(
+def _check_subsets(
     full: Mapping[str, int | float], result: HeuristicValidation
 ) -> Iterator[tuple[BoolArray, str, str]]:
-    """Which subsets are doubtful, why, and what that means for the selected model."""
+    """Yield which subsets are not safe to use, why, and what that means for the selected model."""
     unsafe = _unsafe(full, result)
     last = int(result.n[unsafe].max(initial=0))
     yield (

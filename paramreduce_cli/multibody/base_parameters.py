@@ -7,7 +7,7 @@ singular value of W with its columns scaled to unit length.
 import numpy as np
 import scipy.linalg
 
-from paramreduce_cli.errors import Concern, ConcernError
+from paramreduce_cli.errors import Cause, NumericalError
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import (
     INERTIAL,
@@ -80,7 +80,7 @@ def base_parameters(
         Columns in the order of preference in which they were taken, and beta.
 
     Raises:
-        ConcernError: The greedy choice and the singular values disagree, so that no rank can
+        NumericalError: The greedy choice and the singular values disagree, so that no rank can
             be told.
     """
     affects = affecting_columns(W) if affects is None else affects
@@ -95,10 +95,10 @@ def base_parameters(
     wanted = preference[np.isin(preference, affecting)]
     taken = independent_columns(compressed, wanted, tolerance)
     if len(taken) != rank:
-        raise ConcernError(
+        raise NumericalError(
             f"at {tolerance:g} the rank is not clear: {rank} by singular values, {len(taken)} by "
             f"columns; the gap at {rank} is {gap:.3g}.",
-            Concern.RANK,
+            Cause.RANK,
         )
     columns = np.array(taken, dtype=np.int64)
     return BaseParameters(columns, regrouping(W, columns, affects), singular, gap)

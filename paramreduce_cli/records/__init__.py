@@ -98,7 +98,7 @@ from paramreduce_cli.records.validation import (
     DataVariant,
     HeuristicValidation,
     Leanest,
-    Remark,
+    ModelWarning,
     Selected,
     Stability,
     Validation,

@@ -136,7 +136,7 @@ class MeasuredLog:
     spectra: Spectra
     steps: tuple[str, ...]
     """What was done, one sentence each."""
-    doubts: tuple[str, ...]
+    warnings: tuple[str, ...]
     """What looks wrong, one sentence each."""
 
 

@@ -27,7 +27,7 @@ class Progress:
     task: str
     done: float
     total: float
-    remark: str = ""
+    detail: str = ""
 
 
 Tell = Callable[[Progress], None]

@@ -123,7 +123,7 @@ class CrossValidation(BySize):
 
 
 class About(StrEnum):
-    """What a remark is about."""
+    """Models that a warning is about."""
 
     SELECTED = "selected"
     """The selected model."""
@@ -132,7 +132,7 @@ class About(StrEnum):
 
 
 @dataclass(frozen=True)
-class Remark:
+class ModelWarning:
     """A reason not to trust a model everywhere."""
 
     about: About
@@ -164,4 +164,4 @@ class Validation:
     """None where nothing is judged."""
     verdict: str
     """One sentence that says why."""
-    remarks: tuple[Remark, ...]
+    warnings: tuple[ModelWarning, ...]

@@ -63,12 +63,12 @@ def summary_of(
             "parameters": dict(zip(selected.model.names, selected.model.values, strict=True)),
             "accepted": validation.accepted,
             "verdict": validation.verdict,
-            "remarks": [r.text for r in validation.remarks if r.about is About.SELECTED],
+            "remarks": [r.text for r in validation.warnings if r.about is About.SELECTED],
             "leanest": _leanest(leanest),
             **next(row for row in _rows(chosen) if row["n"] == selected.n),
         },
         "stability": _stability(reduction, validation),
-        "remarks": [remark.text for remark in validation.remarks],
+        "remarks": [warning.text for warning in validation.warnings],
     }
     plain: dict[str, Any] = _plain(data)
     return plain

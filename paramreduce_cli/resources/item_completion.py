@@ -31,7 +31,7 @@ def complete_items(
         work: Does the item of a key; picklable as well.
         task: Name of the work for the progress.
         jobs: Number of processes.
-        describe: Returns a remark on a finished item for the progress.
+        describe: Returns a detail of a finished item for the progress.
         prepare: Called in this process before others start, where an item is missing.
 
     Returns:
@@ -53,8 +53,8 @@ def complete_items(
             for key, record in pool.as_done(work, missing):
                 items.kept[key] = record
                 found[key] = items.kept[key]  # a large one is read from where it is kept
-                remark = f"{key}{describe(record)}"
-                run.progress(Progress(task, len(found), len(own), remark))
+                detail = f"{key}{describe(record)}"
+                run.progress(Progress(task, len(found), len(own), detail))
     if not items.part.is_whole:
         raise PartFinished
     return {key: found[key] for key in keys}

@@ -20,7 +20,7 @@ from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
 from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
 from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.config import Config
-from paramreduce_cli.config.checks import remarks
+from paramreduce_cli.config.checks import find_warnings
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import digests, is_section, section, section_digest
 from paramreduce_cli.errors import ArtifactError
@@ -67,7 +67,7 @@ def provenance(
     digest = hashlib.sha256(text.encode()).hexdigest()
     changed = wanted.model_dump(mode="json", exclude_defaults=True)
     if isinstance(wanted, Config):
-        warnings = {"config": remarks(wanted), **warnings}
+        warnings = {"config": find_warnings(wanted), **warnings}
     return Provenance(robot, digest, versions(), seconds, warnings, asked, changed)
 
 

@@ -6,7 +6,7 @@ import warnings
 import numpy as np
 
 from paramreduce_cli.config.schema import ModelSection
-from paramreduce_cli.errors import ConcernError, ConfigError, DataError, ParamreduceWarning
+from paramreduce_cli.errors import ConfigError, DataError, NumericalError, ParamreduceWarning
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.formulations import formulations
 from paramreduce_cli.multibody.base_parameters import (
@@ -98,7 +98,7 @@ def _say_other_modes(
             affects = affecting_parameters(mode, K)
             W = K.reshape(-1, K.shape[2])
             found = base_parameters(W, _preference(model, mode), model.rank_tolerance, affects)
-        except (ConcernError, DataError):
+        except (NumericalError, DataError):
             continue
         counts.append(found.columns.size)
     others = sorted({count for count in counts if count != base.columns.size})

@@ -9,7 +9,7 @@ from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.comparison import compared
 from paramreduce_cli.identification.estimation import LinearFit, robust_fit, rows_of
-from paramreduce_cli.identification.suspicions import suspicions
+from paramreduce_cli.identification.hints import find_hints
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import (
@@ -61,8 +61,8 @@ def identify(
     tell(Progress("identification", 2, _STEPS, "selected parameters"))
     consistency = _consistency(identification, model, samples, deviation)
     delay = 0.0 if log is None else log.delay
-    suspected = suspicions(model, training, full, full_fit, consistency, delay)
-    for text in suspected:
+    hints = find_hints(model, training, full, full_fit, consistency, delay)
+    for text in hints:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _shown(held_out)
     tell(Progress("identification", _STEPS, _STEPS))
@@ -74,7 +74,7 @@ def identify(
         reduced=reduced,
         residuals=full_fit.judged_residuals(n_samples),
         consistency=consistency,
-        hints=tuple(suspected),
+        hints=tuple(hints),
         comparison=compared(full, reduced),
         shown_time=np.concatenate([block.time for block in shown]),
         shown_measured=np.concatenate([block.tau for block in shown]),

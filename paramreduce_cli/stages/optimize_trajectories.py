@@ -194,7 +194,7 @@ def _measured(
 def _check_motion(
     source: str, name: str, trajectories: tuple[Trajectory, ...], limits: JointLimits
 ) -> None:
-    """Refuse trajectories in which nothing moves; remark on joints that rest or go too far."""
+    """Refuse trajectories in which nothing moves; warn of joints that rest or go too far."""
     moving = np.array([t.reach > 0 for t in trajectories])
     if not moving.any(axis=1).all():
         raise DataError(f"{source}: nothing moves in one of the {name} trajectories.")

@@ -33,6 +33,6 @@ def process_log(
         name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
     ]
     found = processed(logs, log, names, tell, unmeasured)
-    for text in found.doubts:
+    for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

@@ -82,7 +82,7 @@ def reduce(
             f"{rows} rows are too few for {problem.candidates.size} parameters; bring more samples."
         )
     rank = len(independent_columns(problem.W, problem.candidates_by_preference))
-    _remark_on_rank(rank, model, columns)
+    _warn_of_rank(rank, model, columns)
     kept = KeptProofs(items, factor, by_subtrees=reduction.best_subset.parts == "subtrees")
     most = len(problem.columns)
     sizes = range(1, min(reduction.stop.parameters or most, most) + 1)
@@ -109,7 +109,7 @@ def reduce(
         found[name], made = _selected(tasks[method.criterion], method, reduction.stop)
         proofs = made if made is not None else proofs
     run.progress(Progress("heuristics", len(names), len(names)))
-    _remark_on_proofs(proofs)
+    _warn_of_open_proofs(proofs)
     heuristics = _with_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)
 
@@ -167,7 +167,7 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
     return weights
 
 
-def _remark_on_rank(rank: int, model: Model | None, columns: Columns) -> None:
+def _warn_of_rank(rank: int, model: Model | None, columns: Columns) -> None:
     if model is not None and not columns.tied and rank < model.base.columns.size:
         warnings.warn(
             f"the estimation set excites only {rank} of the {model.base.columns.size} base "
@@ -221,7 +221,7 @@ def _criterion_inputs(
     return CriterionInputs(wanted.operations.torque_error, accelerations, cost)
 
 
-def _remark_on_proofs(proofs: Proofs | None) -> None:
+def _warn_of_open_proofs(proofs: Proofs | None) -> None:
     """Say what is not proven."""
     if proofs is None or proofs.n_proven == proofs.n_provable:
         return

@@ -125,8 +125,8 @@ def _search(task: _Task, name: str) -> TermModel | None:
         direct=direct, projected=projected, measured=sampling.measured,
     )  # fmt: skip
 
-    def progress(share: float, remark: str) -> None:
-        run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, remark))
+    def progress(share: float, detail: str) -> None:
+        run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, detail))
 
     searcher = Searcher(
         lean, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),

@@ -137,7 +137,7 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
 
 
 def _running(model: Model | None, selected: Selected, what: Exported) -> dict[str, RunningModel]:
-    """The exported code of the full and of the selected model; none in doubt."""
+    """The exported code of the full and of the selected model; none where its formulation fails."""
     if model is None:
         return {}
     models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}

@@ -15,7 +15,7 @@ from paramreduce_cli.judgement.picking import every_model, pareto_front, shown_m
 from paramreduce_cli.judgement.selection import select
 from paramreduce_cli.judgement.stability import stability
 from paramreduce_cli.judgement.torque import NormErrors, joint_errors, torque_errors
-from paramreduce_cli.judgement.verdict import remarks, verdict
+from paramreduce_cli.judgement.verdict import find_model_warnings, verdict
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
@@ -138,7 +138,7 @@ def validate(
         cross_validation=crossed,
         accepted=accepted,
         verdict=sentence,
-        remarks=tuple(remarks(heuristics, full, selected)),
+        warnings=tuple(find_model_warnings(heuristics, full, selected)),
     )
 
 

@@ -9,8 +9,8 @@ import warnings
 import numpy as np
 
 from paramreduce_cli.identification.estimation import Rows, weighted_fit
-from paramreduce_cli.identification.expectations import doubted_gravity, doubted_unit
-from paramreduce_cli.identification.hints import hints
+from paramreduce_cli.identification.residual_hints import find_residual_hints
+from paramreduce_cli.identification.torque_hints import hint_at_gravity, hint_at_unit
 from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import INERTIAL
 from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
@@ -84,7 +84,7 @@ def changed(case, log, seed):
     return tau, X
 
 
-def doubted(case, log, tau, deviation):
+def list_hints(case, log, tau, deviation):
     """What is said of all torques together: by all standard columns, and by the bodies' known values."""
     mechanism, _, _, values = arm()
     some = slice(None, None, _EVERY)
@@ -94,8 +94,8 @@ def doubted(case, log, tau, deviation):
     bodies = [k for k, p in enumerate(mechanism.parameters) if p.kind in INERTIAL]
     rows = (W / deviation[:, None]).reshape(-1, W.shape[2])
     standard = least_squares(np.column_stack([rows, (tau[some] / deviation).ravel()]))
-    yield from doubted_gravity(W, pulls, tau[some], deviation, mechanism.gravity)
-    yield from doubted_unit(W[:, :, bodies] @ values[bodies], W[:, :, bodies] @ standard[bodies])
+    yield from hint_at_gravity(W, pulls, tau[some], deviation, mechanism.gravity)
+    yield from hint_at_unit(W[:, :, bodies] @ values[bodies], W[:, :, bodies] @ standard[bodies])
 
 
 def right(case, pole, count):
@@ -106,7 +106,7 @@ def right(case, pole, count):
         tau, X = changed(case, log, seed)
         tau = noisy(log, tau, pole, seed)
         fit = fitted(log, tau, X)
-        found = [*doubted(case, log, tau, fit.deviation), *hints(fit, log.names)]
+        found = [*list_hints(case, log, tau, fit.deviation), *find_residual_hints(fit, log.names)]
         good += (
             _SAID[case] in found[0] if case in _SAID and found else case == "clean" and not found
         )

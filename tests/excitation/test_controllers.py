@@ -12,8 +12,8 @@ from conftest import ROOT, config_and_model, config_of, slope
 from oracles import capsules, pinocchio_model
 
 from paramreduce_cli.config.clearance import ClearanceSection
-from paramreduce_cli.config.concerns import explained
-from paramreduce_cli.errors import ConcernError, ConfigError, DataError
+from paramreduce_cli.config.error_keys import name_key
+from paramreduce_cli.errors import ConfigError, DataError, NumericalError
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
@@ -140,9 +140,9 @@ def test_limits_that_no_motion_keeps_are_said():
     )  # fmt: skip
     task = excitation_task(config.trajectories, model)
     excitation = excitation_of(task)
-    with pytest.raises(ConcernError, match="leave no motion") as error:
+    with pytest.raises(NumericalError, match="leave no motion") as error:
         optimise_trajectory(excitation, task.settings, [0])
-    assert explained(error.value).key == ("trajectories", "torque_limits")
+    assert name_key(error.value).key == ("trajectories", "torque_limits")
 
 
 @pytest.fixture(scope="module")

@@ -34,7 +34,7 @@ def test_finished_items_are_not_made_again(optimise):
     made = optimise(Run(2), items)
     del items.kept["estimation-0001"]
     kept = items.kept["estimation-0000"]
-    again = optimise(Run(2, progress=lambda p: seen.append((p.task, p.remark))), items)
+    again = optimise(Run(2, progress=lambda p: seen.append((p.task, p.detail))), items)
     assert again.estimation[0] is kept
     assert np.array_equal(again.estimation[1].coefficients, made.estimation[1].coefficients)
     others = len(made.estimation) + len(made.validation) + len(made.test) - 1

@@ -5,7 +5,10 @@ import pytest
 from simulated_logs import RATE, coloured, simulated
 
 from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit, weighted_fit
-from paramreduce_cli.identification.hints import hints, negative_friction
+from paramreduce_cli.identification.residual_hints import (
+    find_residual_hints,
+    hint_at_negative_friction,
+)
 from paramreduce_cli.identification.uncertainty import ColouredNoise, score_covariance
 
 
@@ -137,7 +140,9 @@ def test_hints(case, seed):
     tau = log.tau if change is None else change(log)
     tau = tau + coloured(tau.shape, 0.03 * np.std(log.tau, axis=0), 0.9, seed)
     X = log.X if left_out is None else log.X[:, :, [kind != left_out for kind in log.kinds]]
-    assert any(re.search(said, text) for text in hints(fitted(log, tau, X), log.names))
+    assert any(
+        re.search(said, text) for text in find_residual_hints(fitted(log, tau, X), log.names)
+    )
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
@@ -145,7 +150,7 @@ def test_hints(case, seed):
 def test_no_hints_where_nothing_is_wrong(pole, seed):
     log = simulated(seed)
     tau = log.tau + coloured(log.tau.shape, 0.03 * np.std(log.tau, axis=0), pole, seed)
-    assert hints(fitted(log, tau), log.names) == []
+    assert find_residual_hints(fitted(log, tau), log.names) == []
 
 
 @pytest.mark.parametrize(
@@ -158,7 +163,7 @@ def test_no_hints_where_nothing_is_wrong(pole, seed):
     ],
 )
 def test_friction_that_drives(values, said):
-    found = negative_friction(["fc_a", "fv_a", "fv_b", "fc_c"], list("aabc"), np.array(values), np.full(4, 0.01))  # fmt: skip
+    found = hint_at_negative_friction(["fc_a", "fv_a", "fv_b", "fc_c"], list("aabc"), np.array(values), np.full(4, 0.01))  # fmt: skip
     assert found == [] if said is None else said in found[0]
 
 
@@ -168,13 +173,13 @@ def test_gravity_that_is_tilted_is_suspected():
 
     tilts = tilt_torques(2)
     tau = log.tau + 0.5 * tilts[0] + coloured(log.tau.shape, 0.02 * np.std(log.tau, axis=0), 0.5, 2)
-    found = hints(fitted(log, tau), log.names, [(t,) for t in tilts])
+    found = find_residual_hints(fitted(log, tau), log.names, [(t,) for t in tilts])
     assert any("Gravity seems to have 0.5" in text and "along x" in text for text in found)
 
 
 def test_what_is_modelled_is_of_another_form_if_anything():
     log = simulated(0)
     X = log.X[:, :, [kind != "fc" for kind in log.kinds]]
-    found = hints(fitted(log, log.tau, X), log.names, modelled=[f"drives.{n}.coulomb" for n in log.names])  # fmt: skip
+    found = find_residual_hints(fitted(log, log.tau, X), log.names, modelled=[f"drives.{n}.coulomb" for n in log.names])  # fmt: skip
     assert any("coulomb is of another form" in text for text in found)
     assert not any("missing" in text for text in found)

@@ -43,7 +43,7 @@ def test_it_tells_how_far_it_is():
     logs = RawLogs((RawLog("log.csv", two_link_log(), 2),), ())
     processed(logs, LogSection(files=["log.csv"], columns=COLUMNS), NAMES, told.append)
     assert [(p.done, p.total) for p in told] == [(k, 4) for k in range(5)]
-    assert all(p.remark for p in told[:-1])
+    assert all(p.detail for p in told[:-1])
 
 
 def test_nothing_is_learned_from_what_is_held_out():
@@ -252,8 +252,8 @@ def test_noise_is_what_lies_above_the_band():
     ],
 )
 def test_doubts(change, said):
-    assert any(said in text for text in made(change(two_link_log())).doubts)
+    assert any(said in text for text in made(change(two_link_log())).warnings)
 
 
 def test_no_doubts_of_a_good_log():
-    assert made(two_link_log()).doubts == ()
+    assert made(two_link_log()).warnings == ()

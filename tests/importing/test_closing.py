@@ -7,7 +7,7 @@ import pytest
 from robot_files import FOUR_BAR
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.errors import ConcernError
+from paramreduce_cli.errors import NumericalError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -322,7 +322,7 @@ def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, t
             "    independent: [q1]", "    independent: [q1]\n    guess: {q1: 0.01}"
         )
     )
-    with pytest.raises(ConcernError, match=r"cannot be closed from the guess with q1 = 0\.01"):
+    with pytest.raises(NumericalError, match=r"cannot be closed from the guess with q1 = 0\.01"):
         assembled(load_config(output).mechanism())
 
 

@@ -129,8 +129,8 @@ def test_limits_and_drives_are_taken_over(tmp_path):
     assert np.degrees([limits.lower[0], limits.upper[0]]) == pytest.approx([-110, 40], abs=1e-3)
     effects = {kind.symbol: value for kind, value in config.drives["elbow"].effects().items()}
     assert effects == pytest.approx({"Ia": 0.02, "fv": 0.3, "fc": 0.4})
-    remarks = " ".join(imported(SourceSection(file=path)).remarks)
-    assert "shoulder counts from the pose of the file" in remarks
+    warnings = " ".join(imported(SourceSection(file=path)).warnings)
+    assert "shoulder counts from the pose of the file" in warnings
     assert config.nominal_torque == "standard-deviation"  # the lift has no actuator
 
 
@@ -368,14 +368,16 @@ def test_what_mujoco_warns_of_is_told_and_written_nowhere(tmp_path, invoke, monk
     path, output = written(tmp_path, text), tmp_path / "arm.yaml"
     mujoco.set_mju_user_warning(None)
     try:
-        remarks = imported(SourceSection(file=path)).remarks
+        warnings = imported(SourceSection(file=path)).warnings
         invoke("init", path, "--output", output)
         given = (output, "--results", tmp_path / "r")
         invoke("build-model", *given)
         invoke("export", *given, "--format", "mjcf", "--model", "full")
     finally:
         mujoco.set_mju_user_warning(lambda _: None)
-    assert any(remark.startswith("MuJoCo says:") for remark in remarks) or mujoco.__version__ < "4"
+    assert (
+        any(warning.startswith("MuJoCo says:") for warning in warnings) or mujoco.__version__ < "4"
+    )
     assert not (tmp_path / "MUJOCO_LOG.TXT").exists()
 
 

@@ -100,8 +100,8 @@ def test_names_limits_and_torques_are_taken_over(tmp_path):
     assert limits.upper == pytest.approx([1.5, 0.3, np.pi])
     assert limits.velocity == pytest.approx([3, 0.5, 1.5])
     assert config.nominal_torque == "standard-deviation"  # grip has no effort
-    remarks = " ".join(imported(SourceSection(file=path)).remarks)
-    assert "the joint 'j\"lift' is called j_lift here" in remarks
+    warnings = " ".join(imported(SourceSection(file=path)).warnings)
+    assert "the joint 'j\"lift' is called j_lift here" in warnings
 
 
 def test_a_chain_a_branch_left_out_and_another_root(tmp_path):
@@ -147,7 +147,7 @@ def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
 def test_a_joint_that_follows_none_moves_on_its_own(tmp_path):
     robot = imported(SourceSection(file=written(tmp_path, following('<mimic joint="lost"/>'))))
     assert not robot.couplings
-    assert "j\"lift follows 'lost', which is no joint: it moves on its own" in robot.remarks
+    assert "j\"lift follows 'lost', which is no joint: it moves on its own" in robot.warnings
 
 
 def test_joints_that_follow_one_that_follows_or_does_not_move(tmp_path):
@@ -178,7 +178,7 @@ def test_planar_and_floating_joints(tmp_path):
 def test_rounded_angles_are_listed(tmp_path):
     path = written(tmp_path, ARM.replace('rpy="0 1.2 0"', 'rpy="0 1.5708 3.14159"'))
     robot = imported(SourceSection(file=path))
-    assert [r for r in robot.remarks if "1.5708" in r or "3.14159" in r]
+    assert [r for r in robot.warnings if "1.5708" in r or "3.14159" in r]
     assert "{rz: pi}, {ry: pi/2}" in config_text(robot, SourceSection(file=path))
 
 
@@ -416,5 +416,5 @@ def test_followers_of_a_fixed_joint_and_negative_speeds_are_said(tmp_path):
         + "</robot>"
     )  # fmt: skip
     found = imported(SourceSection(file=file))
-    assert "m follows f, which is fixed, and so is locked at 0.1" in found.remarks
-    assert any("velocity=-1 is taken for 1" in remark for remark in found.remarks)
+    assert "m follows f, which is fixed, and so is locked at 0.1" in found.warnings
+    assert any("velocity=-1 is taken for 1" in warning for warning in found.warnings)

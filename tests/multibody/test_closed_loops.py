@@ -9,7 +9,7 @@ import scipy.linalg
 from conftest import CLOSED_LOOPS, config_of, slope
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
-from paramreduce_cli.errors import ConcernError, DataError, ParamreduceWarning
+from paramreduce_cli.errors import DataError, NumericalError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.multibody import regressor
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
@@ -388,5 +388,5 @@ def test_equations_that_are_needed_elsewhere_are_not_dropped():
     mechanism = config_of("four_bar", f"description.tree.closures=[{closure}]").mechanism()
     here, there = np.zeros((2, 5, 3))
     here[0, 0] = here[1, 1] = there[0, 0] = there[2, 2] = 1.0
-    with pytest.raises(ConcernError, match="not the same ones"):
+    with pytest.raises(NumericalError, match="not the same ones"):
         _kept(mechanism, mechanism.loops, [here, there])

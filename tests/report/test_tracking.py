@@ -111,10 +111,10 @@ def test_pages_of_loops_say_what_is_timed(invoke, tmp_path):
 
 
 def test_a_model_in_doubt_is_not_timed(invoke, two_link_copy, monkeypatch):
-    def doubted(*_):
+    def failing(*_):
         raise FormulationError("two formulations disagree")
 
-    monkeypatch.setattr(report, "RunningModel", doubted)
+    monkeypatch.setattr(report, "RunningModel", failing)
     made = invoke(
         "report", TWO_LINK, "--results", two_link_copy, "--force", settings=["report.formats=[svg]"]
     )

@@ -8,7 +8,7 @@ import rich.table
 
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import SET, FilePath
-from paramreduce_cli.cli.terminal import LOG, remark, say, say_table
+from paramreduce_cli.cli.terminal import LOG, say, say_table, warn_user
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
@@ -88,12 +88,12 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         )
         if found.weak:
             more = ", ..." if len(found.weak) > _MOST_SHOWN else ""
-            remark(
+            warn_user(
                 f"{len(found.weak)} can hardly be told from the others: "
                 f"{', '.join(found.weak[:_MOST_SHOWN])}{more}"
             )
-    for text in log.doubts:
-        remark(text.rstrip("."))
+    for text in log.warnings:
+        warn_user(text.rstrip("."))
 
 
 def _joints(names: list[str]) -> list[str]:

@@ -118,8 +118,8 @@ def init(
         base = robot.independent[:_BASE] if floating else ()
         log = _log(path, logs, robot.independent, base) if logs else ""
         text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
-        for remark in robot.remarks:
-            say(f"- {remark}.")
+        for warning in robot.warnings:
+            say(f"- {warning}.")
     if path.exists():
         raise exists_already(path)
     _check(text)

@@ -28,10 +28,10 @@ from paramreduce_cli.cli.terminal import (
     LOG,
     VERBOSE,
     emit,
-    remark,
     say,
     say_table,
     show_progress,
+    warn_user,
 )
 from paramreduce_cli.config import load_config, placed_errors
 from paramreduce_cli.records import Report
@@ -41,7 +41,7 @@ from paramreduce_cli.texts import format_percent, format_percent_range
 
 _TABLE_WIDTH = 110
 _MOST_PLACES = 8
-"""Lines that a remark names."""
+"""Lines that a warning names."""
 
 
 @click.command(cls=ExampleCommand, example="run {config}")
@@ -73,7 +73,7 @@ def run(
     quiet = quiet or as_json
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
-    _remark_on_what_is_to_do(config)
+    _warn_of_open_tasks(config)
     for path, key in absent_files(loaded):
         raise missing(
             path,
@@ -106,11 +106,11 @@ def run(
     if not quiet:
         say(f"Selected: {selected['reason']}")
         for text in selected["remarks"]:
-            remark(text.rstrip("."))
+            warn_user(text.rstrip("."))
     return say_verdict(selected["accepted"], selected["verdict"], quiet)
 
 
-def _remark_on_what_is_to_do(config: Path) -> None:
+def _warn_of_open_tasks(config: Path) -> None:
     """Say where a template is not filled in yet; of a pipe there is nothing left to read."""
     if not config.is_file():
         return
@@ -118,7 +118,7 @@ def _remark_on_what_is_to_do(config: Path) -> None:
     marked = [str(k) for k, line in enumerate(lines, start=1) if "# TODO" in line]
     if marked:
         more = ", ..." if len(marked) > _MOST_PLACES else ""
-        remark(
+        warn_user(
             f"{config}: line {', '.join(marked[:_MOST_PLACES])}{more}: marked TODO, so numbers there may be those of "
             "the template"
         )
@@ -134,12 +134,12 @@ def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
     owner = stamp.config if stamp is not None else ""
     folder = runner.store.folder
     if owner not in ("", runner.config_name):
-        remark(
+        warn_user(
             f"{folder} holds results of {owner}, which those of {runner.config_name} replace from {others[0].name} on; give "
             "one of them another name under robot:, or name another folder in --results, to keep both"
         )
     elif changed:
-        remark(
+        warn_user(
             f"{folder} holds results of other settings, which --set replaces from "
             f"{others[0].name} on; name another folder in --results to keep both"
         )

@@ -12,7 +12,7 @@ from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import no_results
-from paramreduce_cli.cli.terminal import JSON, LOG, emit, remark, say
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, say, warn_user
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
@@ -99,7 +99,7 @@ def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
         raise ArtifactError(f"{listed}: none of its {len(left)} runs has ended.")
     if left:
         more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
-        remark(f"left out, as they have not ended: {', '.join(left[:_MOST_NAMED])}{more}")
+        warn_user(f"left out, as they have not ended: {', '.join(left[:_MOST_NAMED])}{more}")
     return ended
 
 

@@ -13,7 +13,7 @@ import numpy as np
 import scipy.linalg
 import scipy.optimize
 
-from paramreduce_cli.errors import Concern, ConcernError, ParamreduceWarning
+from paramreduce_cli.errors import Cause, NumericalError, ParamreduceWarning
 from paramreduce_cli.multibody.kinematics import body_poses
 from paramreduce_cli.multibody.loops.closures import CLOSURES, closure_equations, equation_owners
 from paramreduce_cli.multibody.orthogonal import independent_columns
@@ -41,7 +41,7 @@ def assembled(mechanism: Mechanism) -> Mechanism:
     """The mechanism with its loops closed, and its independent coordinates as in the guess.
 
     Raises:
-        ConcernError: The loops cannot be closed from the guess, equations are redundant, or the
+        NumericalError: The loops cannot be closed from the guess, equations are redundant, or the
             independent coordinates are too many, too few or not independent.
     """
     loops = mechanism.loops
@@ -49,10 +49,10 @@ def assembled(mechanism: Mechanism) -> Mechanism:
         return mechanism
     equations = _Equations(mechanism)
     if not mechanism.dependent:
-        raise ConcernError(
+        raise NumericalError(
             "all coordinates are named, so that the closures have "
             "none left to determine. Leave out those that the loops determine.",
-            Concern.INDEPENDENT,
+            Cause.INDEPENDENT,
         )
     nearest = _closed_nearby(equations, mechanism, loops)
     jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
@@ -79,7 +79,7 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
         Generalised coordinates with closed loops, (n_q,), and positions of independent ones.
 
     Raises:
-        ConcernError: The loops cannot be closed from the guess.
+        NumericalError: The loops cannot be closed from the guess.
     """
     assert mechanism.loops is not None
     equations = _Equations(mechanism)
@@ -122,7 +122,7 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
             q = _closed(equations, mechanism, moved, dependent)
             _check_regular(mechanism, equations.jacobian(q)[kept])
             _check_hinges(mechanism, loops, q)
-        except ConcernError:
+        except NumericalError:
             continue
         q[turns] = loops.assembly[turns] + _wrap_angles(q[turns] - loops.assembly[turns])
         if all(np.abs(q - known).max() > _ANOTHER_MODE for known in modes):
@@ -188,12 +188,12 @@ def _closed(
             for k in range(mechanism.n_q)
             if k not in free
         )
-        raise ConcernError(
+        raise NumericalError(
             f"the loops cannot be closed from the guess"
             f"{f' with {fixed}' if fixed else ''}: there they are open by {before:.3g}, and at "
             f"best by {gaps[worst]:.3g}, at {open_at} (m, or no unit for a tilt). Give a guess nearer to an assembly, or "
             "check lengths and frames.",
-            Concern.ASSEMBLY,
+            Cause.ASSEMBLY,
         )
     return q
 
@@ -205,12 +205,12 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
     they are moved at random before, a little at first.
 
     Raises:
-        ConcernError: The loops cannot be closed.
+        NumericalError: The loops cannot be closed.
     """
     moving = _find_loop_coordinates(mechanism)
     try:
         return _closed(equations, mechanism, loops, moving)
-    except ConcernError:
+    except NumericalError:
         if loops.assembly.any():
             raise
         rng = np.random.default_rng(_SEED)
@@ -220,7 +220,7 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
             try:
                 moved = dataclasses.replace(loops, assembly=start)
                 return _closed(equations, mechanism, moved, moving)
-            except ConcernError:
+            except NumericalError:
                 continue
         raise
 
@@ -235,7 +235,7 @@ def _closed_as_given(
     """
     try:
         return _closed(equations, mechanism, loops, mechanism.dependent)
-    except ConcernError:
+    except NumericalError:
         if loops.assembly[list(mechanism.independent)].any():
             raise
     names = mechanism.generalised_names
@@ -296,18 +296,18 @@ def _rows_beyond_rounding(jacobian: FloatArray) -> IntArray:
 
 
 def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:
-    """Equations that all others follow from; which are dropped is remarked on.
+    """Equations that all others follow from; which are dropped is said in a warning.
 
     Welds of planar or spherical linkages, and rods between two ball joints, have more equations than
     they take away freedom. They can be dropped if the same ones do wherever the loops are closed.
     """
     jacobian, rows = _generic(jacobians)
     if len(rows) == mechanism.n_q:
-        raise ConcernError(
+        raise NumericalError(
             f"the loops are over-constrained: {len(rows)} independent "
             f"equations for {mechanism.n_q} coordinates leave nothing that moves. Leave out a "
             "closure, or use joints or closures with more freedom.",
-            Concern.CLOSURES,
+            Cause.CLOSURES,
         )
     owners = equation_owners(loops.closures)
     if len(rows) == len(owners):
@@ -316,11 +316,11 @@ def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> li
     dropped = ", ".join(name for k, (_, name) in enumerate(owners) if k not in kept)
     for other in jacobians:
         if _rank(other) > _rank(other[kept]):
-            raise ConcernError(
+            raise NumericalError(
                 f"of the {len(owners)} equations {len(rows)} are independent, but not the same ones "
                 f"wherever the loops are closed; {dropped} cannot be left to the others. Use closures "
                 "with fewer equations.",
-                Concern.CLOSURES,
+                Cause.CLOSURES,
             )
     warnings.warn(
         f"of the {len(owners)} equations that close the loops {len(rows)} are independent; dropped are "
@@ -350,28 +350,28 @@ def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
     named = [names[k] for k in mechanism.independent]
     suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
     if len(named) != freedom:
-        raise ConcernError(
+        raise NumericalError(
             f"names {len(named)} coordinates, but {freedom} are "
             f"independent: {mechanism.n_q} coordinates less {len(rows)} independent equations. Name "
             f"{freedom}, for example {suggestion}.",
-            Concern.INDEPENDENT,
+            Cause.INDEPENDENT,
         )
     if np.linalg.cond(np.array(jacobians)[:, :, list(mechanism.dependent)]).min() >= 1 / _RANK:
-        raise ConcernError(
+        raise NumericalError(
             f"{', '.join(named)} are not independent: the loops tie "
             "them to each other, and leave others undetermined. Choose others, for example "
             f"{suggestion}.",
-            Concern.INDEPENDENT,
+            Cause.INDEPENDENT,
         )
 
 
 def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
     if np.linalg.cond(jacobian[:, list(mechanism.dependent)]) >= 1 / _RANK:
         named = (mechanism.generalised_names[k] for k in mechanism.independent)
-        raise ConcernError(
+        raise NumericalError(
             "the assembly it leads to is a singular configuration, in which "
             f"{', '.join(named)} do not determine the other coordinates. Give a guess away from it.",
-            Concern.ASSEMBLY,
+            Cause.ASSEMBLY,
         )
 
 
@@ -385,9 +385,9 @@ def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
         )
         for k in CLOSURES[closure.kind].parallel:
             if A[:, k] @ B[:, k] < 0:
-                raise ConcernError(
+                raise NumericalError(
                     f"{closure.name} closes with its two {'xyz'[k]} axes against each other.",
-                    Concern.HINGE_DIRECTION,
+                    Cause.HINGE_DIRECTION,
                 )
 
 

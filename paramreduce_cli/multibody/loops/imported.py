@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from paramreduce_cli.errors import ConcernError, ConfigError
+from paramreduce_cli.errors import ConfigError, NumericalError
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.multibody.loops.assembly import find_assembly
 from paramreduce_cli.records import Mechanism
@@ -30,10 +30,10 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     driven = named or _driven(robot, names)
     try:
         q, independent = find_assembly(mechanism, driven)
-    except ConcernError as error:
-        remark = f"TODO description.tree.guess: {str(error).rstrip('.')}"
+    except NumericalError as error:
+        warning = f"TODO description.tree.guess: {str(error).rstrip('.')}"
         chosen = robot.independent or tuple(names[k] for k in driven or [0])
-        return replace(robot, independent=chosen, remarks=(*robot.remarks, remark))
+        return replace(robot, independent=chosen, warnings=(*robot.warnings, warning))
     if not independent:
         raise ConfigError(
             f"{robot.source}: the loops leave nothing that moves. Close fewer, let more joints move, or close them "
@@ -48,20 +48,20 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
         )
     guess = {name: round(float(value), _DIGITS) for name, value in zip(names, q, strict=True)}
     guess = {name: value for name, value in guess.items() if value}
-    remarks = robot.remarks
+    warnings = robot.warnings
     if guess:
         shown = ", ".join(f"{name} = {value:.4g}" for name, value in guess.items())
-        remarks = (*remarks, f"the loops are closed at {shown}, which is the guess")
+        warnings = (*warnings, f"the loops are closed at {shown}, which is the guess")
     passed_over = [names[k] for k in driven if k not in independent]
     if passed_over:
-        remarks = (
-            *remarks,
+        warnings = (
+            *warnings,
             f"the loops tie {', '.join(passed_over)} to other coordinates, although the joints are driven: do the closures "
             "take more freedom than those of the robot? `spherical` takes the least",
         )
     if set(named) != set(independent):
         text = f"independent coordinates, which determine all others: {', '.join(own)}"
-        remarks = (*remarks, f"{text}; --independent JOINT chooses others")
+        warnings = (*warnings, f"{text}; --independent JOINT chooses others")
     closed = replace(robot, independent=own, guess=guess)
     outside = [
         f"{name} ({joint.lower:.4g} to {joint.upper:.4g})"
@@ -69,12 +69,12 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
         if not joint.allows(guess.get(name, 0.0))
     ]
     if outside:
-        remarks = (
-            *remarks,
+        warnings = (
+            *warnings,
             f"the guess lies outside the limits that the file gives {', '.join(outside)}; trajectories do not keep to "
             "these limits. Give another guess, or add constraints by hand",
         )
-    return replace(closed, remarks=remarks)
+    return replace(closed, warnings=warnings)
 
 
 def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:

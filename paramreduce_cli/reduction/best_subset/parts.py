@@ -116,9 +116,9 @@ class PartedSearch:
         return self._best.subset
 
     @property
-    def doubtful(self) -> bool:
-        """Whether some part proves nothing; see :attr:`Search.doubtful`."""
-        return any(part.doubtful for part in self._parts())
+    def is_uncertain(self) -> bool:
+        """Whether some part proves nothing; see :attr:`Search.is_uncertain`."""
+        return any(part.is_uncertain for part in self._parts())
 
     @property
     def bound(self) -> float:

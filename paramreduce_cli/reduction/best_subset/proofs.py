@@ -204,8 +204,8 @@ class ProofSearch:
             future.result()
             done = len(self._proofs) - len(self._open())
             if done != shown:
-                remark = f"{done} of {len(self._proofs)} sizes"
-                self._task.progress(Progress("best-subset", done, len(self._proofs), remark))
+                detail = f"{done} of {len(self._proofs)} sizes"
+                self._task.progress(Progress("best-subset", done, len(self._proofs), detail))
                 shown = done
 
     def _threads(self, waiting: int) -> int:
@@ -280,7 +280,7 @@ class ProofSearch:
 
     def _certain(self, search: PartedSearch) -> bool:
         clear = self._objective.problem.certifiable and self._problem.certifiable
-        return clear and not search.doubtful
+        return clear and not search.is_uncertain
 
     @cached_property
     def _least_error(self) -> float:

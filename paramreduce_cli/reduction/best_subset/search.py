@@ -203,7 +203,7 @@ class Search:
         return found
 
     @property
-    def doubtful(self) -> bool:
+    def is_uncertain(self) -> bool:
         """Whether a column was neither surely dependent nor surely not, so that nothing is proven."""
         return bool(self._state.progress[self._kernel.DOUBTFUL])
 

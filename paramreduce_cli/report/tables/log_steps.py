@@ -10,5 +10,5 @@ def log_steps(data: ReportData) -> Table:
     """What was done to the log, and what looks wrong in it."""
     log = data.log
     rows = [] if log is None else [("done", text) for text in log.steps]
-    rows += [] if log is None else [("doubt", text) for text in log.doubts]
+    rows += [] if log is None else [("warning", text) for text in log.warnings]
     return Table("The log", ("", "what"), tuple(rows))

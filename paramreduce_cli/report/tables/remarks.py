@@ -8,5 +8,5 @@ from paramreduce_cli.texts.table import Table
 @placed(PageSection.ACCELERATIONS, 3)
 def remarks(data: ReportData) -> Table:
     """Where models should not be trusted."""
-    rows = [(str(remark.about), remark.text) for remark in data.validation.remarks]
-    return Table("Remarks", ("about", "remark"), tuple(rows))
+    rows = [(str(warning.about), warning.text) for warning in data.validation.warnings]
+    return Table("Warnings", ("about", "warning"), tuple(rows))

@@ -3,14 +3,14 @@
 import numpy as np
 
 from paramreduce_cli.importing.imported import Inertial
-from paramreduce_cli.importing.inertia_checks import doubts
+from paramreduce_cli.importing.inertia_checks import find_inertia_warnings
 
 ROD = np.diag([1e-4, 1 / 12, 1 / 12])
 MIDDLE = np.array([0.5, 0.0, 0.0])
 
 
 def said(**links):
-    return list(doubts(links))
+    return list(find_inertia_warnings(links))
 
 
 def test_a_rod_about_its_middle_is_as_it_should_be():

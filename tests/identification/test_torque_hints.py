@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from simulated_logs import along_axes, arm, coloured, simulated
 
-from paramreduce_cli.identification.expectations import (
-    doubted_gravity,
-    doubted_rating,
-    doubted_sign,
-    doubted_unit,
+from paramreduce_cli.identification.torque_hints import (
+    hint_at_gravity,
+    hint_at_rating,
+    hint_at_sign,
+    hint_at_unit,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
 
@@ -39,7 +39,7 @@ def torques(gravity, seed):
 )  # fmt: skip
 def test_the_axis_of_gravity_is_found(gravity, said, seed):
     W, pulls, tau, noise = torques(gravity, seed)
-    found = doubted_gravity(W, pulls, tau, noise, np.array([0, 0, -9.81]))
+    found = hint_at_gravity(W, pulls, tau, noise, np.array([0, 0, -9.81]))
     assert len(found) == (said is not None)
     assert said is None or said in found[0]
 
@@ -51,7 +51,7 @@ def test_a_factor_of_all_torques_is_found(factor):
     W = dynamics.regressor(log.z, log.dz, log.ddz)
     rng = np.random.default_rng(0)
     # What was identified is not quite what the config says.
-    found = doubted_unit(W @ values, W @ (factor * values * rng.uniform(0.8, 1.2, values.size)))
+    found = hint_at_unit(W @ values, W @ (factor * values * rng.uniform(0.8, 1.2, values.size)))
     if 0.5 < factor < 2:
         assert not found
     elif factor < 0:
@@ -63,8 +63,8 @@ def test_a_factor_of_all_torques_is_found(factor):
 
 def test_unknown_values_let_nothing_expect():
     found = np.random.default_rng(0).normal(size=(50, 3))
-    assert not doubted_unit(np.zeros((50, 3)), found)
-    assert not doubted_unit(np.random.default_rng(1).normal(size=(50, 3)), 100 * found)
+    assert not hint_at_unit(np.zeros((50, 3)), found)
+    assert not hint_at_unit(np.random.default_rng(1).normal(size=(50, 3)), 100 * found)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -89,7 +89,7 @@ def test_a_joint_that_counts_the_other_way_is_found(joint, torques, seed):
             sign[j] = -1
             yield dynamics.regressor(*(sign * values for values in states))
 
-    found = doubted_sign(dynamics.regressor(*states), mirrored(), tau, noise, names)
+    found = hint_at_sign(dynamics.regressor(*states), mirrored(), tau, noise, names)
     assert len(found) == (joint is not None)
     assert joint is None or re.search(rf"speeds of {names[joint]} counted .*, {torques}", found[0])
 
@@ -100,5 +100,5 @@ def test_a_joint_that_counts_the_other_way_is_found(joint, torques, seed):
 def test_torques_far_from_what_joints_are_rated_for_are_doubted(factor, said):
     tau = factor * np.array([[0.5, -0.2], [-0.3, 0.3]]) * np.array([330.0, 56.0])
     rating = np.array([330.0, 56.0]) * np.array([1.0, 0.5] if said == "b" else [1.0, 1.0])
-    found = doubted_rating(tau, rating, ("a", "b"))
+    found = hint_at_rating(tau, rating, ("a", "b"))
     assert (f", of {said}, goes up to" in found[0]) if said else not found

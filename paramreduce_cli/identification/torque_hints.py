@@ -25,7 +25,7 @@ _NEAR = 0.1
 """Share of gravity by which its direction may be off an axis of the base."""
 
 
-def doubted_unit(expected: FloatArray, found: FloatArray) -> list[str]:
+def hint_at_unit(expected: FloatArray, found: FloatArray) -> list[str]:
     """A sentence where the bodies' torques are those of the config's values but for a large factor.
 
     Args:
@@ -52,7 +52,7 @@ def doubted_unit(expected: FloatArray, found: FloatArray) -> list[str]:
     ]
 
 
-def doubted_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) -> list[str]:
+def hint_at_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) -> list[str]:
     """A sentence where torques are far from what joints are made for.
 
     Args:
@@ -71,7 +71,7 @@ def doubted_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) ->
     ]
 
 
-def doubted_sign(
+def hint_at_sign(
     usual: FloatArray,
     mirrored: Iterable[FloatArray],
     tau: FloatArray,
@@ -109,7 +109,7 @@ def _left(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
     return float(np.sum((factor[:, -1] - factor[:, :-1] @ least_squares(factor)) ** 2))
 
 
-def doubted_gravity(
+def hint_at_gravity(
     W: FloatArray, pulls: FloatArray, tau: FloatArray, deviation: FloatArray, gravity: FloatArray
 ) -> list[str]:
     """Say where the residuals are far smaller with gravity along another axis of the base, or without gravity.

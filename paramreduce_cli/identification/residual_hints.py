@@ -1,0 +1,324 @@
+"""What residuals suggest is wrong or missing, in the model or in the log.
+
+Each hint rests on a signal that the residuals would contain if it were true. Of a signal what the
+parameters cannot take up counts; it is suggested where the residuals contain it beyond
+what noise as coloured as theirs explains, the strongest first, each judged with those before it
+accounted for.
+"""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from paramreduce_cli.identification.estimation import LinearFit, weighted_fit
+from paramreduce_cli.identification.uncertainty import score_covariance
+from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.records import FloatArray
+
+_SURE = 5.0
+"""Standard deviations from zero at which a signal is there."""
+_SHARE = 0.02
+"""Of a joint's residuals that it must explain, squared."""
+_OBVIOUS = 0.25
+"""Share that needs less sureness, as what is missing has coloured the noise that it is measured by."""
+_OBVIOUSLY_SURE = 3.0
+_VISIBLE = 1e-3
+"""Share of a signal that the parameters must leave, squared, for it to be told from them."""
+_MOST = 4
+_GAIN = 0.08
+"""Relative error of a torque's scale that is worth a word."""
+_DELAY = 0.15
+"""Of a sampling step, likewise."""
+_TILT = 1.0
+"""Degrees, likewise."""
+_SMOOTH = 0.05
+"""Share of a joint's largest speed over which a smooth sign goes up."""
+_MUCH_BETTER = 0.5
+"""What squared residuals fall to when signs or columns of torques are put right."""
+
+
+@dataclass(frozen=True)
+class _Signal:
+    """A signal that residuals may contain."""
+
+    joint: int | None
+    """Whose residuals; None for all together."""
+    signal: tuple[FloatArray, ...]
+    """(n_samples, n_dof) for each part."""
+    said: Callable[[float, float], str | None]
+    """The sentence for its coefficient and share; None where that is too small to matter."""
+
+
+def find_residual_hints(
+    fitted: LinearFit,
+    names: Sequence[str],
+    tilts: Sequence[tuple[FloatArray, ...]] = (),
+    gravity: float = 9.81,
+    delay: float = 0.0,
+    sliding: Sequence[bool] = (),
+    modelled: Collection[str] = (),
+) -> list[str]:
+    """Sentences on what the residuals suggest, the strongest first.
+
+    Args:
+        fitted: The model of all base parameters on the training data.
+        names: Of the coordinates.
+        tilts: Torques that gravity of one unit along each horizontal axis would cause, (n_samples, n_dof)
+            for each part of the rows.
+        gravity: m/s^2
+        delay: That was taken back already, s.
+        sliding: Whether coordinates are lengths; none if left out.
+        modelled: Keys of drives that are in the model, such as ``drives.q1.coulomb``.
+    """
+    mistaken = list(_mistaken_columns(fitted, names))
+    if mistaken:
+        return mistaken
+    found: list[str] = []
+    tried: set[int] = set()
+    slides = list(sliding) or [False] * len(names)
+    candidates = list(_list_signals(fitted, names, tilts, gravity, delay, slides, modelled))
+    while len(found) < _MOST:
+        judged = [
+            (*_judged(fitted, candidate), k)
+            for k, candidate in enumerate(candidates)
+            if k not in tried
+        ]
+        good = [entry for entry in judged if _convincing(*entry[:3])]
+        if not good:
+            break
+        _, share, coefficient, k = max(good, key=lambda entry: entry[1])
+        tried.add(k)
+        text = candidates[k].said(coefficient, share)
+        if text is None:
+            continue
+        found.append(text)
+        if (
+            candidates[k].joint is None
+        ):  # all joints are wrong in it, and what else is seen follows from that
+            break
+        fitted = _with(fitted, candidates[k].signal)
+    return found
+
+
+def _convincing(sureness: float, share: float, coefficient: float) -> bool:
+    sure = abs(sureness) > _SURE and share > _SHARE
+    return sure or (abs(sureness) > _OBVIOUSLY_SURE and share > _OBVIOUS)
+
+
+def _judged(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]:
+    """How many standard deviations from zero, share of the residuals, and coefficient."""
+    left = fitted.left_of(candidate.signal)
+    weights = fitted.weights
+    size = sum(float(np.sum(u**2 * weights)) for u in left)
+    whole = sum(float(np.sum(u**2 * weights)) for u in candidate.signal)
+    if whole == 0 or size < _VISIBLE * whole:
+        return 0.0, 0.0, 0.0
+    pairs = list(zip(left, fitted.residuals, strict=True))
+    score = sum(float(np.sum(u * e * weights)) for u, e in pairs)
+    spread = score_covariance([u[..., None] for u in left], fitted.noise, weights)[0, 0]
+    picked = slice(None) if candidate.joint is None else candidate.joint
+    own = sum(float(np.sum((e**2 * weights)[:, picked])) for e in fitted.residuals)
+    return score / np.sqrt(max(spread, 1e-300)), score**2 / (size * max(own, 1e-300)), score / size
+
+
+def _with(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
+    """The fit with one more column."""
+    rows = fitted.rows
+    X = tuple(
+        np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True)
+    )
+    return weighted_fit(replace(rows, X=X), fitted.deviation)
+
+
+def _alone(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
+    """Signals of one joint, zero for the others."""
+    found = []
+    for part in values:
+        signal = np.zeros_like(part)
+        signal[:, joint] = part[:, joint]
+        found.append(signal)
+    return tuple(found)
+
+
+def _list_signals(
+    fitted: LinearFit,
+    names: Sequence[str],
+    tilts: Sequence[tuple[FloatArray, ...]],
+    gravity: float,
+    delay: float,
+    sliding: Sequence[bool],
+    modelled: Collection[str],
+) -> Iterator[_Signal]:
+    def _missing(name: str, what: str, unit: str, key: str) -> Callable[[float, float], str]:
+        return _follows(what, unit, name, f"drives.{name}.{key}", modelled)
+
+    rows = fitted.rows
+    fastest = np.max([np.abs(v).max(axis=0) for v in rows.dz], axis=0)
+    fastest = np.where(fastest > 0, fastest, 1.0)
+    model = [x @ fitted.parameters for x in rows.X]
+    for j, name in enumerate(names):
+        if not np.isfinite(fitted.deviation[j]):
+            continue
+        force = "N" if sliding[j] else "N m"
+        signs = [np.sign(v) for v in rows.dz]
+        smooth = [np.tanh(v / (_SMOOTH * fastest)) for v in rows.dz]
+        constant = [np.ones_like(v) for v in rows.dz]
+        yield _Signal(
+            j, _alone(signs, j), _missing(name, "the sign of its speed", force, "coulomb")
+        )
+        yield _Signal(j, _alone(smooth, j), _smoother(name, _SMOOTH * fastest[j]))
+        yield _Signal(
+            j,
+            _alone(rows.dz, j),
+            _missing(name, "its speed", "N s/m" if sliding[j] else "N m s/rad", "viscous"),
+        )
+        yield _Signal(
+            j,
+            _alone(rows.ddz, j),
+            _missing(name, "its acceleration", "kg" if sliding[j] else "kg m^2", "inertia"),
+        )
+        yield _Signal(j, _alone(constant, j), _missing(name, "a constant", force, "offset"))
+        yield _Signal(j, _alone(model, j), _scaled(name))
+    slopes = tuple(
+        np.gradient(t, rows.step, axis=0) if len(t) > 1 else np.zeros_like(t) for t in model
+    )
+    yield _Signal(None, slopes, _delayed(rows.step, delay))
+    for axis, signal in zip("xy", tilts, strict=False):
+        yield _Signal(None, signal, _tilted(axis, gravity))
+
+
+def _follows(
+    what: str, unit: str, name: str, key: str, modelled: Collection[str]
+) -> Callable[[float, float], str]:
+    def said(coefficient: float, share: float) -> str:
+        return (
+            f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * share:.0f} % of them): "
+            f"{key} is {'of another form' if key in modelled else 'missing'}."
+        )
+
+    return said
+
+
+def _smoother(name: str, speed: float) -> Callable[[float, float], str | None]:
+    def said(coefficient: float, share: float) -> str:
+        return (
+            f"Residuals of {name} follow a smooth sign of its speed ({100 * share:.0f} % of them): friction that "
+            f"goes over from one sign to the other; try drives.{name}.smoothing: {speed:.2g}."
+        )
+
+    return said
+
+
+def _scaled(name: str) -> Callable[[float, float], str | None]:
+    def said(coefficient: float, share: float) -> str | None:
+        if abs(coefficient) < _GAIN:
+            return None
+        return (
+            f"Torques of {name} are {1 + coefficient:.3g} times what those of the other joints let expect: a "
+            "wrong torque constant or gear ratio?"
+        )
+
+    return said
+
+
+def _delayed(step: float, known: float) -> Callable[[float, float], str | None]:
+    def said(coefficient: float, share: float) -> str | None:
+        if abs(coefficient) < _DELAY * step:
+            return None
+        later = "later" if coefficient < 0 else "earlier"
+        return (
+            f"Torques come {abs(coefficient) * 1e3:.3g} ms {later} than positions; try "
+            f"sampling.log.delay: {known - coefficient:.3g}."
+        )
+
+    return said
+
+
+def _tilted(axis: str, gravity: float) -> Callable[[float, float], str | None]:
+    def said(coefficient: float, share: float) -> str | None:
+        angle = float(np.degrees(np.arctan2(abs(coefficient), gravity)))
+        if angle < _TILT:
+            return None
+        return (
+            f"Gravity seems to have {coefficient:.2g} m/s^2 along {axis} of the base, {angle:.2g} degrees: is the "
+            "base level, and description.gravity right?"
+        )
+
+    return said
+
+
+def hint_at_negative_friction(
+    names: Sequence[str], owners: Sequence[str], values: FloatArray, deviations: FloatArray
+) -> list[str]:
+    """A sentence where friction surely drives the machine, as with the wrong sign of torques or speeds.
+
+    Args:
+        names: Of friction parameters, (n,).
+        owners: Joints that they are of, (n,).
+        values: (n,)
+        deviations: Standard deviations, (n,).
+    """
+    wrong: list[int] = np.flatnonzero(values < -_SURE * deviations).tolist()
+    joints = list(dict.fromkeys(owners[k] for k in wrong))
+    if not joints:
+        return []
+    listed = ", ".join(f"{names[k]} = {values[k]:.3g}" for k in wrong[:_MOST])
+    if len(joints) > max(1, len(set(owners)) / 2):
+        return [
+            f"Friction comes out negative at most joints ({listed}): is the sign of all torques wrong? See "
+            "sampling.log.signs."
+        ]
+    return [
+        f"Friction of {' and '.join(joints)} comes out negative ({listed}): is the sign of its torques or speeds "
+        "wrong, or friction of another form? See sampling.log.signs."
+    ]
+
+
+def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
+    """Torques with the wrong sign, or of another joint: with them right the residuals collapse."""
+    rows = fitted.rows
+    n_dof, p = len(names), fitted.parameters.size
+    tau = np.concatenate(rows.tau)
+    scale = np.sqrt(np.mean(tau**2, axis=0))
+    scale[(scale == 0) | ~np.isfinite(fitted.deviation)] = np.inf
+    X = np.concatenate(rows.X)
+    factors = [
+        np.linalg.qr(np.column_stack([X[:, j], tau]), mode="r") / scale[j] for j in range(n_dof)
+    ]
+
+    def left(owner: Sequence[int], signs: FloatArray) -> float:
+        A = np.concatenate([f[:, :p] for f in factors])
+        y = np.concatenate([f[:, p + owner[j]] * signs[j] for j, f in enumerate(factors)])
+        solution = least_squares(np.column_stack([A, y]))
+        return float(np.sum((y - A @ solution) ** 2))
+
+    usual, plain = list(range(n_dof)), np.ones(n_dof)
+    before = left(usual, plain)
+    found: list[tuple[float, str]] = []
+    seen = np.flatnonzero(np.isfinite(scale)).tolist()
+    for j in seen:
+        name = names[j]
+        signs = plain.copy()
+        signs[j] = -1
+        found.append(
+            (
+                left(usual, signs),
+                f"With the other sign of {name}'s torques the residuals are far smaller: is its sign "
+                "wrong? See sampling.log.signs.",
+            )
+        )
+    for i, j in combinations(seen, 2):
+        owner = usual.copy()
+        owner[i], owner[j] = j, i
+        found.append(
+            (
+                left(owner, plain),
+                f"With the torques of {names[i]} and {names[j]} exchanged the residuals are far smaller: "
+                "are their columns swapped?",
+            )
+        )
+    after, text = min(found, default=(before, ""))
+    if after < _MUCH_BETTER * before:
+        yield text
