@@ -16,7 +16,7 @@ LAYERS = [
     {"cli", "__main__", "api"},
     {"running"},
     {"stages"},
-    {"judgement", "artifacts", "tracking", "export", "report"},
+    {"judgement", "artifacts", "export", "report"},
     {"motion", "terms"},
     {"excitation", "identification", "reduction", "lean"},
     {"multibody"},

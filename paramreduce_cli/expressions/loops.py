@@ -1,7 +1,8 @@
 """Loops that Numba compiles once for all runs, kept in its cache and checked before they are loaded.
 
 Numba keeps machine code and its index without any checksum, and runs what it finds. Here a SHA-256 follows both, which
-unpickling does not look at; what does not fit is compiled again.
+unpickling does not look at; what does not fit is compiled again. A checksum in a file beside would need the same methods:
+Numba has no other place to compare one before it loads, and two files cannot be replaced at once.
 """
 
 import hashlib

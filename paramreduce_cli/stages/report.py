@@ -44,8 +44,8 @@ from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
+from paramreduce_cli.report.tracking.demonstration import tracked
 from paramreduce_cli.texts.latex_table import latex_table
-from paramreduce_cli.tracking.demonstration import tracked
 
 _POSES = 3
 _MOTIONS, _FRAMES = 40, 1200

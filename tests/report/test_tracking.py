@@ -10,9 +10,9 @@ from conftest import CONFIGS, TWO_LINK
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.export import running
 from paramreduce_cli.records import Paths, Tracking
+from paramreduce_cli.report.tracking.control import advanced, simulate
+from paramreduce_cli.report.tracking.paths import point_to_point
 from paramreduce_cli.stages import report
-from paramreduce_cli.tracking.control import advanced, simulate
-from paramreduce_cli.tracking.paths import point_to_point
 
 INERTIA, WEIGHT = 0.4, 3.0
 

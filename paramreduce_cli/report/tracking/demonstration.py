@@ -10,8 +10,8 @@ from paramreduce_cli.config.schema import TrackingSection
 from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import FloatArray, Model, Tracking
-from paramreduce_cli.tracking.control import Arm, advanced, simulate
-from paramreduce_cli.tracking.paths import point_to_point
+from paramreduce_cli.report.tracking.control import Arm, advanced, simulate
+from paramreduce_cli.report.tracking.paths import point_to_point
 
 _SHARE = 0.8
 """Of the range and speed of a motion that the paths keep to."""
