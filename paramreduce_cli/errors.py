@@ -1,4 +1,4 @@
-"""The errors a user can meet; each message is complete as it stands.
+"""Errors that a user can meet; each message is complete in itself.
 
 Every class carries the exit code its kind of failure has at the shell. Numerics know no config:
 what of it stands in their way they name as a :class:`Cause`, and
@@ -10,26 +10,26 @@ from enum import Enum, auto
 from typing import Any
 
 Key = tuple[str | int, ...]
-"""Where something stands in a config: names of keys, and numbers of items in lists."""
+"""Path of a value in a config: names of keys, and positions in lists."""
 
 
 class Cause(Enum):
-    """What a numerical error is about, whatever it is called in a config."""
+    """A part of the robot's description or of the settings that a calculation fails on, whatever its key is called."""
 
     ASSEMBLY = auto()
-    """Where the closing of loops starts from."""
+    """Guess of the coordinates from which loops are closed."""
     HINGE_DIRECTION = auto()
-    """Which way round a hinge of a loop closes."""
+    """Direction in which a hinge of a loop closes."""
     CLOSURES = auto()
-    """How the loops are closed."""
+    """Closures of the loops."""
     INDEPENDENT = auto()
-    """Which coordinates are independent."""
+    """Choice of independent coordinates."""
     RANK = auto()
-    """From which size on singular values count as zero."""
+    """Size below which singular values count as zero."""
     REACH = auto()
-    """Where the loops cannot be closed any more, within the position limits."""
+    """Position limits within which the loops cannot be closed everywhere."""
     FULL_RANGE = auto()
-    """That every motion must come to its limits, which loops do not allow."""
+    """Demand that every motion reaches its limits, which loops do not allow."""
     BOUNDS = auto()
     """Bounds on quantities that no position keeps."""
     BOUNDED_MOTION = auto()
@@ -37,20 +37,20 @@ class Cause(Enum):
     LOADS = auto()
     """Limits of torque and power that no motion keeps."""
     GRID = auto()
-    """How many points a trajectory is optimised on."""
+    """Number of points on which a trajectory is optimised."""
     SYMMETRIES = auto()
-    """Images that complete a set of trajectories."""
+    """Symmetries that complete a set of trajectories."""
 
 
 class ParamreduceError(Exception):
-    """Something the user can mend.
+    """An error that the user can fix.
 
     Args:
-        message: What is wrong and what would be right, complete as it stands but for the remedy.
-        rejected: Word of the call that is wrong, as it was given: a path, an option's value, a setting.
-        choices: Words that would be right in its place; the default first where it is written out.
-        command: Stage, or ``run``, that mends it with the config of the call.
-        remedy: Sentence on what to do, with the command where that is another one.
+        message: What is wrong and what would be right, without the remedy.
+        rejected: Word of the call that is wrong, as the user typed it: a path, an option's value, a setting.
+        choices: Words that would be right in its place; a choice with a number, such as ``swap:4``, is the default.
+        command: Stage, or ``run``, that fixes the error when called with the config of the call.
+        remedy: Sentence on what to do, for commands other than ``command``.
         options: Option and value that the call lacks, or has wrong.
     """
 
@@ -86,13 +86,13 @@ class ParamreduceError(Exception):
 
 
 class ConfigError(ParamreduceError):
-    """A configuration that cannot be used as it is written.
+    """A config that cannot be used as it is written.
 
     Args:
-        message: Of the key's value, if there is a key: ``is ...``, ``has ...`` or a sentence.
-        key: Where it stands; the line is looked up from it.
-        in_file: Whether a line of a file is wrong, not the call.
-        fields: As for :class:`ParamreduceError`.
+        message: Sentence, or the rest of a sentence about the value of the key: ``is ...``, ``has ...``.
+        key: Path of the wrong value in the config; the line is looked up from this path.
+        in_file: Whether a line of a file is wrong, instead of a word of the call.
+        fields: Fields of :class:`ParamreduceError`.
     """
 
     def __init__(
@@ -104,13 +104,13 @@ class ConfigError(ParamreduceError):
         """File and line, or setting, in which the key stands, once that is known."""
 
     def describe(self, arguments: str = "CONFIG") -> str:
-        """Return place, key, message and remedy."""
-        text = keyed(self.key, super().describe(arguments))
+        """Return the message with its place, its key and its remedy."""
+        text = prepend_key(self.key, super().describe(arguments))
         return f"{self.place}: {text}" if self.place else text
 
 
-def keyed(key: Key, message: str) -> str:
-    """A message about a key, which begins with it."""
+def prepend_key(key: Key, message: str) -> str:
+    """Return a message about a key, with the key in front."""
     if not key:
         return message
     separator = " " if message.startswith(("is ", "has ")) else ": "
@@ -118,22 +118,22 @@ def keyed(key: Key, message: str) -> str:
 
 
 class MissingConfigError(ConfigError):
-    """A call that names no config where one is needed."""
+    """A call without a config where a config is needed."""
 
 
 class ArtifactError(ParamreduceError):
-    """A file between stages that is missing, foreign, damaged or in use."""
+    """An artifact that is missing, damaged, in use, or of another robot or program."""
 
 
 class DataError(ParamreduceError):
-    """Data brought by the user that does not fit the robot or is not usable."""
+    """User-supplied data that do not fit the robot or cannot be used."""
 
 
 class NumericalError(ParamreduceError):
-    """A calculation that something in the description or the settings does not allow.
+    """A calculation that the robot's description or the settings make impossible.
 
     Args:
-        message: The cause, and a remedy as far as it needs no key.
+        message: What failed, with a remedy if the remedy needs no key.
         concern: What stands in the way.
     """
 
@@ -144,7 +144,7 @@ class NumericalError(ParamreduceError):
 
 
 class FormulationError(ParamreduceError):
-    """A lean model does not compute what it should."""
+    """A lean model that computes wrong values."""
 
 
 class ParamreduceWarning(UserWarning):

@@ -1,4 +1,4 @@
-"""Names to functions: everything that is chosen by name in a config or at the shell.
+"""Registries: functions that a config or a command chooses by name.
 
 What a room offers are the files in its folder: ``forward_selection.py`` holds the function
 ``forward_selection`` and is called forward-selection. So a new file is all it takes to add one,
@@ -14,37 +14,37 @@ from typing import Any
 _PACKAGE = Path(__file__).parent
 
 
-def offered(folder: str) -> tuple[str, ...]:
-    """Public names in a folder of the package, such as ``reduction/heuristics``; nothing is imported.
+def list_names(folder: str) -> tuple[str, ...]:
+    """Return the public names of a folder of the package, such as ``reduction/heuristics``, without importing anything.
 
     Raises:
         ValueError: There is no such folder.
     """
-    files = _files(_PACKAGE / folder)
+    files = _find_files(_PACKAGE / folder)
     if not files:
         raise ValueError(f"{folder} offers nothing")
     return tuple(files)
 
 
-def _files(folder: Path) -> dict[str, Path]:
-    """Files by the names they offer; folders inside belong to it."""
+def _find_files(folder: Path) -> dict[str, Path]:
+    """Return the files of a folder and its subfolders by public name."""
     found = sorted(path for path in folder.rglob("*.py") if not path.stem.startswith("_"))
     return {path.stem.replace("_", "-"): path for path in found}
 
 
 class Registry:
-    """The functions that a room offers, by their public names.
+    """The functions of a subpackage by public name, each imported when it is first asked for.
 
     A room makes it in its ``__init__``, so that it imports no files but its own.
 
     Args:
-        kind: What its entries are, for messages.
-        room: Name of the package whose ``__init__`` makes it.
+        kind: Kind of the entries, for messages.
+        room: Name of the subpackage whose ``__init__`` makes the registry.
     """
 
     def __init__(self, kind: str, room: str) -> None:
         self.kind = kind
-        self._files = _files(_PACKAGE.joinpath(*room.split(".")[1:]))
+        self._files = _find_files(_PACKAGE.joinpath(*room.split(".")[1:]))
 
     def __getitem__(self, name: str) -> Any:
         path = self._files[name].relative_to(_PACKAGE.parent).with_suffix("")
@@ -59,8 +59,8 @@ class Registry:
     def __len__(self) -> int:
         return len(self._files)
 
-    def summary(self, name: str) -> str:
-        """First line of a function's docstring; its file is read, not imported."""
+    def read_summary(self, name: str) -> str:
+        """Return the first line of a function's docstring, read from its file without an import."""
         path = self._files[name]
         functions = (
             node
@@ -70,5 +70,5 @@ class Registry:
         return (ast.get_docstring(next(functions)) or "").partition("\n")[0]
 
     def items(self) -> list[tuple[str, Any]]:
-        """Names with their functions."""
+        """Return all names with their functions."""
         return [(name, self[name]) for name in self]

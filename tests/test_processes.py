@@ -7,14 +7,14 @@ from functools import partial
 import pytest
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.resources.processes import worker_pool
+from paramreduce_cli.resources.processes import start_workers
 
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_each_item_comes_with_its_result(jobs):
-    with worker_pool(jobs, partial(int, "3")) as pool:
-        assert dict(pool.as_done(pow, range(5))) == {k: 3**k for k in range(5)}
-        assert dict(pool.as_done(divmod, [2])) == {2: (1, 1)}
+    with start_workers(jobs, partial(int, "3")) as pool:
+        assert dict(pool.map_unordered(pow, range(5))) == {k: 3**k for k in range(5)}
+        assert dict(pool.map_unordered(divmod, [2])) == {2: (1, 1)}
 
 
 def end_process(_, status):
@@ -23,10 +23,10 @@ def end_process(_, status):
 
 @pytest.mark.parametrize("between", [False, True])
 def test_a_process_that_dies_is_said_whenever_it_does(between):
-    with worker_pool(2, partial(int, "3")) as pool:
-        assert dict(pool.as_done(pow, range(50))) == {k: 3**k for k in range(50)}
+    with start_workers(2, partial(int, "3")) as pool:
+        assert dict(pool.map_unordered(pow, range(50))) == {k: 3**k for k in range(50)}
         if between:
             for number in pool._processes._processes:
                 os.kill(number, signal.SIGKILL)
         with pytest.raises(DataError, match="a worker process died"):
-            list(pool.as_done(pow if between else end_process, range(100)))
+            list(pool.map_unordered(pow if between else end_process, range(100)))

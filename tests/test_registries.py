@@ -12,7 +12,7 @@ from paramreduce_cli.excitation.scalings import scalings
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.heuristics import heuristics
-from paramreduce_cli.registry import Registry, offered
+from paramreduce_cli.registry import Registry, list_names
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.sections import place_of
 from paramreduce_cli.report.tables import tables
@@ -70,7 +70,7 @@ def test_the_schema_offers_them():
 
 def test_rooms_that_offer_nothing_are_a_mistake():
     with pytest.raises(ValueError, match="nowhere offers nothing"):
-        offered("nowhere")
+        list_names("nowhere")
 
 
 def test_unknown_names_are_key_errors():

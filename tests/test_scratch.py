@@ -6,7 +6,7 @@ import sys
 import numpy as np
 import pytest
 
-from paramreduce_cli.resources.scratch import LargeTable, large_matrix, side_by_side, stacked
+from paramreduce_cli.resources.scratch import LargeTable, allocate_matrix, stack_columns, stack_rows
 
 SCRATCH = sys.modules["paramreduce_cli.resources.scratch"]
 
@@ -30,7 +30,7 @@ def place(request, monkeypatch, tmp_path):
 
 
 def test_a_matrix_has_columns_without_gaps_and_can_be_written(place):
-    found = large_matrix(5, 3)
+    found = allocate_matrix(5, 3)
     assert found.shape == (5, 3)
     assert found.T.flags.c_contiguous
     assert type(found) is np.ndarray
@@ -41,9 +41,9 @@ def test_a_matrix_has_columns_without_gaps_and_can_be_written(place):
 
 def test_columns_and_parts_are_joined(place):
     rows = np.arange(20.0).reshape(10, 2)
-    np.testing.assert_array_equal(side_by_side(list(rows.T)), rows)
-    np.testing.assert_array_equal(stacked([rows[:4], rows[4:5], rows[5:]]), rows)
-    assert stacked([rows]) is rows
+    np.testing.assert_array_equal(stack_columns(list(rows.T)), rows)
+    np.testing.assert_array_equal(stack_rows([rows[:4], rows[4:5], rows[5:]]), rows)
+    assert stack_rows([rows]) is rows
 
 
 @pytest.mark.parametrize("n_rows", [0, 1, 4, 50])
@@ -53,5 +53,5 @@ def test_a_table_of_unknown_length(place, n_rows):
         for row in rows:
             table.extend(row.tolist())
         assert bool(table) == (n_rows > 0)
-        found = table.matrix(3)
+        found = table.to_matrix(3)
     np.testing.assert_array_equal(found, rows)

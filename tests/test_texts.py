@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paramreduce_cli.texts import format_percent_range
-from paramreduce_cli.texts.measured import measured
+from paramreduce_cli.texts.measured import format_measured
 
 
 @pytest.mark.parametrize(
@@ -23,12 +23,12 @@ from paramreduce_cli.texts.measured import measured
     ],
 )
 def test_values_have_the_digits_that_are_sure(value, deviation, said):
-    assert measured(value, deviation) == said
+    assert format_measured(value, deviation) == said
 
 
 @given(st.floats(-1e6, 1e6), st.floats(1e-12, 1e6))
 def test_what_is_left_out_is_far_less_than_the_deviation(value, deviation):
-    told, _ = measured(value, deviation)
+    told, _ = format_measured(value, deviation)
     assert abs(float(told) - value) <= 0.06 * deviation + 1e-12 * abs(value) or deviation > 10
     assert abs(float(told) - value) <= 0.5
 

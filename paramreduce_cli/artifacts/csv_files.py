@@ -86,7 +86,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
                     for k in kept
                 )  # fmt: skip
             left_out = [name for k, name in enumerate(header) if name and k not in kept]
-            return NumberTable([header[k] for k in kept], table.matrix(len(kept)), left_out)
+            return NumberTable([header[k] for k in kept], table.to_matrix(len(kept)), left_out)
     except FileNotFoundError as error:
         raise missing(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:

@@ -16,7 +16,7 @@ from paramreduce_cli.artifacts.csv_files import read_csv
 from paramreduce_cli.artifacts.hdf5 import reading
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray, RawLog
-from paramreduce_cli.resources.scratch import large_matrix
+from paramreduce_cli.resources.scratch import allocate_matrix
 
 _MOST_COLUMNS = 64
 """Columns of a matrix beyond which they are samples, where rows are fewer."""
@@ -81,7 +81,7 @@ def _kind(item: Any) -> str:
 
 def _columns(rows: Any) -> FloatArray:
     """Rows, (n_rows,) or (n_rows, n), as a matrix of columns; read some at a time."""
-    result = large_matrix(rows.shape[0], rows.shape[1] if rows.ndim == 2 else 1)
+    result = allocate_matrix(rows.shape[0], rows.shape[1] if rows.ndim == 2 else 1)
     for start in range(0, len(result), _AT_ONCE):
         some = rows[start : start + _AT_ONCE]
         result[start : start + _AT_ONCE] = some.reshape(len(some), -1)
@@ -122,7 +122,7 @@ def _members(archive: zipfile.ZipFile, others: dict[str, str]) -> Iterator[tuple
                 continue
             if n_rows * n_columns * kind.itemsize != info.file_size - file.tell():
                 raise ValueError(f"{info.filename} does not hold the {shape} numbers it declares")
-            result = large_matrix(n_rows, n_columns)
+            result = allocate_matrix(n_rows, n_columns)
             # Numbers follow each other row by row, or column by column.
             lines = result.T if by_column else result
             at_once = 1 if by_column else _AT_ONCE

@@ -149,7 +149,7 @@ class _Commands(click.Group):
         rooms = {name: room for room in (stages, commands) for name in room}
         with formatter.section("Commands"):
             formatter.write_dl(
-                [(name, rooms[name].summary(name)) for name in self.list_commands(ctx)]
+                [(name, rooms[name].read_summary(name)) for name in self.list_commands(ctx)]
             )
 
 

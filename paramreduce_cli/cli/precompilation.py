@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.resources.processes import worker_pool
+from paramreduce_cli.resources.processes import start_workers
 
 _EXAMPLE = "two_link"
 _QUICK = (
@@ -26,8 +26,8 @@ def compile_loops() -> None:
     Raises:
         DataError: A process died.
     """
-    with worker_pool(2, _search_examples) as pool:
-        for _ in pool.as_done(_compile, ["proofs", "terms"]):
+    with start_workers(2, _search_examples) as pool:
+        for _ in pool.map_unordered(_compile, ["proofs", "terms"]):
             pass
 
 

@@ -14,7 +14,7 @@ from paramreduce_cli.config.schema import Config
 from paramreduce_cli.errors import Key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import RATHER_DEGREES
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
 from paramreduce_cli.robots.inertia import physical, pseudo_inertia
@@ -277,7 +277,7 @@ def _unmeasured(config: Config) -> Iterator[Problem]:
     for key in ("torque_limits", "power_limits"):
         given = getattr(config.trajectories, key) or [np.inf]
         if len(given) in (1, len(names)):
-            limits = dict(zip(names, per_joint(given, len(names)), strict=True))
+            limits = dict(zip(names, expand_per_joint(given, len(names)), strict=True))
             for name in set(config.unmeasured) & set(names):
                 if np.isfinite(limits[name]):
                     yield (

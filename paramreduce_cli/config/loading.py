@@ -20,7 +20,7 @@ from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.config.sections import keys_named
-from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, keyed
+from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, prepend_key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import read_constants
 from paramreduce_cli.fields.section import Section
@@ -364,7 +364,7 @@ def _unwrap(annotation: Any) -> Any:
 def _line(document: Document, problem: Problem) -> str:
     path, message = problem[0], str(problem[1])
     end = "" if message.rstrip().endswith((".", "?")) else "."
-    return f"{document.place(path)}: {keyed(path, message)}{end}"
+    return f"{document.place(path)}: {prepend_key(path, message)}{end}"
 
 
 def _without_unused_tests(config: Config) -> Config:

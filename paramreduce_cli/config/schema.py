@@ -29,8 +29,8 @@ from paramreduce_cli.fields.section import (
     Section,
     Seed,
     Span,
-    as_words,
-    per_joint,
+    expand_per_joint,
+    split_words,
 )
 from paramreduce_cli.records import (
     SETS,
@@ -118,10 +118,10 @@ class TrajectoriesSection(Section):
         return JointLimits(
             lower=pairs[:, 0],
             upper=pairs[:, 1],
-            velocity=per_joint(self.velocity_limits, n_dof),
-            acceleration=per_joint(self.acceleration_limits or [np.inf], n_dof),
-            torque=per_joint(self.torque_limits or [np.inf], n_dof),
-            power=per_joint(self.power_limits or [np.inf], n_dof),
+            velocity=expand_per_joint(self.velocity_limits, n_dof),
+            acceleration=expand_per_joint(self.acceleration_limits or [np.inf], n_dof),
+            torque=expand_per_joint(self.torque_limits or [np.inf], n_dof),
+            power=expand_per_joint(self.power_limits or [np.inf], n_dof),
         )
 
     def bounded(self, mechanism: Mechanism) -> tuple[Constraint, ...]:
@@ -376,7 +376,9 @@ class ReportSection(Section):
     """Heading; the robot's name if left out."""
     formats: Annotated[
         list[Literal["pdf", "svg", "png"]],
-        BeforeValidator(as_words, json_schema_input_type=list[Literal["pdf", "svg", "png"]] | str),
+        BeforeValidator(
+            split_words, json_schema_input_type=list[Literal["pdf", "svg", "png"]] | str
+        ),
         Field(min_length=1),
     ] = ["svg"]
     """File formats of the figures: pdf, svg, png, or a list of these. PDF figures have the width of a paper's column."""

@@ -1,1 +1,1 @@
-"""What the sections of a YAML are made of: numbers, names, one value for all joints or one each."""
+"""Types of the values in a YAML file: numbers, names, and values for all joints or for each."""

@@ -13,7 +13,7 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, ValidationInfo, WithJsonSchema
 
 RATHER_DEGREES = 25.0
-"""Positions beyond this, in rad, are rather degrees."""
+"""Size of a position, rad, beyond which it was probably written in degrees."""
 _CONSTANTS = {"pi": math.pi, "inf": math.inf, "deg": math.pi / 180}
 _DEGREES = re.compile(r"(?<=[\d.)])\s*(?:deg\b|°)")
 _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
@@ -26,21 +26,22 @@ _BINARY: dict[type[ast.operator], Callable[[float, float], float]] = {
 _LONGEST = 100
 _LARGEST_POWER = 64
 _SHOWN = 80
-"""Characters of a value in a message."""
+"""Characters of a value that a message shows."""
 
 
-def _shown(value: Any) -> str:
+def _abbreviate(value: Any) -> str:
+    """Return a value as text, cut after so many characters."""
     text = repr(value)
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."
 
 
 def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> float:
-    """Read a number or a small arithmetic expression.
+    """Return the value of a number or a small arithmetic expression.
 
     Args:
         value: A number, or text made of numbers, ``pi``, ``inf``, names of constants,
             + - * / ** and brackets; ``90deg`` is 90 degrees in rad.
-        constants: By name.
+        constants: Values of constants by name.
 
     Raises:
         ValueError: It is neither.
@@ -48,7 +49,7 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
     known = {**_CONSTANTS, **(constants or {})}
     example = "write one such as 0.5, 1e-3, pi/2 or 90deg"
     if isinstance(value, bool) or not isinstance(value, int | float | str):
-        raise ValueError(f"{_shown(value)} is not a number; {example}")
+        raise ValueError(f"{_abbreviate(value)} is not a number; {example}")
     if isinstance(value, int | float):
         result = float(value)
     else:
@@ -61,13 +62,14 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
         except (ValueError, SyntaxError, ArithmeticError, TypeError, RecursionError) as error:
             if constants:
                 example += f", or with the constants {', '.join(constants)}"
-            raise ValueError(f"{_shown(value)} is not a number; {example}") from error
+            raise ValueError(f"{_abbreviate(value)} is not a number; {example}") from error
     if math.isnan(result):
         raise ValueError("NaN is not a number that can be used here")
     return result
 
 
 def _evaluate(node: ast.expr, known: Mapping[str, float]) -> float:
+    """Return the value of a syntax tree, or raise ValueError if it is no arithmetic on known names."""
     if isinstance(node, ast.Constant) and not isinstance(node.value, bool):
         if isinstance(node.value, int | float):
             return float(node.value)
@@ -91,30 +93,31 @@ def _evaluate(node: ast.expr, known: Mapping[str, float]) -> float:
 _LARGEST = 1e12
 
 
-def _limit(value: Any, info: ValidationInfo) -> float:
+def _validate_limit(value: Any, info: ValidationInfo) -> float:
     return parse_number(value, (info.context or {}).get("constants"))
 
 
-def _ordinary(value: Any, info: ValidationInfo) -> float:
-    """A number of a size that a machine can have and arithmetic can bear."""
-    result = _limit(value, info)
+def _validate_number(value: Any, info: ValidationInfo) -> float:
+    """Return a number, or raise ValueError if it is larger than any quantity of a machine."""
+    result = _validate_limit(value, info)
     if abs(result) > _LARGEST:
         raise ValueError(f"{result:g} is too large; numbers go up to {_LARGEST:g}")
     return result
 
 
-def _whole(value: Any, info: ValidationInfo) -> int:
-    result = _ordinary(value, info)
+def _validate_whole(value: Any, info: ValidationInfo) -> int:
+    """Return a whole number, or raise ValueError if it has decimals."""
+    result = _validate_number(value, info)
     if result != int(result):
         raise ValueError(f"{value!r} is not a whole number")
     return int(result)
 
 
 def read_constants(given: Any) -> tuple[dict[str, float], dict[str, str]]:
-    """Values of a config's ``constants``, each of which may use those above it.
+    """Return the values of a config's ``constants``, each of which may use earlier ones.
 
     Returns:
-        Values by name, and what is wrong by name. What cannot be read counts as one, so that
+        Values by name, and messages on unreadable constants by name. An unreadable constant has the value 1, so that
         only its own key is reported.
     """
     values: dict[str, float] = {}
@@ -134,13 +137,13 @@ def read_constants(given: Any) -> tuple[dict[str, float], dict[str, str]]:
 
 _TEXT_OR_NUMBER = WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "string"}]})
 
-Number = Annotated[float, BeforeValidator(_ordinary), _TEXT_OR_NUMBER]
+Number = Annotated[float, BeforeValidator(_validate_number), _TEXT_OR_NUMBER]
 """A finite float that may be written as arithmetic, such as ``pi/2``."""
-Limit = Annotated[float, BeforeValidator(_limit), _TEXT_OR_NUMBER]
-"""The same, or ``inf`` for no limit."""
+Limit = Annotated[float, BeforeValidator(_validate_limit), _TEXT_OR_NUMBER]
+"""A number that may be written as arithmetic, or ``inf`` for no limit."""
 Whole = Annotated[
     int,
-    BeforeValidator(_whole),
+    BeforeValidator(_validate_whole),
     WithJsonSchema({"anyOf": [{"type": "integer"}, {"type": "string"}]}),
 ]
 """A whole number that may be written as arithmetic, such as ``1e3``."""

@@ -1,4 +1,4 @@
-"""Sections, and the names, numbers and lists of numbers in them."""
+"""Base class of sections, and lists of values for all joints or for each."""
 
 from typing import Annotated, Any
 
@@ -24,18 +24,18 @@ Name = Annotated[
 ]
 
 
-def as_list(value: Any) -> Any:
-    """One entry for all joints, as a list of one."""
+def wrap_in_list(value: Any) -> Any:
+    """Return a value that is not a list as a list with one entry, which holds for all joints."""
     return value if isinstance(value, list) else [value]
 
 
-def as_words(value: Any) -> Any:
-    """Split words that commas part into a list."""
+def split_words(value: Any) -> Any:
+    """Return the words of a text, split at commas."""
     return [word.strip() for word in value.split(",")] if isinstance(value, str) else value
 
 
-def as_pairs(value: Any) -> Any:
-    """One pair for all joints, as a list of one."""
+def wrap_pair(value: Any) -> Any:
+    """Return a single pair as a list with one entry, which holds for all joints."""
     if isinstance(value, list) and value and not isinstance(value[0], list):
         return [value]
     return value
@@ -46,31 +46,31 @@ VECTOR = {"type": "array", "items": SCALAR, "minItems": 1}
 _ONE_OR_EACH = WithJsonSchema({"anyOf": [*SCALAR["anyOf"], VECTOR]})
 _PAIR_OR_EACH = WithJsonSchema({"anyOf": [VECTOR, {"type": "array", "items": VECTOR}]})
 
-PerJoint = Annotated[list[Number], BeforeValidator(as_list), Field(min_length=1), _ONE_OR_EACH]
+PerJoint = Annotated[list[Number], BeforeValidator(wrap_in_list), Field(min_length=1), _ONE_OR_EACH]
 """One number for all joints or one for each."""
 PositivePerJoint = Annotated[
-    list[Positive], BeforeValidator(as_list), Field(min_length=1), _ONE_OR_EACH
+    list[Positive], BeforeValidator(wrap_in_list), Field(min_length=1), _ONE_OR_EACH
 ]
 LimitPerJoint = Annotated[
     list[Annotated[Limit, Field(ge=1e-6)]],
-    BeforeValidator(as_list),
+    BeforeValidator(wrap_in_list),
     Field(min_length=1),
     _ONE_OR_EACH,
 ]
 
 
-def per_joint(values: list[float], n: int) -> FloatArray:
-    """One number for all joints or one for each, as one for each, (n,)."""
+def expand_per_joint(values: list[float], n: int) -> FloatArray:
+    """Return a value for every joint, (n,), from one value for all joints or one for each."""
     return np.full(n, values[0]) if len(values) == 1 else np.array(values, dtype=float)
 
 
 Triple = Annotated[list[Number], Field(min_length=3, max_length=3)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
-PairPerJoint = Annotated[list[Pair], BeforeValidator(as_pairs), Field(min_length=1), _PAIR_OR_EACH]
+PairPerJoint = Annotated[list[Pair], BeforeValidator(wrap_pair), Field(min_length=1), _PAIR_OR_EACH]
 """One [lower, upper] for all joints or one for each."""
 
 
 class Section(BaseModel):
-    """A mapping in which unknown keys are errors."""
+    """A section of the config; unknown keys are errors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, use_attribute_docstrings=True)

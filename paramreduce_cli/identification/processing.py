@@ -32,7 +32,7 @@ from paramreduce_cli.records import (
     Spectra,
     Tell,
 )
-from paramreduce_cli.resources.scratch import large_matrix, stacked
+from paramreduce_cli.resources.scratch import allocate_matrix, stack_rows
 
 UNUSED = -1
 """Fold of samples that only serve filters."""
@@ -347,7 +347,7 @@ def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
     if known and thin == state.size == torque.size == 1:
         return piece
     time = s.time[::thin]
-    z, dz, ddz, tau = (large_matrix(time.size, s.z.shape[1]) for _ in range(4))
+    z, dz, ddz, tau = (allocate_matrix(time.size, s.z.shape[1]) for _ in range(4))
     for j in range(s.z.shape[1]):
         made = _joint_ready(s.joint(j), rate, state, torque)
         for whole, values in zip((z, dz, ddz, tau), made, strict=True):
@@ -383,7 +383,8 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
         before += size
         fold_of.append(fold)
     joined = {
-        key: stacked([getattr(p.signals, key) for p in pieces]) for key in ("z", "dz", "ddz", "tau")
+        key: stack_rows([getattr(p.signals, key) for p in pieces])
+        for key in ("z", "dz", "ddz", "tau")
     }
     time = np.concatenate([p.signals.time for p in pieces])
     number = np.repeat(np.arange(len(pieces)), [p.signals.time.size for p in pieces])

@@ -18,10 +18,10 @@ from paramreduce_cli.config.logs import (
     Names,
 )
 from paramreduce_cli.errors import ConfigError, DataError
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.turns import unwrap_positions
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
-from paramreduce_cli.resources.scratch import large_matrix, side_by_side
+from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
 
 _EVEN = 0.005
 """Deviation of a time step from the usual one, a share, up to which time is even."""
@@ -141,7 +141,7 @@ def _each(values: list[float], key: str, n_dof: int) -> FloatArray:
             f"has {len(values)} values for {n_dof} joints. Give one for each, or one for all.",
             ("sampling", "log", key),
         )
-    return per_joint(values, n_dof)
+    return expand_per_joint(values, n_dof)
 
 
 def _matrix(
@@ -185,7 +185,7 @@ def _matrix(
                 f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; bring "
                 "signals that were recorded together."
             )
-    return side_by_side(found)
+    return stack_columns(found)
 
 
 def _column(log: RawLog, name: str) -> FloatArray:
@@ -274,7 +274,7 @@ def _resampled(found: Signals, step: float) -> Signals:
     time = found.time[0] + step * np.arange(int((found.time[-1] - found.time[0]) / step) + 1)
 
     def at(values: FloatArray) -> FloatArray:
-        result = large_matrix(time.size, values.shape[1])
+        result = allocate_matrix(time.size, values.shape[1])
         for j, column in enumerate(values.T):
             result[:, j] = scipy.interpolate.CubicSpline(found.time, column)(time)
         return result

@@ -16,7 +16,7 @@ from paramreduce_cli.records import (
     ReducedModel,
     Run,
 )
-from paramreduce_cli.resources.processes import worker_pool
+from paramreduce_cli.resources.processes import start_workers
 
 COUNTS = ("operations_inverse", "operations_direct")
 """Names of the counts of lean models, which :meth:`Counts.lean` returns in this order."""
@@ -103,8 +103,8 @@ def count_all(
     chunks = [tasks[k : k + size] for k in range(0, len(tasks), size)]
     jobs = min(run.jobs, len(chunks)) if pays else 1
     run.progress(Progress("count operations", 0, len(tasks)))
-    with worker_pool(jobs, partial(Counts, model, counted)) as pool:
-        for _, found in pool.as_done(_count, chunks):
+    with start_workers(jobs, partial(Counts, model, counted)) as pool:
+        for _, found in pool.map_unordered(_count, chunks):
             known |= found
             run.progress(Progress("count operations", len(known), len(tasks)))
     return np.array([known[key] for key in keys], dtype=np.int64)

@@ -38,7 +38,7 @@ from paramreduce_cli.records import (
     Progress,
     Run,
 )
-from paramreduce_cli.resources.processes import worker_pool
+from paramreduce_cli.resources.processes import start_workers
 
 _FIRST_MOMENTS = (Kind.M, Kind.MX, Kind.MY, Kind.MZ)
 _MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)
@@ -134,8 +134,8 @@ def _searched(
 ) -> Iterator[tuple[_Searches, list[_Choices]]]:
     """In any order."""
     pays = len(lean_tree(mechanism).joints) >= _MANY
-    with worker_pool(min(jobs, len(asked)) if pays else 1, partial(_same, mechanism)) as pool:
-        yield from pool.as_done(_work, asked)
+    with start_workers(min(jobs, len(asked)) if pays else 1, partial(_same, mechanism)) as pool:
+        yield from pool.map_unordered(_work, asked)
     forget()
 
 

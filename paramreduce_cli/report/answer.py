@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.records import ReducedModel, Speed
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
-from paramreduce_cli.texts.measured import measured
+from paramreduce_cli.texts.measured import format_measured
 
 _WEIGHTED = {
     "nominal-torque": "each joint weighted by its nominal torque",
@@ -79,9 +79,9 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
     return tuple(
         ShownParameter(
             name,
-            measured(value, deviations.get(name))[0],
+            format_measured(value, deviations.get(name))[0],
             data.unit(parameter).replace("^2", "²"),
-            measured(value, deviations.get(name))[1],
+            format_measured(value, deviations.get(name))[1],
             relation if relation != name else "",
         )
         for parameter, name, value, relation in zip(

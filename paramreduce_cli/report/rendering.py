@@ -8,7 +8,7 @@ from typing import NamedTuple
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.style import render
-from paramreduce_cli.resources.processes import worker_pool
+from paramreduce_cli.resources.processes import start_workers
 
 Encoded = dict[str, bytes]
 """A figure in each format; empty where there is nothing to draw."""
@@ -39,8 +39,8 @@ def rendered(
     found: dict[str, Encoded] = {}
     jobs = min(jobs, len(names) // _AT_LEAST)
     shown = replace(data, animation=None)  # the page's alone, and large
-    with worker_pool(jobs, partial(_Drawn, shown, formats)) as pool:
-        for name, encoded in pool.as_done(_draw, names):
+    with start_workers(jobs, partial(_Drawn, shown, formats)) as pool:
+        for name, encoded in pool.map_unordered(_draw, names):
             found[name] = encoded
             told(len(found), name)
     return {name: found[name] for name in names if found[name]}

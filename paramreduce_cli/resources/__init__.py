@@ -1,1 +1,1 @@
-"""Worker processes, the items of stages that these do, and room for large matrices."""
+"""Worker processes, the completion of items by them, and storage for large matrices."""

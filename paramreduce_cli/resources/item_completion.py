@@ -1,10 +1,10 @@
-"""The items of a stage: each is done once, and kept until all of them are combined."""
+"""Completion of a stage's items: each is computed once and kept until all are combined."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, TypeVar
 
 from paramreduce_cli.records import Items, PartFinished, Progress, Run
-from paramreduce_cli.resources.processes import State, worker_pool
+from paramreduce_cli.resources.processes import State, start_workers
 
 Record = TypeVar("Record")
 
@@ -21,18 +21,18 @@ def complete_items(
     describe: Callable[[Any], str] = lambda _: "",
     prepare: Callable[[], None] = lambda: None,
 ) -> dict[str, Record]:
-    """Do the items that are not kept yet, and keep each when it is done.
+    """Compute the items that are not kept yet, and keep each as soon as it is computed.
 
     Args:
-        run: Progress callback.
-        items: Items that are kept, and the part of this job.
+        run: Run that owns the progress callback.
+        items: Kept items, and the part of them that this job computes.
         keys: Keys of all items, in their order.
-        state: Returns what the work on every item needs; picklable where there are several processes.
-        work: Does the item of a key; picklable as well.
+        state: Returns the state that the work on every item needs; picklable if there are several processes.
+        work: Computes the item of a key from the state; picklable if there are several processes.
         task: Name of the work for the progress.
         jobs: Number of processes.
         describe: Returns a detail of a finished item for the progress.
-        prepare: Called in this process before others start, where an item is missing.
+        prepare: Called in this process before worker processes start, if an item is missing.
 
     Returns:
         Records of all items by key.
@@ -49,8 +49,8 @@ def complete_items(
     if missing:
         if jobs > 1:
             prepare()
-        with worker_pool(min(jobs, len(missing)), state) as pool:
-            for key, record in pool.as_done(work, missing):
+        with start_workers(min(jobs, len(missing)), state) as pool:
+            for key, record in pool.map_unordered(work, missing):
                 items.kept[key] = record
                 found[key] = items.kept[key]  # a large one is read from where it is kept
                 detail = f"{key}{describe(record)}"

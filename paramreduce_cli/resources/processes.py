@@ -1,4 +1,4 @@
-"""Worker processes, which end with their parent and leave interruptions to it."""
+"""Worker processes, which end with their parent and leave interruptions to the parent."""
 
 import contextlib
 import multiprocessing
@@ -21,20 +21,20 @@ Result = TypeVar("Result")
 
 
 class WorkerPool(Generic[State]):
-    """Workers that each hold the same state: other processes, or this one.
+    """A pool of workers that hold the same state: other processes, or this process alone.
 
     Args:
-        state: Returns the state; called where this process itself works.
-        processes: Other processes, which hold the state; None to work in this process.
+        state: Returns the state; called only if this process itself works.
+        processes: Worker processes that hold the state; None to work in this process.
     """
 
     def __init__(self, state: Callable[[], State], processes: ProcessPoolExecutor | None) -> None:
         self._state, self._processes = state, processes
 
-    def as_done(
+    def map_unordered(
         self, work: Callable[[State, Item], Result], items: Iterable[Item]
     ) -> Iterator[tuple[Item, Result]]:
-        """Work on items.
+        """Yield items with their results, in the order of completion.
 
         Args:
             work: Called with the state and an item; picklable.
@@ -52,7 +52,7 @@ class WorkerPool(Generic[State]):
                 yield item, work(state, item)
             return
         try:
-            with _interruption_held():  # so that new processes are born without it
+            with _block_interrupts():  # so that new processes are born without it
                 futures = {self._processes.submit(_work_on, work, item): item for item in items}
             for future in as_completed(futures):
                 yield futures[future], future.result()
@@ -64,19 +64,21 @@ class WorkerPool(Generic[State]):
 
 
 @contextlib.contextmanager
-def worker_pool(jobs: int, state: Callable[[], State]) -> Iterator[WorkerPool[State]]:
-    """Start worker processes, which ignore Ctrl-C; this process stops them, however it ends.
+def start_workers(jobs: int, state: Callable[[], State]) -> Iterator[WorkerPool[State]]:
+    """Start worker processes that ignore Ctrl-C, and stop them at the end of the block, however it ends.
 
     Args:
-        jobs: Number of processes; below 2 all work is done in this process.
-        state: Returns what the work on every item needs; picklable. Each process calls it once.
+        jobs: Number of processes; with fewer than 2 this process does all work.
+        state: Returns the state that the work on every item needs; picklable. Each process calls it once.
     """
     if jobs < 2:
         yield WorkerPool(state, None)
         return
     others = set(multiprocessing.active_children())
     environment = dict(os.environ)  # the server of processes keeps the one that it was started in
-    processes = ProcessPoolExecutor(jobs, process_context(), _begin, (environment, state))
+    processes = ProcessPoolExecutor(
+        jobs, choose_start_method(), _initialise_worker, (environment, state)
+    )
     try:
         yield WorkerPool(state, processes)
         processes.shutdown()
@@ -87,8 +89,11 @@ def worker_pool(jobs: int, state: Callable[[], State]) -> Iterator[WorkerPool[St
         raise
 
 
-def process_context() -> BaseContext:
-    """Return how processes are started: forked from a server that has imported this package once.
+def choose_start_method() -> BaseContext:
+    """Return the context that starts processes: forked from a server that has imported this package once.
+
+    A fork of this process itself could hang, as Matplotlib, h5py and the progress display keep threads and locks.
+    Without a server, as on Windows, each process imports everything by itself.
 
     A fork of this process could hang, as Matplotlib, h5py and the progress display keep threads and locks. Where there
     is no server, as on Windows, each process imports all by itself.
@@ -102,8 +107,8 @@ def process_context() -> BaseContext:
 
 
 @contextlib.contextmanager
-def _interruption_held() -> Iterator[None]:
-    """Keep Ctrl-C waiting; processes started meanwhile never get it."""
+def _block_interrupts() -> Iterator[None]:
+    """Block Ctrl-C within the block; processes that start in the block never receive it."""
     before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -112,14 +117,14 @@ def _interruption_held() -> Iterator[None]:
 
 
 class _Worker:
-    """What a worker process holds; set once when it begins."""
+    """The state that a worker process holds; set once when the process begins."""
 
     state: Any
 
 
-def _begin(environment: dict[str, str], state: Callable[[], Any]) -> None:
-    """Prepare a worker process, and make its state."""
-    threading.Thread(target=_end_with_parent, daemon=True).start()
+def _initialise_worker(environment: dict[str, str], state: Callable[[], Any]) -> None:
+    """Prepare a worker process, and compute its state."""
+    threading.Thread(target=_exit_with_parent, daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     os.environ.clear()
@@ -132,8 +137,8 @@ def _work_on(work: Callable[[Any, Item], Result], item: Item) -> Result:
     return work(_Worker.state, item)
 
 
-def _end_with_parent() -> None:
-    """End this process when the process that asked for it is gone, however that ended."""
+def _exit_with_parent() -> None:
+    """End this process as soon as its parent process is gone."""
     parent = multiprocessing.parent_process()
     assert parent is not None
     parent.join()

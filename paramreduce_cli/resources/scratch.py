@@ -1,4 +1,4 @@
-"""Matrices that may be larger than memory: from some size on in a file that vanishes with them.
+"""Matrices that may be larger than memory, kept in temporary files from some size on.
 
 The file is in the folder that ``TMPDIR`` names, else in ``/var/tmp``, which unlike ``/tmp`` is on a disk. What is in
 it is mapped, so that the system takes back the memory where it is short.
@@ -17,18 +17,18 @@ from numpy.typing import NDArray
 from paramreduce_cli.errors import DataError
 
 _LARGE = 1 << 26
-"""Bytes from which on a matrix is in a file."""
+"""Bytes from which on a matrix is kept in a file."""
 _WAITING = 1 << 16
-"""Numbers that are written together."""
+"""Numbers that are written to the file at once."""
 
 
-def large_matrix(n_rows: int, n_columns: int) -> NDArray[np.float64]:
-    """A matrix of any numbers, (n_rows, n_columns), each column without gaps."""
+def allocate_matrix(n_rows: int, n_columns: int) -> NDArray[np.float64]:
+    """Return an uninitialised matrix, (n_rows, n_columns), in column order, in a mapped temporary file if it is large."""
     shape = (n_columns, n_rows)
     size = 8 * n_rows * n_columns
     if size >= _LARGE and hasattr(os, "posix_fallocate"):
         try:
-            with tempfile.TemporaryFile(dir=_folder()) as file:
+            with tempfile.TemporaryFile(dir=_find_temporary_folder()) as file:
                 # A disk that is full later would end the process.
                 os.posix_fallocate(file.fileno(), 0, size)
                 mapped = np.memmap(file, dtype=np.float64, mode="r+", shape=shape)
@@ -38,19 +38,19 @@ def large_matrix(n_rows: int, n_columns: int) -> NDArray[np.float64]:
     return np.empty(shape).T
 
 
-def side_by_side(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """A matrix of columns, (n_rows,) each."""
-    result = large_matrix(columns[0].size, len(columns))
+def stack_columns(columns: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return a matrix of columns, (n_rows,) each, in a mapped file if it is large."""
+    result = allocate_matrix(columns[0].size, len(columns))
     for j, column in enumerate(columns):
         result[:, j] = column
     return result
 
 
-def stacked(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
-    """Matrices, (n_rows, n_columns) each, one below the other; a single one as it is."""
+def stack_rows(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+    """Return matrices, (n_rows, n_columns) each, one below the other; a single matrix is returned as it is."""
     if len(parts) == 1:
         return parts[0]
-    result = large_matrix(sum(map(len, parts)), parts[0].shape[1])
+    result = allocate_matrix(sum(map(len, parts)), parts[0].shape[1])
     start = 0
     for part in parts:
         result[start : start + len(part)] = part
@@ -59,12 +59,12 @@ def stacked(parts: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
 
 
 class LargeTable:
-    """Numbers, row by row, of which it is not known how many come."""
+    """A table of numbers that is extended row by row, in a temporary file; the number of rows need not be known."""
 
     def __init__(self) -> None:
         self._size = 0
         self._waiting = array.array("d")
-        self._file = tempfile.SpooledTemporaryFile(max_size=_LARGE, dir=_folder())  # noqa: SIM115
+        self._file = tempfile.SpooledTemporaryFile(max_size=_LARGE, dir=_find_temporary_folder())  # noqa: SIM115
 
     def __enter__(self) -> Self:
         return self
@@ -73,11 +73,11 @@ class LargeTable:
         self._file.close()
 
     def __bool__(self) -> bool:
-        """Whether there are any."""
+        """Return whether the table holds any number."""
         return self._size > 0
 
     def extend(self, numbers: Iterable[float]) -> None:
-        """More of them."""
+        """Append numbers to the table."""
         before = len(self._waiting)
         self._waiting.extend(numbers)
         self._size += len(self._waiting) - before
@@ -85,20 +85,21 @@ class LargeTable:
             self._flush()
 
     def _flush(self) -> None:
+        """Write the buffered numbers to the file, or raise DataError if the disk is full."""
         try:
             self._file.write(self._waiting.tobytes())
         except OSError as error:
             raise DataError(
-                f"{_folder() or tempfile.gettempdir()}: no room for a table that memory does not hold "
+                f"{_find_temporary_folder() or tempfile.gettempdir()}: no room for a table that memory does not hold "
                 f"({error.strerror}). TMPDIR names another folder."
             ) from error
         del self._waiting[:]
 
-    def matrix(self, n_columns: int) -> NDArray[np.float64]:
-        """All of them, (n_rows, n_columns)."""
+    def to_matrix(self, n_columns: int) -> NDArray[np.float64]:
+        """Return all numbers as a matrix, (n_rows, n_columns)."""
         self._flush()
         self._file.seek(0)
-        result = large_matrix(self._size // max(1, n_columns), n_columns)
+        result = allocate_matrix(self._size // max(1, n_columns), n_columns)
         rows = max(1, _WAITING // max(1, n_columns))
         for start in range(0, len(result), rows):
             part = result[start : start + rows]
@@ -106,7 +107,8 @@ class LargeTable:
         return result
 
 
-def _folder() -> str | None:
+def _find_temporary_folder() -> str | None:
+    """Return ``/var/tmp``, or None for Python's own choice if ``TMPDIR`` is set or the folder is not writable."""
     usual = Path("/var/tmp")
     if "TMPDIR" in os.environ or not os.access(usual, os.W_OK):
         return None

@@ -9,7 +9,14 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import NAME, Name, PositivePerJoint, Section, Triple, per_joint
+from paramreduce_cli.fields.section import (
+    NAME,
+    Name,
+    PositivePerJoint,
+    Section,
+    Triple,
+    expand_per_joint,
+)
 from paramreduce_cli.records import INERTIAL, BoolArray, FloatArray, Mechanism, Parameter
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
@@ -141,4 +148,4 @@ class Robot(Section):
         """The characteristic torques where they are given, (n_dof,), N m or N."""
         if self.nominal_torque == "standard-deviation":
             return None
-        return per_joint(self.nominal_torque, self.n_dof)
+        return expand_per_joint(self.nominal_torque, self.n_dof)

@@ -13,7 +13,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema, model_validator
 
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import Number
-from paramreduce_cli.fields.section import ONE_OR_MORE_NAMES, Name, Positive, Section, as_list
+from paramreduce_cli.fields.section import ONE_OR_MORE_NAMES, Name, Positive, Section, wrap_in_list
 from paramreduce_cli.records import (
     BASE,
     JOINT_AXES,
@@ -97,7 +97,7 @@ class TreeBody(Section):
     """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
     at: Placement = []
     """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""
-    coordinates: Annotated[list[Name], BeforeValidator(as_list), ONE_OR_MORE_NAMES] = []
+    coordinates: Annotated[list[Name], BeforeValidator(wrap_in_list), ONE_OR_MORE_NAMES] = []
     """Names of the joint's coordinates; if left out q_NAME, or q_NAME_1, q_NAME_2, ..."""
     massless: bool = False
     """Whether the body has no mass and so no parameters."""

@@ -11,7 +11,7 @@ from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_time
 from paramreduce_cli.excitation.optimiser import TrajectorySettings, describe
 from paramreduce_cli.excitation.point_to_point import find_point_to_point
 from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.records import (
     SETS,
     Coefficients,
@@ -84,7 +84,7 @@ def _torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> Fl
     """Noise of the torques where it is given; what is not measured stays without weight."""
     if wanted.torque_noise is None:
         return nominal_torque
-    noise = per_joint(wanted.torque_noise, nominal_torque.size)
+    noise = expand_per_joint(wanted.torque_noise, nominal_torque.size)
     return np.where(np.isfinite(nominal_torque), noise, np.inf)
 
 
@@ -102,7 +102,7 @@ def _settings(
         start_pose=(
             None
             if wanted.start_pose is None
-            else per_joint(wanted.start_pose, model.mechanism.n_dof)
+            else expand_per_joint(wanted.start_pose, model.mechanism.n_dof)
         ),
         starts=wanted.starts,
         polished=wanted.polished,

@@ -17,7 +17,7 @@ from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.running import RunningModel, speed
 from paramreduce_cli.export.writing import Exported, exported_model
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
@@ -45,7 +45,7 @@ from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skel
 from paramreduce_cli.report.summary import summary_of
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.report.tracking.demonstration import tracked
-from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.latex_table import format_latex_table
 
 _POSES = 3
 _MOTIONS, _FRAMES = 40, 1200
@@ -119,7 +119,7 @@ def report(
     symbols = {} if model is None else model.mechanism.symbols
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
-        files[f"tables/{name}.tex"] = latex_table(table, symbols).encode()
+        files[f"tables/{name}.tex"] = format_latex_table(table, symbols).encode()
     files["index.html"] = render_page(
         data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
     ).encode()
@@ -219,7 +219,7 @@ def _skeletons(section: ReportSection, model: Model, motion: ShownMotion) -> tup
 
 def _shown_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:
     if section.poses is not None:
-        wanted = [per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
+        wanted = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
         coordinates = Coordinates(model.mechanism, once=True)
         try:
             return [coordinates.states(*[z[None]] * 3)[0][0] for z in wanted]

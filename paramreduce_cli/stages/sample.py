@@ -22,7 +22,7 @@ from paramreduce_cli.excitation.fourier import (
 from paramreduce_cli.excitation.point_to_point import evaluate_along
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import completed, symmetries
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.joined import JoinedSet
@@ -413,7 +413,7 @@ def _nominal_acceleration(
 ) -> FloatArray:
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
-        return per_joint(given, model.mechanism.n_dof)
+        return expand_per_joint(given, model.mechanism.n_dof)
     deviation = standard_deviation(block.ddz for block in estimation.states())
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.

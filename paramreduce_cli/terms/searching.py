@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.resources.processes import Item, WorkerPool, worker_pool
+from paramreduce_cli.resources.processes import Item, WorkerPool, start_workers
 from paramreduce_cli.terms.descent import Descent, Way, gone_on
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
@@ -149,7 +149,7 @@ class Hands:
         """What is found on items, in their order; on one of them at least, and no others when it is too late."""
         in_time = partial(_begun, work, math.inf if however_late else self._deadline)
         found: dict[int, Way] = {}
-        for (number, _), (begun, way) in self._pool.as_done(in_time, enumerate(items)):
+        for (number, _), (begun, way) in self._pool.map_unordered(in_time, enumerate(items)):
             self.cut_short |= not begun
             self._told(way)
             if way is not None:
@@ -175,7 +175,7 @@ def hands(
     searcher: Searcher, jobs: int, told: Callable[[Way | None], None], deadline: float = math.inf
 ) -> Iterator[Hands]:
     """Work here, or in so many other processes; what is found by no deadline does not depend on how many."""
-    with worker_pool(jobs, partial(_same, searcher)) as pool:
+    with start_workers(jobs, partial(_same, searcher)) as pool:
         yield Hands(told, deadline, pool)
 
 

@@ -1,10 +1,10 @@
-"""How numbers and symbols are written for people, everywhere alike."""
+"""Text for people: percentages, ranges and formulas."""
 
 import math
 from collections.abc import Mapping
 
 EXACT = 1e-10
-"""Error below which a model is exact: round-off of the samples and of a fit together."""
+"""Relative error below which a model counts as exact: round-off of the samples and of a fit together."""
 _FAR_OFF = 10.0
 
 _ESCAPES = {
@@ -31,17 +31,18 @@ def format_percent_range(median: float | None, least: float | None, worst: float
     return f"{format_percent(median)} ({format_percent(least).removesuffix(' %')} to {format_percent(worst)})"
 
 
-def latex(text: str, symbols: Mapping[str, str]) -> str:
-    """Text for LaTeX, numbers and symbols as formulas.
+def to_latex(text: str, symbols: Mapping[str, str]) -> str:
+    """Return a text in LaTeX, with numbers and symbols as formulas.
 
     Args:
-        text: Words, numbers and names with spaces between.
-        symbols: Formulas by the names they stand for.
+        text: Words, numbers and names, separated by spaces.
+        symbols: LaTeX formulas by the name that each replaces.
     """
-    return " ".join(_latex_word(word, symbols) for word in text.split(" "))
+    return " ".join(_word_to_latex(word, symbols) for word in text.split(" "))
 
 
-def _latex_word(word: str, symbols: Mapping[str, str]) -> str:
+def _word_to_latex(word: str, symbols: Mapping[str, str]) -> str:
+    """Return one word in LaTeX: a sign, a symbol with brackets and powers, a number, or escaped text."""
     if word in ("+", "-"):
         return f"${word}$"
     core = word.removeprefix("(").removesuffix(")").removesuffix("^2")
@@ -68,5 +69,5 @@ _GREEK = {
     "²": r"$^2$",
 }
 _FORMULAS = {symbol: chr(0xE000 + k) for k, symbol in enumerate(_GREEK)}
-"""Characters of private use that stand for formulas while text is escaped."""
+"""Private-use characters that replace formulas while text is escaped."""
 _UNMASKED = {0xE000 + k: formula for k, formula in enumerate(_GREEK.values())}

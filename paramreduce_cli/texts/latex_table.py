@@ -1,60 +1,61 @@
-"""A table for papers."""
+"""A table in LaTeX, for papers."""
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from types import MappingProxyType
 
-from paramreduce_cli.texts import latex
+from paramreduce_cli.texts import to_latex
 from paramreduce_cli.texts.table import Table
 
 _FITTING = 80
-"""Characters of a row beyond which it is scaled to the width of the line."""
+"""Characters of a row beyond which the table is scaled to the width of the line."""
 _WIDE = 150
-"""Characters beyond which it is turned, as scaled to the line it would be too small to read."""
+"""Characters of a row beyond which the table is rotated, as its scaled text would be too small."""
 _PAGE = 40
-"""Lines beyond which a table is broken over pages."""
+"""Lines beyond which a table is broken across pages."""
 _LONG = 45
-"""Characters from which on a cell is broken."""
+"""Characters of a cell from which on its text is broken into lines."""
 _SPACE = 3
-"""Characters that the space between two columns takes."""
+"""Characters that the gap between two columns takes."""
 _NUMBER = re.compile(r"-?(\d*)(?:\.(\d*))?(?:e(-?)\+?(\d+))?")
 
 
-def latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({})) -> str:
-    """A tabular with its caption, or a longtable where it is more than a page; names as formulas.
+def format_latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return a table as a LaTeX tabular with a caption, or as a longtable if it is longer than a page.
 
-    Columns of numbers are siunitx's, long texts are broken, what is wide is set small, and what is
-    wider than that is turned.
+    Columns of numbers are set by siunitx, long texts are broken into lines, wide tables are set smaller, and wider
+    tables are rotated.
 
     Args:
-        table: What is set.
-        symbols: Formulas by the names they stand for.
+        table: Table to format.
+        symbols: LaTeX formulas by the name that each replaces.
     """
-    table = _shares_in_the_heading(table)
+    table = _move_percent_signs(table)
     columns = [[row[k] for row in table.rows] for k in range(len(table.header))]
-    kinds = [_kind(cells) for cells in columns]
+    kinds = [_choose_column_type(cells) for cells in columns]
     # siunitx takes what is in braces for text, and sets what is not.
-    head = _row(
-        f"{{{latex(cell, symbols)}}}" if kind.startswith("S") else latex(cell, symbols)
+    head = _format_row(
+        f"{{{to_latex(cell, symbols)}}}" if kind.startswith("S") else to_latex(cell, symbols)
         for cell, kind in zip(table.header, kinds, strict=True)
     )
     rows = [
-        _row(
-            cell if kind.startswith("S") else latex(cell, symbols)
+        _format_row(
+            cell if kind.startswith("S") else to_latex(cell, symbols)
             for cell, kind in zip(row, kinds, strict=True)
         )
         for row in table.rows
     ]
-    caption = rf"\caption{{{latex(table.title, symbols)}}}"
+    caption = rf"\caption{{{to_latex(table.title, symbols)}}}"
     height = sum(1 + max(map(len, cells)) // _LONG for cells in table.rows)
     lengths = (max(map(len, cells)) for cells in zip(table.header, *table.rows, strict=True))
     width = sum(min(length, _LONG) + _SPACE for length in lengths)
     lines = [r"\hline", head, r"\hline", *rows, r"\hline"]
-    whole = _over_pages if height > _PAGE else _on_a_page
+    whole = _format_longtable if height > _PAGE else _format_tabular
     return "\n".join(whole("".join(kinds), caption, lines, width)) + "\n"
 
 
-def _over_pages(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+def _format_longtable(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+    """Return the lines of a longtable, rotated if its rows are wide."""
     turned = width > _WIDE
     size = r"\tiny" if turned else r"\footnotesize"
     if width > _FITTING:
@@ -70,7 +71,8 @@ def _over_pages(kinds: str, caption: str, lines: Sequence[str], width: int) -> l
     ]
 
 
-def _on_a_page(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+def _format_tabular(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:
+    """Return the lines of a table on one page, rotated if its rows are wide."""
     kind = "sidewaystable" if width > _WIDE else "table"
     scaled = width > _FITTING
     return [
@@ -86,8 +88,8 @@ def _on_a_page(kinds: str, caption: str, lines: Sequence[str], width: int) -> li
     ]
 
 
-def _shares_in_the_heading(table: Table) -> Table:
-    """Where all cells of a column are shares the per cent stands in its heading, and numbers are left."""
+def _move_percent_signs(table: Table) -> Table:
+    """Return the table with per-cent signs moved to the heading of each column whose cells all have one."""
     shares = [
         all(re.fullmatch(r"[\d.]+ %", row[k]) for row in table.rows) and bool(table.rows)
         for k in range(len(table.header))
@@ -107,12 +109,12 @@ def _shares_in_the_heading(table: Table) -> Table:
     )
 
 
-def _row(cells: Iterable[str]) -> str:
+def _format_row(cells: Iterable[str]) -> str:
     return " & ".join(cells) + r" \\"
 
 
-def _kind(cells: Sequence[str]) -> str:
-    """How LaTeX sets a column: decimal points under each other, long texts broken."""
+def _choose_column_type(cells: Sequence[str]) -> str:
+    """Return the column type of cells: aligned decimal points for numbers, line breaks for long texts."""
     found = [_NUMBER.fullmatch(cell) for cell in cells]
     if cells and all(match is not None and match[0].strip("-") for match in found):
         parts = [match.groups(default="") for match in found if match is not None]

@@ -1,20 +1,21 @@
-"""Values that are known up to a standard deviation."""
+"""Values with a standard deviation, written with the digits that are certain."""
 
 import math
 
 _MOST_DECIMALS = 7
-"""Digits after the point from which on numbers have exponents."""
+"""Digits after the point from which on numbers are written with exponents."""
 
 
-def measured(value: float, deviation: float | None) -> tuple[str, str]:
-    """A value and its standard deviation with the digits that the latter leaves sure.
+def format_measured(value: float, deviation: float | None) -> tuple[str, str]:
+    """Return a value and its standard deviation as text, with two digits of the deviation and as many decimals of the
+    value.
 
     Args:
         value: The value.
-        deviation: Two of its digits are told; where there is none, or it is not finite, the value has six.
+        deviation: Standard deviation; if it is None or not finite, the value has six digits.
 
     Returns:
-        Both as text, the second one empty where there is no deviation.
+        Text of the value and of the deviation, which is empty if there is none.
     """
     if deviation is None:
         return f"{value:.6g}", ""

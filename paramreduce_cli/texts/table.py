@@ -1,4 +1,4 @@
-"""A table as text and CSV."""
+"""A table of text cells, as aligned text or CSV."""
 
 import csv
 import io
@@ -8,20 +8,20 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Table:
-    """Cells of text under a header."""
+    """A table of text cells under a header."""
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
 
     def to_text(self) -> str:
-        """Aligned columns under the title."""
+        """Return the table as text, with aligned columns under the title."""
         lines = [self.header, *self.rows]
-        widths = [max(_width(line[k]) for line in lines) for k in range(len(self.header))]
+        widths = [max(_count_columns(line[k]) for line in lines) for k in range(len(self.header))]
 
         def aligned(cells: tuple[str, ...]) -> str:
             padded = (
-                cell + " " * (width - _width(cell))
+                cell + " " * (width - _count_columns(cell))
                 for cell, width in zip(cells, widths, strict=True)
             )
             return "  ".join(padded).rstrip()
@@ -31,7 +31,7 @@ class Table:
         return "\n".join([self.title, "", *body]) + "\n"
 
     def to_csv(self) -> str:
-        """Comma-separated values with a header line."""
+        """Return the table as comma-separated values with a header line."""
         buffer = io.StringIO()
         writer = csv.writer(buffer, lineterminator="\n")
         writer.writerow(self.header)
@@ -39,6 +39,6 @@ class Table:
         return buffer.getvalue()
 
 
-def _width(text: str) -> int:
-    """Columns that a text takes; accents stand on the letter before them."""
+def _count_columns(text: str) -> int:
+    """Return the number of columns that a text takes on a terminal; combining accents take none."""
     return sum(1 for character in text if not unicodedata.combining(character))

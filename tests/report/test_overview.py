@@ -2,7 +2,7 @@ import csv
 import io
 
 from paramreduce_cli.report.overview import overview, overview_row
-from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.latex_table import format_latex_table
 
 
 def test_one_row_per_robot_with_the_selected_model(summary):
@@ -17,7 +17,7 @@ def test_one_row_per_robot_with_the_selected_model(summary):
     assert int(row["d, n"]) == selected["operations"]["inverse"]
     rows = list(csv.reader(io.StringIO(table.to_csv())))
     assert {len(row) for row in rows} == {17}
-    assert latex_table(table).count("&") == 3 * 16
+    assert format_latex_table(table).count("&") == 3 * 16
     assert "two_link" in table.to_text()
 
 

@@ -14,7 +14,7 @@ from conftest import run_stages
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import format_percent
-from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
 
 
@@ -165,7 +165,7 @@ def test_errors_joint_by_joint_are_those_of_the_samples(summary, two_link_result
 
 def test_latex_escapes_what_latex_would_trip_over():
     table = Table("κ & 5 %", ("a_b", "m_3"), (("50 %", "ε_τ"), ("x^2", "my_name")))
-    text = latex_table(table, {"m_3": r"m_{\mathrm{3}}"})
+    text = format_latex_table(table, {"m_3": r"m_{\mathrm{3}}"})
     for piece in (r"$\kappa$ \& 5 \%", r"$m_{\mathrm{3}}$", r"a\_b", r"50 \%",
                   r"$\varepsilon_\tau$", r"x\^{}2"):  # fmt: skip
         assert piece in text
@@ -174,20 +174,20 @@ def test_latex_escapes_what_latex_would_trip_over():
 def test_latex_sets_numbers_breaks_texts_and_fits_the_line():
     long = "a + " * 30
     rows = (("1", "-0.25", "1e-7", "50 %", long), ("23", "4", "2.5e+11", "> 1000 %", "[M | δ]"))
-    lines = latex_table(Table("t", ("a", "b", "c", "d", "e"), rows)).splitlines()
+    lines = format_latex_table(Table("t", ("a", "b", "c", "d", "e"), rows)).splitlines()
     (columns,) = (line for line in lines if line.startswith(r"\begin{tabular}"))
     assert columns.startswith(
         r"\begin{tabular}{S[table-format=2]S[table-format=-1.2]S[table-format=1.1e-2]r>{\raggedright"
     )
     assert lines[-4] == r"23 & 4 & 2.5e+11 & $>$ 1000 \% & {[}M $|$ $\delta$] \\"
     many = tuple((str(k), "x" * 20) * 6 for k in range(60))
-    turned = latex_table(Table("t", ("a", "b") * 6, many)).splitlines()
+    turned = format_latex_table(Table("t", ("a", "b") * 6, many)).splitlines()
     assert turned[1] == r"\begin{landscape}"
     assert r"\begin{longtable}" in turned[2]
-    scaled = latex_table(Table("t", ("a", "b") * 3, tuple(row[:6] for row in many[:3])))
+    scaled = format_latex_table(Table("t", ("a", "b") * 3, tuple(row[:6] for row in many[:3])))
     assert r"\resizebox{\linewidth}" in scaled
     assert r"\begin{table}" in scaled
-    assert r"\begin{sidewaystable}" in latex_table(Table("t", ("a", "b") * 6, many[:3]))
+    assert r"\begin{sidewaystable}" in format_latex_table(Table("t", ("a", "b") * 6, many[:3]))
 
 
 def typeset(folder):

@@ -15,7 +15,7 @@ from paramreduce_cli.cli.terminal import LOG, say
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
-from paramreduce_cli.fields.section import per_joint
+from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.motion.approach import Ways
 from paramreduce_cli.motion.timed_motion import TimedMotion, timed_motion
 from paramreduce_cli.records import SETS, Model, Trajectories, Trajectory
@@ -69,7 +69,7 @@ def export_trajectory(
     store = Store(results or Path("results") / loaded.robot)
     model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
-    start = None if pose is None else per_joint(pose, loaded.n_dof)
+    start = None if pose is None else expand_per_joint(pose, loaded.n_dof)
     ways = Ways(model, trajectories)
 
     def timed(which: str) -> TimedMotion:

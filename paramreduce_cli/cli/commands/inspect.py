@@ -22,7 +22,7 @@ from paramreduce_cli.cli.project_state import no_results, results_below
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
-from paramreduce_cli.texts.measured import measured
+from paramreduce_cli.texts.measured import format_measured
 
 if TYPE_CHECKING:
     from paramreduce_cli.records import ReducedModel
@@ -148,7 +148,7 @@ def _say_model(
         if p.deviation is None:
             value = f"{p.value: .9e}"
         else:
-            value = " ± ".join(measured(p.value, p.deviation))
+            value = " ± ".join(format_measured(p.value, p.deviation))
             value = value if p.value < 0 else f" {value}"
         say(
             f"  {p.name:{longest}}  {value} {p.unit}".rstrip()

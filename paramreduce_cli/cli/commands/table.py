@@ -17,7 +17,7 @@ from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
 from paramreduce_cli.report.spread import choices, run_record, spread
 from paramreduce_cli.running.sweep import Sweep, load_sweep
-from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
 
 _MOST_NAMED = 12
@@ -129,7 +129,7 @@ def _write(prefix: Path, made: Mapping[str, Table], records: list[dict[str, Any]
     figure = render(runs_figure, records, ["svg"])["svg"]
     for ending, text in {
         ".txt": "\n".join(one.to_text() for one in tables),
-        ".tex": "\n".join(map(latex_table, tables)),
+        ".tex": "\n".join(map(format_latex_table, tables)),
         ".html": render_sweep("Reduced models", records, tables, figure),
         **{f"{part}.csv": one.to_csv() for part, one in made.items()},
         "-runs.csv": runs.to_csv(),

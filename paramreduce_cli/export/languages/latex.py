@@ -1,7 +1,7 @@
 """The approximate base parameters as equations for a paper."""
 
 from paramreduce_cli.export.exported import ExportedModel, plain
-from paramreduce_cli.texts.latex_table import latex_table
+from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
 
 
@@ -17,4 +17,8 @@ def latex(model: ExportedModel) -> dict[str, bytes]:
     )
     own = ", units in parentheses" if any(p.unit.startswith("(") for p in model.parameters) else ""
     table = Table(f"{model.robot}: {len(rows)} parameters{own}", columns, rows)
-    return {f"{model.name}_parameters.tex": (heading + latex_table(table, model.symbols)).encode()}
+    return {
+        f"{model.name}_parameters.tex": (
+            heading + format_latex_table(table, model.symbols)
+        ).encode()
+    }

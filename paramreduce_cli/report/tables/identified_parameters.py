@@ -5,7 +5,7 @@ import numpy as np
 from paramreduce_cli.records import Estimate
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts.measured import measured
+from paramreduce_cli.texts.measured import format_measured
 from paramreduce_cli.texts.table import Table
 
 
@@ -24,6 +24,6 @@ def _rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
     relative = 100 * estimate.deviations / np.maximum(np.abs(estimate.values), 1e-300)
     cells = zip(estimate.names, estimate.values, estimate.deviations, relative, strict=True)
     return [
-        (model, name, *measured(value, deviation), f"{percent:.2g}")
+        (model, name, *format_measured(value, deviation), f"{percent:.2g}")
         for name, value, deviation, percent in cells
     ]
