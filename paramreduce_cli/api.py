@@ -222,7 +222,7 @@ def chosen(
     Raises:
         KeyError: There is no such model.
     """
-    row = reduction.heuristics[heuristic].row(n)
+    row = reduction.heuristics[heuristic].find_row(n)
     if row is None:
         raise KeyError(f"{heuristic}:{n}")
     return reduced_model(reduction, heuristic, row, None if model is None else model.values)

@@ -43,7 +43,7 @@ def mechanism_of(description, gravity=(0, 0, -9.81), robot="arm", **more):
     """The mechanism of a description, without values of the bodies' parameters."""
     description = {**description, "gravity": [float(g) for g in gravity]}
     sections = {"description": description, "parameter_sets": {"none": {}}, **more}
-    return Robot(robot=robot, **sections).mechanism()
+    return Robot(robot=robot, **sections).build_mechanism()
 
 
 def dh(rows, convention="modified"):

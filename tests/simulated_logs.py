@@ -40,11 +40,11 @@ class Simulated:
 def arm():
     """Mechanism, dynamics, base parameters and values in puma560_friction.yaml."""
     config = load_config(CONFIG)
-    mechanism = config.mechanism()
+    mechanism = config.build_mechanism()
     dynamics = Dynamics(mechanism)
     K = dynamics.regressor(*random_states(mechanism, 300, np.random.default_rng(0)))
     base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, 1e-9)
-    return mechanism, dynamics, base, config.parameter_values()
+    return mechanism, dynamics, base, config.get_values()
 
 
 def simulated(seed):
@@ -103,8 +103,8 @@ reduction:
 
 def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0):
     """Columns of a log of the two-link arm with friction, by name."""
-    mechanism = load_config(TWO_LINK).mechanism()
-    values = load_config(TWO_LINK).parameter_values()
+    mechanism = load_config(TWO_LINK).build_mechanism()
+    values = load_config(TWO_LINK).get_values()
     rng = np.random.default_rng(seed)
     time = np.arange(0, seconds, 1 / rate)
     series = np.array([[0.0, 1.0, 0.6, -1.1, 0.4, 0.7, 0.9], [0.2, -0.8, 0.9, 1.2, -0.5, 0.9, 0.7]])

@@ -48,7 +48,7 @@ def test_selection_on_the_committed_trajectories(robot):
         return int(found[name].n[np.argmax(found[name].torque_error < FULL)])
 
     def error(name, n):
-        return found[name].torque_error[found[name].row(n)]
+        return found[name].torque_error[found[name].find_row(n)]
 
     names = ("qr", "forward-selection", "backward-elimination", "best-subset")
     assert [full_precision(name) for name in names] == full

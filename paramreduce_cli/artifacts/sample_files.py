@@ -54,7 +54,7 @@ _GENERALISED = ("q", "dq", "ddq")
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
     """One set; its triangular factors are collected on the way, unless they are known from its parts."""
-    known = sample_set.factors() if isinstance(sample_set, JoinedSet) else None
+    known = sample_set.compute_factors() if isinstance(sample_set, JoinedSet) else None
     accumulator = FactorAccumulator()
     appenders: dict[str, Any] = {}
     for block in _read(sample_set, known):
@@ -76,7 +76,7 @@ def _read(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
         _, n_dof, k, _ = known.shape
         if _left_out(sample_set, n_dof, k - 1):
             return sample_set.states()
-    return sample_set.blocks()
+    return sample_set.iterate_blocks()
 
 
 def _left_out(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
@@ -176,7 +176,7 @@ class StoredSet:
 
             return Dynamics(layouts.load(reader, Model).mechanism)
 
-    def blocks(self) -> Iterator[Block]:
+    def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         return self._blocks(W=True)
 
@@ -235,12 +235,12 @@ class StoredSet:
             raise ArtifactError(f"{self._path}: /{name} must hold the numbers 0, 1, 2, ...")
         return column
 
-    def factors(self) -> FloatArray:
+    def compute_factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint, stored or computed."""
         if self._own:
             with reading(self._path) as reader:
                 return reader.array(f"{self._name}/factors", 4)
-        return joint_factors(self.blocks())
+        return joint_factors(self.iterate_blocks())
 
 
 def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:

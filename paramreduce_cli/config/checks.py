@@ -17,7 +17,7 @@ from paramreduce_cli.fields.numbers import RATHER_DEGREES
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.records import Kind, Parameter
 from paramreduce_cli.robots import drives, payloads
-from paramreduce_cli.robots.inertia import physical, pseudo_inertia
+from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
 
 _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
@@ -48,9 +48,9 @@ def find_warnings(config: Config) -> list[str]:
 def _bodies(config: Config) -> Iterator[Problem]:
     bodies = config.description.bodies
     path: Key = ("description", config.description.way, bodies.ROWS)
-    names = bodies.body_names()
+    names = bodies.list_body_names()
     seen: set[str] = set()
-    for k, (name, parent) in enumerate(zip(names, bodies.parents(), strict=True)):
+    for k, (name, parent) in enumerate(zip(names, bodies.list_parents(), strict=True)):
         if name in seen or name == "base":
             yield (*path, k, "name"), f"{name!r} is taken; every body needs a name of its own"
         if parent is not None and parent not in {"base", *seen}:
@@ -66,9 +66,9 @@ def _bodies(config: Config) -> Iterator[Problem]:
 
 def _payloads_and_drives(config: Config) -> Iterator[Problem]:
     bodies = config.description.bodies
-    for key, message in payloads.problems(config.payloads, bodies.body_names()):
+    for key, message in payloads.find_payload_problems(config.payloads, bodies.list_body_names()):
         yield ("payloads", *key), message
-    for key, message in drives.problems(config.drives, bodies.generalised_names()):
+    for key, message in drives.find_drive_problems(config.drives, bodies.list_coordinates()):
         yield ("drives", *key), message
 
 
@@ -83,14 +83,14 @@ def _tracking(config: Config) -> Iterator[Problem]:
 
 
 def _description(config: Config) -> Iterator[Problem]:
-    for key, message in config.description.bodies.problems():
+    for key, message in config.description.bodies.find_problems():
         yield ("description", config.description.way, *key), message
 
 
 def _constraints(config: Config) -> Iterator[Problem]:
     description = config.description
-    bodies = ["base", *description.bodies.body_names()]
-    coordinates = description.bodies.generalised_names()
+    bodies = ["base", *description.bodies.list_body_names()]
+    coordinates = description.bodies.list_coordinates()
     seen: set[str] = set()
     for k, entry in enumerate(config.trajectories.constraints):
         path: Key = ("trajectories", "constraints", k)
@@ -114,7 +114,7 @@ def _constraints(config: Config) -> Iterator[Problem]:
 
 
 def _known_parameters(config: Config) -> list[str]:
-    return [parameter.name for parameter in config.dynamic_parameters()]
+    return [parameter.name for parameter in config.list_parameters()]
 
 
 def _groups(config: Config) -> Iterator[Problem]:
@@ -123,10 +123,12 @@ def _groups(config: Config) -> Iterator[Problem]:
     for k, entry in enumerate(config.reduction.groups):
         path: Key = ("reduction", "groups", k)
         for j, body in enumerate(entry.bodies or []):
-            if body not in config.description.bodies.inertial_names():
+            if body not in config.description.bodies.list_inertial_bodies():
                 yield (
                     (*path, "bodies", j),
-                    UnknownNameError("body", body, config.description.bodies.inertial_names()),
+                    UnknownNameError(
+                        "body", body, config.description.bodies.list_inertial_bodies()
+                    ),
                 )
         for j, name in enumerate(entry.parameters or []):
             if name not in known:
@@ -143,7 +145,7 @@ def _groups(config: Config) -> Iterator[Problem]:
 
 
 def _symmetries(config: Config) -> Iterator[Problem]:
-    names = config.description.bodies.independent_names()
+    names = config.description.bodies.list_independent_coordinates()
     for k, images in enumerate(config.sampling.symmetries):
         if sorted(name.removeprefix("-") for name in images) != sorted(names):
             yield (
@@ -159,7 +161,7 @@ def _simulation(config: Config) -> Iterator[Problem]:
     if wanted is None:
         return
     path: Key = ("sampling", "simulation")
-    names = config.description.bodies.independent_names()
+    names = config.description.bodies.list_independent_coordinates()
     for key, given in (("inputs", wanted.inputs), ("start", wanted.start)):
         for name in given:
             if name not in names:
@@ -171,8 +173,8 @@ def _simulation(config: Config) -> Iterator[Problem]:
         yield (*path, "step"), f"{wanted.step:g} s is too long for {wanted.duration:g} s"
     if wanted.duration / wanted.step > _MOST_STEPS:
         yield (*path, "step"), f"makes more than {_MOST_STEPS} samples of {wanted.duration:g} s"
-    for name, drive in config.each_drive().items():
-        if Kind.COULOMB in drive.effects() and not drive.smoothing:
+    for name, drive in config.list_drives().items():
+        if Kind.COULOMB in drive.get_values() and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
     if any(sampling.files().values()) or sampling.symmetries:
@@ -180,12 +182,12 @@ def _simulation(config: Config) -> Iterator[Problem]:
 
 
 def _massless(config: Config) -> Iterator[Problem]:
-    if not config.description.bodies.inertial_names():
+    if not config.description.bodies.list_inertial_bodies():
         yield ("description", "tree", "bodies"), "are all massless, so that there is no parameter"
 
 
 def _parameter_sets(config: Config) -> Iterator[Problem]:
-    names = config.description.bodies.inertial_names()
+    names = config.description.bodies.list_inertial_bodies()
     for label, bodies in config.parameter_sets.items():
         for body in bodies:
             if body not in names:
@@ -270,7 +272,7 @@ def _acceptance(config: Config) -> Iterator[Problem]:
 
 
 def _unmeasured(config: Config) -> Iterator[Problem]:
-    names = config.description.bodies.independent_names()
+    names = config.description.bodies.list_independent_coordinates()
     for k, name in enumerate(config.unmeasured):
         if name not in names:
             yield ("unmeasured", k), UnknownNameError("independent coordinate", name, names)
@@ -284,7 +286,7 @@ def _unmeasured(config: Config) -> Iterator[Problem]:
                         ("trajectories", key),
                         f"limits {name}, whose torque is unmeasured; write inf for it",
                     )
-    if not config.measured().any():
+    if not config.find_measured().any():
         yield ("unmeasured",), "leaves no torque to explain; leave out what is measured"
 
 
@@ -298,7 +300,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
 
 
 def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
-    total = len(config.dynamic_parameters())
+    total = len(config.list_parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:
             yield ("reduction", "heuristics", k), f"{name} stands there twice"
@@ -342,12 +344,12 @@ _CHECKS: tuple[Check, ...] = (
 
 def _odd_bodies(config: Config) -> Iterator[str]:
     """Bodies that cannot exist; reduced sets are not physical either, so that is no error."""
-    for name, body in config.body_parameters().items():
+    for name, body in config.get_body_parameters().items():
         if body.m < 0:
             yield f"body {name} has the negative mass {body.m:g} kg"
             continue
-        moments = pseudo_inertia(body.values())
-        if not physical(moments):
+        moments = compute_pseudo_inertia(body.get_values())
+        if not is_positive_semidefinite(moments):
             yield (
                 f"the inertia of body {name} is not physical: no distribution of mass has it (its "
                 f"pseudo-inertia matrix has the eigenvalue {np.linalg.eigvalsh(moments)[0]:.3g})"
@@ -376,11 +378,11 @@ def _odd_terms(config: Config) -> Iterator[str]:
 def _odd_drives(config: Config) -> Iterator[str]:
     """Values that are not known, and what cannot be."""
     sampling = config.sampling
-    missing = {name: drive.unknown() for name, drive in config.each_drive().items()}
+    missing = {name: drive.list_unknown() for name, drive in config.list_drives().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]
     if found and not sampling.measured:
         yield f"unknown, and so zero in the torques of the model: {', '.join(found)}"
-    for name, drive in config.each_drive().items():
-        for kind, value in drive.effects().items():
+    for name, drive in config.list_drives().items():
+        for kind, value in drive.get_values().items():
             if value < 0 and not kind.is_signed:
                 yield f"drive {name} has the negative {Parameter(kind, name).name} {value:g}"

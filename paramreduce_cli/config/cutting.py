@@ -34,8 +34,8 @@ def cut_to_independent(config: Config) -> Config:
     bodies = config.description.bodies
     if not bodies.closed:
         return config
-    names = bodies.generalised_names()
-    places = [names.index(name) for name in bodies.independent_names() if name in names]
+    names = bodies.list_coordinates()
+    places = [names.index(name) for name in bodies.list_independent_coordinates() if name in names]
     cut: list[str] = []
     for key in PER_JOINT:
         values = read_per_joint(config, key)

@@ -30,7 +30,7 @@ def find_implausible_bodies(config: Config) -> Iterator[str]:
     # Of a single joint nothing else tells a size.
     size = max(_SMALLEST, extent) if extent > 0 else np.inf
     found: dict[str, list[tuple[float, str]]] = {}
-    for name, body in config.body_parameters().items():
+    for name, body in config.get_body_parameters().items():
         for what, number in _check_body(body, size):
             found.setdefault(what, []).append((number, name))
     for what, bodies in found.items():
@@ -60,7 +60,7 @@ def _check_body(body: BodyParameters, size: float) -> Iterator[tuple[str, float]
         body: Standard parameters of the body.
         size: Approximate length of the robot, m.
     """
-    values = body.values()
+    values = body.get_values()
     mass = values[Kind.M]
     if mass <= 0:
         return
@@ -79,7 +79,7 @@ def _check_body(body: BodyParameters, size: float) -> Iterator[tuple[str, float]
 def _extent(config: Config) -> float:
     """Estimate the length of the robot, m: the largest sum of distances between joints from the base to a body."""
     bodies = config.description.bodies
-    rigid = bodies.rigid_bodies()
+    rigid = bodies.build_bodies()
     reach: list[float] = []
     for body in rigid:
         before = reach[body.parent] if body.parent >= 0 else 0.0
@@ -87,7 +87,7 @@ def _extent(config: Config) -> float:
         reach.append(before + sum(float(np.linalg.norm(shift)) for shift in shifts))
     joints = {body.coordinate: body.joint for body in rigid}
     given = config.trajectories.position_limits
-    names = bodies.independent_names()
+    names = bodies.list_independent_coordinates()
     ranges = given * len(names) if len(given) == 1 else given
     slides = [
         max(abs(lower), abs(upper))

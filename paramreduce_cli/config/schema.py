@@ -235,7 +235,7 @@ class GroupSection(Section):
             Parameter(kind, self.name).name: [
                 Parameter(kind, body).name for body in self.bodies or []
             ]
-            for kind in map(Kind.of, self.kinds)
+            for kind in map(Kind.parse, self.kinds)
         }
 
 

@@ -55,7 +55,7 @@ def chosen_model(
         choice = ModelChoice(validation.selected.heuristic, validation.selected.n)
     else:
         choice = ModelChoice.parse(text)
-    row = choice.row(reduction)
+    row = choice.find_row(reduction)
     if row is None:
         others = [FULL, BASE] if model is not None else []
         choices = [*others, *known_choices(reduction)]
@@ -71,12 +71,12 @@ def chosen_model(
     worth = "exact" if error < EXACT else f"torque error {format_percent(error)}"
     title = f"{choice.heuristic} with {choice.n} parameters, {worth} on the estimation set"
     judged = validation and validation.heuristics.get(choice.heuristic)
-    if judged and (known_row := judged.row(choice.n)) is not None:
+    if judged and (known_row := judged.find_row(choice.n)) is not None:
         other = float(judged.torque_error.validation[known_row])
         title += f", {format_percent(other)} on the validation set"
         test = judged.torque_error.test[known_row]
         if test.size:
-            title += f", {format_percent_range(*ErrorRange.of(test))} on {test.size} motions of the test set"
+            title += f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
     return reduced_model(reduction, choice.heuristic, row, known), title
 
@@ -127,7 +127,7 @@ def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, Ter
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
     if term.torque_error.test.size:
-        test = format_percent_range(*ErrorRange.of(term.torque_error.test))
+        test = format_percent_range(*ErrorRange.summarise(term.torque_error.test))
         title += f", {test} on {term.torque_error.test.size} motions that no search looked at"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)

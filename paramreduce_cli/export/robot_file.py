@@ -12,8 +12,8 @@ from paramreduce_cli.importing.reading import imported, kind_of
 from paramreduce_cli.importing.robot_format import RobotFormat
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, Kind, Mechanism, Model
-from paramreduce_cli.robots.inertia import physical, pseudo_inertia
-from paramreduce_cli.robots.placement import transform
+from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
+from paramreduce_cli.robots.placement import compose_steps
 
 _SAME = 1e-9
 """By which frames may differ, m or without unit."""
@@ -62,8 +62,8 @@ def _check_same(
     own = [] if tree is None else list(tree.bodies)
     same = len(own) == len(robot.bodies) and all(
         (a.name, a.parent, a.joint) == (b.name, b.parent, b.joint)
-        and np.allclose(transform(a.at), matrix(b.at), rtol=0, atol=_SAME)
-        and (b.axis is None or np.allclose(a.motions()[-1][1], b.axis, rtol=0, atol=_SAME))
+        and np.allclose(compose_steps(a.at), matrix(b.at), rtol=0, atol=_SAME)
+        and (b.axis is None or np.allclose(a.list_motions()[-1][1], b.axis, rtol=0, atol=_SAME))
         for a, b in zip(own, robot.bodies, strict=True)
     )
     if not same:
@@ -78,8 +78,8 @@ def _bodies(mechanism: Mechanism, standard: FloatArray) -> dict[str, FloatArray]
     result = {}
     for k, body in enumerate(mechanism.bodies):
         whole = np.zeros((4, 4))
-        for rigid in mechanism.moving_with(k):
-            own = pseudo_inertia({kind: standard[rigid.columns[kind]] for kind in INERTIAL})
+        for rigid in mechanism.list_rigid_parts(k):
+            own = compute_pseudo_inertia({kind: standard[rigid.columns[kind]] for kind in INERTIAL})
             whole += rigid.frame @ own @ rigid.frame.T
         result[body.name] = whole
     return result
@@ -111,7 +111,7 @@ def _drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, f
             continue
         weight = float(drive.weights[moved[0]])
         found = result.setdefault(mechanism.bodies[moved[0]].name, {})
-        for kind, column in mechanism.drive_columns(drive).items():
+        for kind, column in mechanism.find_drive_columns(drive).items():
             scale = abs(weight) if kind.order is None else weight**2
             found[kind.key] = found.get(kind.key, 0.0) + scale * float(standard[column])
             if kind is Kind.STIFFNESS:
@@ -127,7 +127,7 @@ def _warn_of_losses(
     Raises:
         ConfigError: Bodies cannot exist, and the format refuses them.
     """
-    unphysical = [name for name, body in bodies.items() if not physical(body)]
+    unphysical = [name for name, body in bodies.items() if not is_positive_semidefinite(body)]
     if unphysical and form.physical:
         raise ConfigError(
             f"MuJoCo takes physical bodies alone, and no distribution of mass has the inertia of "

@@ -36,7 +36,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if known := " / ".join(format_percent(error) for error in errors if np.isfinite(error)):
         lines.append(f"Error of the accelerations (estimation / validation): {known}.")
-    test = ErrorRange.of(term.acceleration_error.test)
+    test = ErrorRange.summarise(term.acceleration_error.test)
     if np.isfinite(test.median):
         lines.append(
             f"The same on motions that no search looked at: {format_percent_range(*test)}."

@@ -27,7 +27,7 @@ def values_file(
         simplified: The function that they are of with terms left out; where it holds is said of a mechanism.
     """
     found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
-    units = [] if mechanism is None else chosen.unit_names(mechanism.parameters)
+    units = [] if mechanism is None else chosen.list_units(mechanism.parameters)
     sizes = chosen.unit_sizes.tolist() if chosen.units is not None else []
     known = {} if mechanism is None else {
         "coordinates": mechanism.generalised_names,

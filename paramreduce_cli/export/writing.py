@@ -182,7 +182,7 @@ def _frames(mechanism: Mechanism) -> tuple[str, ...]:
 
 def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
     """Values with units."""
-    units = chosen.unit_names(model.mechanism.parameters)
+    units = chosen.list_units(model.mechanism.parameters)
     found = zip(chosen.names, chosen.values.tolist(), units, chosen.expressions, strict=True)
     return tuple(ParameterValue(*one) for one in found)
 

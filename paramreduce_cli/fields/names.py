@@ -90,7 +90,7 @@ class OneMethod(OneOf):
     def __init__(self) -> None:
         super().__init__("heuristic", _HEURISTICS)
 
-    def names(self) -> list[str]:
+    def list_names(self) -> list[str]:
         """Return heuristics alone, then with every criterion that they can select by."""
         heuristics, alone = list_names(_HEURISTICS), list_names(_TORQUE_ONLY)
         methods = [

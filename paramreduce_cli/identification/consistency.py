@@ -14,7 +14,7 @@ import numpy as np
 
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, IntArray, Mechanism
-from paramreduce_cli.robots.inertia import pseudo_inertia
+from paramreduce_cli.robots.inertia import compute_pseudo_inertia
 
 _MARGIN = 1e-3
 """Smallest eigenvalue of a pseudo-inertia matrix in units of the body's size."""
@@ -82,7 +82,7 @@ def pseudo_inertias(physical: Physical, values: FloatArray) -> FloatArray:
 
 
 def _matrix(values: FloatArray) -> FloatArray:
-    return pseudo_inertia(dict(zip(INERTIAL, values.tolist(), strict=True)))
+    return compute_pseudo_inertia(dict(zip(INERTIAL, values.tolist(), strict=True)))
 
 
 def smallest_eigenvalues(physical: Physical, values: FloatArray) -> FloatArray:

@@ -160,7 +160,7 @@ def _some(model: Model, training: SampleSet) -> _Looked:
     )
     W, pulls, tau, seen = [], [], [], 0
     states: list[tuple[FloatArray, ...]] = []
-    for block in training.blocks():
+    for block in training.iterate_blocks():
         picked = slice(-seen % every, None, every)
         seen += len(block.tau)
         q = block.q[picked]
@@ -199,7 +199,7 @@ def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[F
     if (
         not level[:2].all()
         or not np.any(model.values)
-        or len(fitted.rows.X) != len({block.trajectory for block in training.blocks()})
+        or len(fitted.rows.X) != len({block.trajectory for block in training.iterate_blocks()})
     ):
         return []
     found = []
@@ -207,7 +207,7 @@ def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[F
     for axis in np.eye(3)[:2]:
         tilted = Dynamics(replace(mechanism, gravity=axis))
         parts: dict[int, list[FloatArray]] = {}
-        for block in training.blocks():
+        for block in training.iterate_blocks():
             still = np.zeros_like(block.q)
             K = tilted.regressor(block.q, still, still)
             weightless = without.regressor(block.q, still, still)

@@ -49,7 +49,7 @@ def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQ
     base = base_parameters(
         K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE, affects
     )
-    factors = LoggedSet(log.training, log, dynamics, "training part").factors()
+    factors = LoggedSet(log.training, log, dynamics, "training part").compute_factors()
     scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, np.inf)
     W = combined_factor(factors, scale)[:, base.columns]

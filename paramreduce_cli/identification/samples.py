@@ -123,13 +123,13 @@ class LoggedSet:
         tau = self.motions.tau[rows]
         return tau if self.measured is None else np.where(self.measured, tau, 0.0)
 
-    def blocks(self) -> Iterator[Block]:
+    def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         observed = ObservedSet(
             spans([stretch.size for stretch in self._stretches]), self._states_at, self.dynamics,
             np.zeros(self.dynamics.mechanism.n_parameters), self.source,
         )  # fmt: skip
-        for number, blocks in groupby(observed.blocks(), attrgetter("trajectory")):
+        for number, blocks in groupby(observed.iterate_blocks(), attrgetter("trajectory")):
             yield from self._low_passed(self._stretches[number], blocks)
 
     def states(self) -> Iterator[StateBlock]:
@@ -190,6 +190,6 @@ class LoggedSet:
             tau = filters.thinned_low_pass(tau, first, self._taps, outputs)
         return Block(trajectory=fold, tau=tau, W=W.reshape(outputs.size * n_dof, -1), **states)
 
-    def factors(self) -> FloatArray:
+    def compute_factors(self) -> FloatArray:
         """Triangular factors per fold and joint."""
-        return joint_factors(self.blocks())
+        return joint_factors(self.iterate_blocks())

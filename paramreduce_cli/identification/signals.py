@@ -208,7 +208,7 @@ def _column(log: RawLog, name: str) -> FloatArray:
     if wrong.size:
         more = f", nor are {wrong.size - 1} others" if wrong.size > 1 else ""
         raise DataError(
-            f"{log.place(int(wrong[0]))}, column {name}: is empty or not a finite number below {_LARGEST:g}{more}. "
+            f"{log.describe_row(int(wrong[0]))}, column {name}: is empty or not a finite number below {_LARGEST:g}{more}. "
             "Remove such rows."
         )
     if column.size < _FEWEST:
@@ -223,7 +223,7 @@ def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
         row = int(wrong[0]) + 1
         what = "stands still" if steps[row - 1] == 0 else "goes back"
         raise DataError(
-            f"{log.place(row)}, column {name}: time {what}, from {time[row - 1]:.6g} s to "
+            f"{log.describe_row(row)}, column {name}: time {what}, from {time[row - 1]:.6g} s to "
             f"{time[row]:.6g} s; so it does in {wrong.size} rows. Bring rows in the order in which they "
             "were recorded, one file for each recording."
         )

@@ -10,7 +10,7 @@ import numpy as np
 
 from paramreduce_cli.importing.angles import without_dust
 from paramreduce_cli.records import ClosureKind, FloatArray
-from paramreduce_cli.robots.placement import Step, transform
+from paramreduce_cli.robots.placement import Step, compose_steps
 
 JointKind = Literal["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "ball"]
 
@@ -44,7 +44,7 @@ def _whole(angle: float) -> float:
 
 def matrix(steps: Steps) -> FloatArray:
     """Steps as a homogeneous transform, (4, 4), m."""
-    return transform([Step.model_validate({key: value}) for key, value in steps])
+    return compose_steps([Step.model_validate({key: value}) for key, value in steps])
 
 
 @dataclass(frozen=True)

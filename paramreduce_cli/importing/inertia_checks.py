@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.importing.imported import Inertial
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.robots.inertia import physical
+from paramreduce_cli.robots.inertia import is_positive_semidefinite
 
 _FAR = 0.5
 """Square of the distance to the centre of mass, in squares of the radius of gyration, from which on it
@@ -39,7 +39,7 @@ def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]
 
 def possible(tensor: FloatArray) -> bool:
     """Whether second moments of mass with this tensor are positive."""
-    return physical(np.trace(tensor) / 2 * np.eye(3) - tensor)
+    return is_positive_semidefinite(np.trace(tensor) / 2 * np.eye(3) - tensor)
 
 
 def _about_origin(inertial: Inertial) -> bool:

@@ -25,7 +25,7 @@ from paramreduce_cli.importing.imported import (
 )
 from paramreduce_cli.importing.inertia_checks import find_inertia_warnings
 from paramreduce_cli.records import JOINT_COORDINATES, ClosureKind, FloatArray
-from paramreduce_cli.robots.tree import rotation_to
+from paramreduce_cli.robots.tree import rotate_z_to
 
 BASE = "base"
 """What configs call the fixed base."""
@@ -305,7 +305,7 @@ class _Simplification:
         if joint.kind in _SEVERAL:
             bodies.append(ImportedBody(name, carrier, _SEVERAL[joint.kind], at, **own))
         elif joint.kind == "planar":
-            turn = rotation_to(np.array(joint.axis))
+            turn = rotate_z_to(np.array(joint.axis))
             for k, letter in enumerate("xy"):
                 slide, axis = self._names.body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
                 sliding = f"{coordinate}_{letter}"
@@ -408,7 +408,7 @@ def _motion(joint: ImportedJoint, value: float) -> Steps:
     for k, key in enumerate(("rx", "ry", "rz")):
         if abs(axis[k]) == 1.0:
             return ((key, value * float(axis[k])),)
-    turn = rotation_to(axis)
+    turn = rotate_z_to(axis)
     frame = np.eye(4)
     frame[:3, :3] = turn
     return (*steps_of(frame), ("rz", value), *steps_of(frame.T))

@@ -37,7 +37,7 @@ class OperationCounts:
     ) -> None:
         self._model, self._counted, self._run = model, counted, run
         self._models = {
-            ModelChoice(name, int(n)): reduction.model(name, row)
+            ModelChoice(name, int(n)): reduction.make_model(name, row)
             for name, found in reduction.heuristics.items()
             for row, n in enumerate(found.n)
         }
@@ -64,7 +64,7 @@ class OperationCounts:
             self._structures[key]: (result.operations.inverse[row], result.operations.direct[row])
             for key in self._models
             for result in [heuristics[key.heuristic]]
-            for row in [result.row(key.n)]
+            for row in [result.find_row(key.n)]
             if row is not None and np.isfinite(result.operations.inverse[row])
         }
         asked = {self._structures[key]: self._models[key] for key in shown}

@@ -70,7 +70,7 @@ def best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pick | N
 
     Of equal ones the last heuristic's; None if no heuristic has such a model.
     """
-    rows = {name: result.row(n) for name, result in results.items()}
+    rows = {name: result.find_row(n) for name, result in results.items()}
     return _smallest_then_best(
         results, [(name, row) for name, row in rows.items() if row is not None]
     )

@@ -77,7 +77,7 @@ def _cross_validated(
 ) -> tuple[str, int, str]:
     """Heuristic, row and reason of what cross-validation chooses."""
     choice = one_standard_error(found)
-    row = results[choice.heuristic].row(choice.n)
+    row = results[choice.heuristic].find_row(choice.n)
     assert row is not None  # only sizes of the heuristic itself are judged
     own = found[choice.heuristic]
     best = min(found.values(), key=lambda r: float(r.mean.min()))

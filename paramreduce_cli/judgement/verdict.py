@@ -55,10 +55,10 @@ def verdict(
 def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
     """Return what a limit of the config is on, of the model of n parameters."""
     quantity, part = key.removesuffix(_WORST).rsplit("_", 1)
-    own = getattr(result, quantity)[part][result.row(n)]
+    own = getattr(result, quantity)[part][result.find_row(n)]
     if part != "test":
         return float(own)
-    errors = ErrorRange.of(own)
+    errors = ErrorRange.summarise(own)
     return errors.worst if key.endswith(_WORST) else errors.median
 
 
@@ -75,7 +75,7 @@ def find_model_warnings(
     common: dict[str, list[str]] = {}
     who = f"The selected model ({selected.heuristic}, n = {selected.n})"
     for name, result in heuristics.items():
-        chosen = result.row(selected.n) if name == selected.heuristic else None
+        chosen = result.find_row(selected.n) if name == selected.heuristic else None
         for flags, text, consequence in _check_subsets(full, result):
             if flags.any():
                 common.setdefault(text, []).append(name)
@@ -121,7 +121,7 @@ def _unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> Boo
 
 
 def _apart(result: HeuristicValidation, what: str) -> BoolArray:
-    one, two = result.error(what).estimation, result.error(what).validation
+    one, two = result.get_errors(what).estimation, result.get_errors(what).validation
     smaller, larger = np.minimum(one, two), np.maximum(one, two)
     apart: BoolArray = (larger > _ERROR_FACTOR * smaller) & ((smaller > _NEGLIGIBLE) & (larger < 1))
     return apart

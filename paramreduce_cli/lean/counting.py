@@ -65,12 +65,12 @@ class Counts:
 
     def lean(self, model: ReducedModel) -> list[int]:
         """Return :data:`COUNTS` of a model; its values do not matter."""
-        model = model.restricted(self._model.affecting)
+        model = model.drop_unaffecting(self._model.affecting)
         return [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
 
     def textbook(self, model: ReducedModel) -> list[int]:
         """Return :data:`TEXTBOOK_COUNTS` of a model; its values do not matter."""
-        model = model.restricted(self._model.affecting)
+        model = model.drop_unaffecting(self._model.affecting)
         return [
             count
             for signs_free in (True, False)
@@ -112,7 +112,7 @@ def count_all(
 
 def structure(one: ReducedModel, model: Model) -> bytes:
     """Return what the operations of a reduced model depend on: which parameters are kept, and which share a value."""
-    one = one.restricted(model.affecting)
+    one = one.drop_unaffecting(model.affecting)
     ties = one.ties
     return bytes(str([ties.get(k, k) for k in one.kept.tolist()]), "ascii")
 

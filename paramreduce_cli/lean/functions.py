@@ -37,7 +37,7 @@ class LeanFunctions:
         self._simplified = simplified
         self._mechanism = mechanism
         self._models = lean_models(model, independent=True)
-        self._reduced = reduced.restricted(model.affecting)
+        self._reduced = reduced.drop_unaffecting(model.affecting)
         self._constant = constant
         q, z = mechanism.n_q, mechanism.n_dof
         self._states = (

@@ -20,7 +20,7 @@ from paramreduce_cli.lean.motion import (
 from paramreduce_cli.lean.tree import Joint, Tree
 from paramreduce_cli.lean.turns import ConstantTurn, Turn, constant_turn, turn_by
 from paramreduce_cli.records import BASE, INERTIAL, FloatArray, Rigid
-from paramreduce_cli.robots.frames import unrounded
+from paramreduce_cli.robots.frames import clean_rotation
 
 
 class Symbols:
@@ -157,7 +157,7 @@ class Kinematics:
         whole = self.symbols.no_inertia()
         for rigid in joint.rigid:
             frame = joint.described_to_axis @ rigid.frame
-            turn = constant_turn(self.graph, unrounded(frame[:3, :3]).tobytes())
+            turn = constant_turn(self.graph, clean_rotation(frame[:3, :3]).tobytes())
             described = turn.inertia(self.symbols.inertia(rigid))
             whole = whole + described.shifted(self.symbols.vector(frame[:3, 3]))
         return whole

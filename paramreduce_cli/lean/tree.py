@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import BASE, Drive, FloatArray, Kind, Mechanism, Rigid
-from paramreduce_cli.robots.frames import unrounded
+from paramreduce_cli.robots.frames import clean_rotation
 
 _FLIP = np.diag([1.0, -1.0, -1.0])
 
@@ -68,7 +68,7 @@ def lean_tree(mechanism: Mechanism) -> Tree:
         placed = body.parent_to_joint
         if before is not None:
             placed = before.described_to_axis @ placed
-        turn, after, sign = unrounded(placed[:3, :3]), body.joint_to_body.copy(), 1
+        turn, after, sign = clean_rotation(placed[:3, :3]), body.joint_to_body.copy(), 1
         parallel = before is not None and not _tilts(turn)
         if parallel and turn[2, 2] < 0:
             turn, sign = turn @ _FLIP, -1
@@ -80,7 +80,7 @@ def lean_tree(mechanism: Mechanism) -> Tree:
         elif parallel:
             after[:3] = turn @ after[:3]
             turn = np.eye(3)
-        after[:3, :3] = unrounded(after[:3, :3])
+        after[:3, :3] = clean_rotation(after[:3, :3])
         joints.append(
             Joint(
                 parent=body.parent,
@@ -91,10 +91,10 @@ def lean_tree(mechanism: Mechanism) -> Tree:
                 turn=turn,
                 parallel=parallel,
                 described_to_axis=after,
-                rigid=mechanism.moving_with(i),
+                rigid=mechanism.list_rigid_parts(i),
             )
         )
-    drives = tuple((drive, mechanism.drive_columns(drive)) for drive in mechanism.drives)
+    drives = tuple((drive, mechanism.find_drive_columns(drive)) for drive in mechanism.drives)
     return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters, drives=drives)
 
 
@@ -114,4 +114,4 @@ def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
     sine, cosine = (turn[2, 0], turn[2, 1]) if _tilts(turn) else (turn[1, 0], turn[0, 0])
     angle = float(np.arctan2(sine, cosine))
     c, s = np.cos(angle), np.sin(angle)
-    return unrounded(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle
+    return clean_rotation(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle

@@ -9,7 +9,7 @@ from paramreduce_cli.expressions.vectors import Vector
 from paramreduce_cli.lean.algebra import Scalar, remembered
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.robots.frames import whole_quarters
+from paramreduce_cli.robots.frames import count_quarter_turns
 
 _SLIGHT = 1e-3
 """Sine of a tilt below which rounding would show in the angles of the turns before and after it."""
@@ -54,7 +54,7 @@ class Turn:
 
 def turn_by(angle: Scalar, offset: float) -> Turn:
     """The turn by angle + offset; whole quarter turns cost nothing and are exact."""
-    quarters = whole_quarters(offset)
+    quarters = count_quarter_turns(offset)
     if quarters is None:
         angle, quarters = angle + offset, 0
     c, s = angle.cosine(), angle.sine()

@@ -59,7 +59,7 @@ def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
         scale[:, inertial] = largest * units
     for drive in mechanism.drives:
         weight = float(np.abs(drive.weights).max())
-        for kind, column in mechanism.drive_columns(drive).items():
+        for kind, column in mechanism.find_drive_columns(drive).items():
             forces = weight if kind.order is not None else 1.0
             scale[:, column] = np.sqrt(len(K)) * weight * forces
     return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0)

@@ -55,7 +55,7 @@ def inverse_dynamics(
     tau = [ca.SX(0)] * mechanism.n_q
     for i in reversed(range(mechanism.n_q)):
         force, moment = forces[i], moments[i]
-        for rigid in mechanism.moving_with(i):
+        for rigid in mechanism.list_rigid_parts(i):
             own_force, own_moment = _inertial_wrench(rigid, phi, rates[i])
             force, moment = add(force, own_force), add(moment, own_moment)
         tau[i] = _along(joints[i], force, moment)
@@ -66,7 +66,7 @@ def inverse_dynamics(
             moments[parent] = add(moments[parent], add(moment, cross(joints[i].origin, force)))
     states = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
     for drive in mechanism.drives:
-        for kind, column in mechanism.drive_columns(drive).items():
+        for kind, column in mechanism.find_drive_columns(drive).items():
             along = phi[column] * unit_force(kind, drive, states, CASADI)
             tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
     return tau

@@ -36,16 +36,16 @@ class JoinedSet:
         """How many samples it yields in all."""
         return sum(part.n_samples for part in self._parts)
 
-    def blocks(self) -> Iterator[Block]:
+    def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         for part in self._parts:
-            yield from part.blocks()
+            yield from part.iterate_blocks()
 
     def states(self) -> Iterator[Block]:
         """The same with observation matrices of no rows."""
         for part in self._parts:
             yield from part.states()
 
-    def factors(self) -> FloatArray:
+    def compute_factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint, from those of the parts."""
-        return joined_factors((part.first, part.factors()) for part in self._parts)
+        return joined_factors((part.first, part.compute_factors()) for part in self._parts)

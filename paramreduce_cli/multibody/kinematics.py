@@ -7,7 +7,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.vectors import Vector, add, apply
 from paramreduce_cli.records import BASE, Body, FloatArray, Mechanism
-from paramreduce_cli.robots.frames import whole_quarters
+from paramreduce_cli.robots.frames import count_quarter_turns
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def joint_motion(body: Body, z: ca.SX) -> JointMotion:
 
 def joint_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
     """Of z + offset; whole quarter turns cost nothing and are exact."""
-    quarters = whole_quarters(offset)
+    quarters = count_quarter_turns(offset)
     if quarters is None:
         return ca.cos(z + offset), ca.sin(z + offset)
     c, s = ca.cos(z), ca.sin(z)

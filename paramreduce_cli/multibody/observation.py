@@ -107,7 +107,7 @@ class ObservedSet:
 
         return Coordinates(self.dynamics.mechanism)
 
-    def blocks(self) -> Iterator[Block]:
+    def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew.
 
         Raises:
@@ -143,9 +143,9 @@ class ObservedSet:
         self._coordinates.check_motion(times, path)
         return q[::finer], (time[-1:], q[-1:])
 
-    def factors(self) -> FloatArray:
+    def compute_factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint."""
-        return joint_factors(self.blocks())
+        return joint_factors(self.iterate_blocks())
 
 
 class FactorAccumulator:

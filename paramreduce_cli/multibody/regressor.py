@@ -64,7 +64,7 @@ def _driven(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -> dict[int, 
     rows = {}
     for drive in mechanism.drives:
         weights = ca.MX(ca.sparsify(ca.DM(drive.weights[None])))
-        for kind, column in mechanism.drive_columns(drive).items():
+        for kind, column in mechanism.find_drive_columns(drive).items():
             rows[column] = unit_force(kind, drive, vectors, CASADI) * weights
     return rows
 

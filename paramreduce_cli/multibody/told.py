@@ -33,10 +33,10 @@ class ToldSet:
         """Whether each sample's state and the model give its rows of the observation matrix back."""
         return self.computed.recomputable
 
-    def blocks(self) -> Iterator[Block]:
+    def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        return told(self.computed.blocks(), self.n_samples, self.what, self.tell)
+        return told(self.computed.iterate_blocks(), self.n_samples, self.what, self.tell)
 
-    def factors(self) -> FloatArray:
+    def compute_factors(self) -> FloatArray:
         """Triangular factors of [W | tau] per trajectory and joint."""
-        return self.computed.factors()
+        return self.computed.compute_factors()

@@ -55,7 +55,7 @@ from paramreduce_cli.records.parameters import (
     LAST,
     Kind,
     Parameter,
-    preference_order,
+    order_by_preference,
 )
 from paramreduce_cli.records.reduction import (
     NOT_KEPT,

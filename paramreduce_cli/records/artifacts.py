@@ -1,4 +1,4 @@
-"""What stages have made of one robot."""
+"""Artifacts that the stages have made of one robot."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from paramreduce_cli.records.validation import Validation
 
 @dataclass(frozen=True)
 class Artifacts:
-    """Artifacts of one robot, without its samples; None where a stage has nothing to do."""
+    """The artifacts of one robot without its samples; None where a stage has nothing to do."""
 
     model: Model | None
     """None where samples were brought without a robot."""

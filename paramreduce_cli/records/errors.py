@@ -1,4 +1,4 @@
-"""Errors and costs of models, by set and by function."""
+"""Errors of models by set, and operations by function."""
 
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -9,15 +9,15 @@ from paramreduce_cli.records.arrays import FloatArray
 
 
 class ErrorRange(NamedTuple):
-    """Errors over the motions of the test set; not numbers where there are none."""
+    """The range of one model's errors over the motions of the test set; NaN without a test set."""
 
     median: float
     least: float
     worst: float
 
     @classmethod
-    def of(cls, errors: FloatArray) -> "ErrorRange":
-        """Return the range of one model's errors, (n_motions,)."""
+    def summarise(cls, errors: FloatArray) -> "ErrorRange":
+        """Return the median and the range of one model's errors, (n_motions,)."""
         if not errors.size:
             return NO_MOTIONS
         return cls(float(np.median(errors)), float(errors.min()), float(errors.max()))
@@ -36,7 +36,7 @@ class _Named:
 
 @dataclass(frozen=True)
 class ModelErrors(_Named):
-    """Relative errors of one model on each set."""
+    """The relative errors of one model on each set."""
 
     estimation: float
     validation: float
@@ -46,7 +46,7 @@ class ModelErrors(_Named):
 
 @dataclass(frozen=True)
 class SetErrors(_Named):
-    """Relative errors of several models on each set, a row for each model."""
+    """The relative errors of several models on each set, one row per model."""
 
     estimation: FloatArray
     """(m,)"""
@@ -58,7 +58,7 @@ class SetErrors(_Named):
 
 @dataclass(frozen=True)
 class JointErrors(_Named):
-    """Relative errors of single joints on each set, (m, n_dof); over all motions of the test set together."""
+    """The relative errors of single joints on each set, (m, n_dof); over all motions of the test set together."""
 
     estimation: FloatArray
     validation: FloatArray
@@ -67,7 +67,7 @@ class JointErrors(_Named):
 
 @dataclass(frozen=True)
 class Operations(_Named):
-    """Operations of the lean functions, (m,); not a number where a model is not shown, and so not counted."""
+    """The operations of the lean functions, (m,); NaN where a model is not shown, and so not counted."""
 
     inverse: FloatArray
     direct: FloatArray
@@ -75,7 +75,7 @@ class Operations(_Named):
 
 @dataclass(frozen=True)
 class MassMatrices(_Named):
-    """Properties of the mass matrices of models over the samples, (m,)."""
+    """The properties of models' mass matrices over all samples, (m,)."""
 
     condition: FloatArray
     """Largest condition number."""

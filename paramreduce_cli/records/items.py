@@ -1,4 +1,4 @@
-"""The items of a stage: what is done once, kept, and combined in the end; and the part of them that a job does."""
+"""Items of a stage: pieces of work that are computed once, kept, and combined in the end."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Part:
-    """Every so many of a stage's items, written ``3/8``; all items as it stands."""
+    """A part of a stage's items, written ``3/8``: every eighth item from the third on; by default all items."""
 
     number: int = 1
     """Number of the job, from 1 on."""

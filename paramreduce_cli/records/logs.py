@@ -1,4 +1,4 @@
-"""Logs of a machine: columns as recorded, and the motions that are made of them."""
+"""Logs of a machine as recorded, motions made from logs, and what is identified from motions."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
@@ -17,7 +17,7 @@ _ROUNDING = 1e-4
 
 @dataclass(frozen=True)
 class RawLog:
-    """One file as it was recorded."""
+    """A log file as it was recorded."""
 
     source: str
     columns: Mapping[str, FloatArray]
@@ -27,8 +27,8 @@ class RawLog:
     others: Mapping[str, str] = field(default_factory=dict)
     """What columns hold that hold no numbers, such as text, by name."""
 
-    def place(self, row: int) -> str:
-        """Where a row stands, for messages."""
+    def describe_row(self, row: int) -> str:
+        """Return file and line of a row, for messages."""
         if self.first_line is None:
             return f"{self.source}, row {row + 1}"
         return f"{self.source}, line {self.first_line + row}"
@@ -36,9 +36,9 @@ class RawLog:
 
 @dataclass(frozen=True)
 class RawLogs:
-    """What the user brought: files to train on, and files that are held out.
+    """The user's log files: files to train on and files that are held out.
 
-    Long ones are read when they are gone through, one at a time.
+    Long files are read only when they are iterated over, one at a time.
     """
 
     training: Iterable[RawLog]
@@ -47,9 +47,10 @@ class RawLogs:
 
 @dataclass(frozen=True)
 class MeasuredMotions:
-    """Measured motions one after the other, evenly spaced in time within each piece.
+    """A sequence of measured motions, evenly spaced in time within each piece.
 
-    Long ones in a file are no arrays, but give forward slices as arrays do, and one by ``numpy.asarray``.
+    Arrays of long motions stay in a file: they give forward slices as arrays do, and become arrays by
+    ``numpy.asarray``.
     """
 
     time: FloatArray
@@ -69,8 +70,8 @@ class MeasuredMotions:
 
 @dataclass(frozen=True)
 class ShownSignals:
-    """Signals before and after, thinned for figures; of the longest motion that is learned from, and of what is
-    held out of the same.
+    """The signals before and after processing, downsampled for figures: of the longest training motion, and of the
+    held-out part of the same motion.
     """
 
     raw_time: FloatArray
@@ -98,7 +99,7 @@ class ShownSignals:
 
 @dataclass(frozen=True)
 class Spectra:
-    """What signals are made of, by frequency."""
+    """The power spectral densities of recorded signals."""
 
     frequency: FloatArray
     """(n_frequencies,), Hz."""
@@ -142,7 +143,9 @@ class MeasuredLog:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Values of a model's parameters from measured torques, and what they are worth."""
+    """The values of a model's parameters identified from measured torques, with their uncertainty and the errors that
+    remain.
+    """
 
     names: tuple[str, ...]
     values: FloatArray
@@ -162,8 +165,8 @@ class Estimate:
     folds: FloatArray
     """Error on each part of the training data when fitted without it, like ``train``, (n_folds,)."""
 
-    def deviations_of(self, model: ReducedModel) -> dict[str, float]:
-        """Standard deviations by name; none for a model of other values, such as other weights give."""
+    def find_deviations(self, model: ReducedModel) -> dict[str, float]:
+        """Return standard deviations by name, or nothing if the model has other values, as other weights give."""
         values = dict(zip(self.names, self.values, strict=True))
         if set(values) != set(model.names):
             return {}
@@ -176,7 +179,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class Residuals:
-    """What the residuals of the model of all base parameters are like on the training data."""
+    """The statistics of the residuals that all base parameters leave on the training data."""
 
     deviation: FloatArray
     """(n_dof,), N m (N)."""
@@ -212,7 +215,7 @@ class Consistency:
 
 @dataclass(frozen=True)
 class Identification:
-    """What measured torques say of a robot."""
+    """The parameters identified from measured torques, with residuals, consistency and hints."""
 
     FILE: ClassVar[str] = "identification.h5"
     estimator: str

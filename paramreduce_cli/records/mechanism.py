@@ -1,4 +1,4 @@
-"""Mechanisms: bodies, joints, closures of loops."""
+"""Mechanisms: bodies, joints, drives, and closures of loops."""
 
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
@@ -13,8 +13,8 @@ from paramreduce_cli.records.parameters import (
     INERTIAL,
     Kind,
     Parameter,
-    preference_order,
-    subscript,
+    order_by_preference,
+    to_latex_subscript,
 )
 
 BASE = -1
@@ -53,7 +53,7 @@ class Body:
 
     @property
     def unit(self) -> str:
-        """Of the joint's coordinate."""
+        """Unit of the joint's coordinate."""
         return "rad" if self.joint == "revolute" else "m"
 
 
@@ -65,7 +65,7 @@ ClosureKind = Literal[
 
 @dataclass(frozen=True)
 class Closure:
-    """What holds two bodies of the tree together and makes a loop of it.
+    """A closure that holds two bodies of the tree together and makes a loop.
 
     With A and B the frames on the two bodies:
 
@@ -97,7 +97,7 @@ class Closure:
 
 @dataclass(frozen=True)
 class Loops:
-    """How the loops of a mechanism are closed, and in which coordinates it is described."""
+    """The closures of a mechanism's loops, and the coordinates that describe the mechanism."""
 
     closures: tuple[Closure, ...]
     independent: tuple[int, ...]
@@ -110,7 +110,7 @@ class Loops:
 
 @dataclass(frozen=True)
 class Payload:
-    """What a body carries: a rigid body with parameters of its own, in a frame fixed to that body."""
+    """A payload: a rigid body with parameters of its own, in a frame fixed to the body that carries it."""
 
     name: str
     body: int
@@ -121,10 +121,10 @@ class Payload:
 
 @dataclass(frozen=True)
 class Drive:
-    """What acts along one motion besides the inertia of bodies: rotor, friction, constant, spring.
+    """A drive: rotor, friction, constant force and spring along one motion.
 
-    Its speed is a sum of the coordinates' speeds with weights, and a force f on it is weight times f
-    on each coordinate, so that its power is force times speed.
+    The speed of the motion is a weighted sum of the coordinates' speeds, and a force f along the motion is weight times
+    f on each coordinate, so that power is force times speed.
     """
 
     name: str
@@ -166,8 +166,8 @@ class Length:
 
     @property
     def latex(self) -> str:
-        """The same as a formula."""
-        return f"{self.symbol}_{{{subscript(self.owner)}}}"
+        """LaTeX formula of the length."""
+        return f"{self.symbol}_{{{to_latex_subscript(self.owner)}}}"
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ class Mechanism:
     @property
     def preference_order(self) -> IntArray:
         """Parameters from the most to the least wanted as base parameters, (n_parameters,)."""
-        return preference_order([parameter.preference for parameter in self.parameters])
+        return order_by_preference([parameter.preference for parameter in self.parameters])
 
     @property
     def size(self) -> float:
@@ -249,25 +249,27 @@ class Mechanism:
         bodies = [(body.name, k, np.eye(4)) for k, body in enumerate(self.bodies)]
         payloads = [(payload.name, payload.body, payload.frame) for payload in self.payloads]
         found = (
-            Rigid(name, body, frame, self._columns_of(name, INERTIAL))
+            Rigid(name, body, frame, self._find_columns(name, INERTIAL))
             for name, body, frame in bodies + payloads
         )
         return tuple(rigid for rigid in found if rigid.columns)
 
-    def moving_with(self, body: int) -> tuple[Rigid, ...]:
-        """A body with its payloads, those of them that have inertia."""
+    def list_rigid_parts(self, body: int) -> tuple[Rigid, ...]:
+        """Return a body and its payloads, as far as they have inertia."""
         return tuple(rigid for rigid in self.rigid if rigid.body == body)
 
-    def drive_columns(self, drive: Drive) -> Mapping[Kind, int]:
-        """Columns of a drive's parameters by kind."""
-        return self._columns_of(drive.name, DRIVE)
+    def find_drive_columns(self, drive: Drive) -> Mapping[Kind, int]:
+        """Return the columns of a drive's parameters by kind."""
+        return self._find_columns(drive.name, DRIVE)
 
-    def _columns_of(self, owner: str, kinds: Collection[Kind]) -> Mapping[Kind, int]:
+    def _find_columns(self, owner: str, kinds: Collection[Kind]) -> Mapping[Kind, int]:
+        """Return the columns of an owner's parameters of some kinds, by kind."""
         columns = self._columns.get(owner, {})
         return {kind: column for kind, column in columns.items() if kind in kinds}
 
     @cached_property
     def _columns(self) -> Mapping[str, Mapping[Kind, int]]:
+        """Columns of all parameters by owner and kind."""
         columns: dict[str, dict[Kind, int]] = {}
         for column, parameter in enumerate(self.parameters):
             columns.setdefault(parameter.owner, {})[parameter.kind] = column

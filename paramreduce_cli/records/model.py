@@ -1,4 +1,4 @@
-"""A model: a mechanism with values of its parameters, their base, and lean formulations."""
+"""The model of a robot: mechanism, values of parameters, base parameters, and lean formulations."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -33,7 +33,7 @@ Formulation = tuple[Mapping[str, str | bool], ...]
 
 @dataclass(frozen=True)
 class Formulations:
-    """Lean ways to write a mechanism's dynamics."""
+    """The choices between equivalent lean ways to write a mechanism's dynamics."""
 
     inverse: tuple[Formulation, ...]
     direct: tuple[Formulation, ...]
@@ -72,7 +72,7 @@ class Model:
 
 
 class CountedDynamics(StrEnum):
-    """Which functions of closed loops are counted; on an open tree they are the same."""
+    """The functions of closed loops whose operations are counted; on an open tree both choices are the same."""
 
     GENERALISED = "generalised"
     """d_q and [M_qq | delta_q] of the open tree."""

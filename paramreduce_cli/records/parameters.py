@@ -1,4 +1,4 @@
-"""The dynamic parameters of a model: a list of things with a kind, an owner and a unit."""
+"""Dynamic parameters of a model: each has a kind, an owner and a unit."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from paramreduce_cli.records.arrays import IntArray
 
 
 class Kind(Enum):
-    """What a parameter measures: its symbol, its unit, its rank of preference in a base, its formula.
+    """A kind of parameter: its symbol, unit, formula, and rank of preference in a base.
 
     The smaller the rank, the more a kind is wanted among the base parameters. For revolute arms
     these ranks yield Khalil's set [Khalil1987]: Izz of the first body and seven parameters of every
@@ -59,8 +59,8 @@ class Kind(Enum):
         return self is Kind.OFFSET
 
     @classmethod
-    def of(cls, symbol: str) -> Kind:
-        """The kind with a symbol.
+    def parse(cls, symbol: str) -> Kind:
+        """Return the kind with a symbol.
 
         Raises:
             KeyError: There is none.
@@ -100,8 +100,8 @@ class Parameter:
 
     @property
     def latex(self) -> str:
-        """The symbol as a formula."""
-        place = [part for part in (self.kind.axes, subscript(self.owner)) if part]
+        """LaTeX formula of the symbol."""
+        place = [part for part in (self.kind.axes, to_latex_subscript(self.owner)) if part]
         return f"{self.kind.letter}_{{{','.join(place)}}}"
 
     @property
@@ -115,14 +115,14 @@ class Parameter:
         return self.kind.preference
 
 
-def subscript(name: str) -> str:
-    """A body's name as part of a formula."""
+def to_latex_subscript(name: str) -> str:
+    """Return a body's name as a LaTeX subscript."""
     escaped = name.replace("_", r"\_")
     return rf"\mathrm{{{escaped}}}"
 
 
-def preference_order(ranks: Sequence[int] | IntArray) -> IntArray:
-    """Columns from the most to the least preferred, by rank, then by position, (n,).
+def order_by_preference(ranks: Sequence[int] | IntArray) -> IntArray:
+    """Return columns from the most to the least preferred, by rank, then by position, (n,).
 
     This order breaks every tie in the project.
     """

@@ -1,4 +1,4 @@
-"""Subsets of parameters, how good they are proven to be, and the models they make."""
+"""Subsets of parameters, the proofs of their optimality, and the reduced models that they make."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ class ReducedModel:
 
     @property
     def first(self) -> list[int]:
-        """The first standard parameter that has each value, whose unit and kind are the value's."""
+        """Number of the first standard parameter that has each value; the value has its unit and kind, (n,)."""
         return [int(np.flatnonzero(self.position == k)[0]) for k in range(self.n)]
 
     @property
@@ -79,8 +79,8 @@ class ReducedModel:
         """Sizes of the units of the values, SI, (n,)."""
         return np.ones(self.n) if self.units is None else self.units
 
-    def unit_names(self, parameters: Sequence[Parameter]) -> list[str]:
-        """Units of the values, such as ``kg m`` or ``(0.0825 kg m)``.
+    def list_units(self, parameters: Sequence[Parameter]) -> list[str]:
+        """Return the units of the values, such as ``kg m`` or ``(0.0825 kg m)``.
 
         Args:
             parameters: The standard parameters.
@@ -109,14 +109,14 @@ class ReducedModel:
         }
         return {parameter: owner for parameter, owner in owners.items() if parameter != owner}
 
-    def restricted(self, affecting: BoolArray) -> ReducedModel:
-        """The same without parameters that change nothing, (n_standard,)."""
+    def drop_unaffecting(self, affecting: BoolArray) -> ReducedModel:
+        """Return the model without parameters that change no torque."""
         return replace(self, position=np.where(affecting, self.position, NOT_KEPT))
 
 
 @dataclass(frozen=True)
 class Columns:
-    """What is chosen among: standard parameters, or several with one value as one column."""
+    """The columns that a selection chooses among: standard parameters, or several that share one value."""
 
     names: tuple[str, ...]
     """Of the columns, (n,)."""
@@ -133,8 +133,8 @@ class Columns:
         """Standard parameters from values of the columns, ones and zeros, (n_standard, n)."""
         return (self.column[:, None] == np.arange(len(self.names))).astype(float)
 
-    def model(self, subset: IntArray, values: FloatArray) -> ReducedModel:
-        """The model that keeps a subset of the columns, (n_kept,), with their values."""
+    def make_model(self, subset: IntArray, values: FloatArray) -> ReducedModel:
+        """Return the model that keeps a subset of the columns, (n_kept,), with their values."""
         position = np.full(len(self.names), NOT_KEPT)
         position[subset] = np.arange(subset.size)
         return ReducedModel(tuple(self.names[k] for k in subset), values, position[self.column])
@@ -142,20 +142,20 @@ class Columns:
 
 @dataclass(frozen=True)
 class BySize:
-    """Arrays with one row for every size of subset."""
+    """A record of arrays with one row for every size of subset."""
 
     n: IntArray
     """Sizes of the subsets: 1, 2, ... unless columns are chosen in groups, (m,)."""
 
-    def row(self, n: int) -> int | None:
-        """Where the subset of size n stands in the arrays; None if there is none."""
+    def find_row(self, n: int) -> int | None:
+        """Return the row of the subset of size n, or None if there is none."""
         rows = np.flatnonzero(self.n == n)
         return int(rows[0]) if rows.size else None
 
 
 @dataclass(frozen=True)
 class Subsets(BySize):
-    """What one heuristic found: a subset of parameters for every n."""
+    """The subsets of parameters that one heuristic has found, one for every size."""
 
     heuristic: str
     subsets: tuple[IntArray, ...]
@@ -174,9 +174,9 @@ class Subsets(BySize):
     """Where the subset is beyond the rank and the fit is the minimum-norm one, (m,)."""
     seconds: float
 
-    def subset(self, n: int) -> IntArray:
-        """The columns of the subset of size n, (n,)."""
-        row = self.row(n)
+    def get_subset(self, n: int) -> IntArray:
+        """Return the columns of the subset of size n, (n,)."""
+        row = self.find_row(n)
         if row is None:
             raise KeyError(n)
         return self.subsets[row]
@@ -190,7 +190,7 @@ class Subsets(BySize):
 
 
 class ProofStatus(StrEnum):
-    """What is known of the best subset of a size."""
+    """A statement on the best subset of a size."""
 
     OPTIMAL = "optimal"
     BEST_FOUND = "best-found"
@@ -203,7 +203,7 @@ class ProofStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Proofs(BySize):
-    """How far the best subset of at most each size is proven; arrays have one row per size."""
+    """The proofs of the best subset of at most each size; arrays have one row per size."""
 
     units: tuple[IntArray, ...]
     """Columns that were chosen as one, the most wanted first."""
@@ -223,13 +223,13 @@ class Proofs(BySize):
     dealt: IntArray
     """Digest of the subtrees that a search was dealt as among several jobs, 0 where it was not, (m,)."""
 
-    def of_size(self, n: int) -> Proofs:
+    def get_size(self, n: int) -> Proofs:
         """Return the proof of one size alone.
 
         Raises:
             KeyError: There is none of that size.
         """
-        row = self.row(n)
+        row = self.find_row(n)
         if row is None:
             raise KeyError(n)
         arrays = (
@@ -258,7 +258,7 @@ class Proofs(BySize):
 
 @dataclass(frozen=True)
 class ProofItem:
-    """Proofs of some sizes that one job has found, and the data on which they hold."""
+    """An item of proofs: the sizes that one job has proven, and the data on which the proofs hold."""
 
     factor: FloatArray
     """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
@@ -290,11 +290,11 @@ class Reduction:
         """Whether more time could prove more."""
         return self.proofs is not None and ProofStatus.BEST_FOUND in self.proofs.status
 
-    def model(self, heuristic: str, row: int) -> ReducedModel:
-        """The model of a heuristic's subset, by the row it stands in; parameters as in the columns."""
+    def make_model(self, heuristic: str, row: int) -> ReducedModel:
+        """Return the model of a heuristic's subset in some row, with its parameters in the order of the columns."""
         found = self.heuristics[heuristic]
         order = np.argsort(found.subsets[row])
-        return self.columns.model(found.subsets[row][order], found.parameters[row][order])
+        return self.columns.make_model(found.subsets[row][order], found.parameters[row][order])
 
 
 @dataclass(frozen=True)
@@ -310,7 +310,7 @@ class ModelChoice:
         heuristic, _, number = text.partition(":")
         return cls(heuristic, int(number) if number.isdecimal() else NOT_KEPT)
 
-    def row(self, reduction: Reduction) -> int | None:
-        """Where the heuristic has it; None if there is no such model."""
+    def find_row(self, reduction: Reduction) -> int | None:
+        """Return the row of the model among its heuristic's subsets, or None if there is no such model."""
         found = reduction.heuristics.get(self.heuristic)
-        return None if found is None else found.row(self.n)
+        return None if found is None else found.find_row(self.n)

@@ -1,4 +1,4 @@
-"""What a run lends its stages, and what it knows of them."""
+"""Workers, callbacks and provenance that a run gives to its stages."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ Tell = Callable[[Progress], None]
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where an artifact came from."""
+    """The provenance of an artifact: config, versions, times and warnings."""
 
     robot: str
     config_sha256: str
@@ -52,7 +52,7 @@ class Provenance:
 
 @dataclass(frozen=True)
 class Run:
-    """What the caller lends a stage: worker processes and callbacks."""
+    """The worker processes and callbacks that the caller of a stage provides."""
 
     jobs: int = 1
     """Worker processes; 0 for doing all in this one."""

@@ -12,7 +12,7 @@ SETS = ("estimation", "validation", "test")
 
 @dataclass(frozen=True)
 class Recording:
-    """States, and perhaps measured torques, brought by the user; each (n_samples, n_dof)."""
+    """A user's recording of states, and perhaps of torques; each array (n_samples, n_dof)."""
 
     source: str
     time: FloatArray
@@ -24,7 +24,7 @@ class Recording:
 
 @dataclass(frozen=True)
 class Recordings:
-    """What the user brought for each set."""
+    """The user's recordings by set; None where there is none."""
 
     estimation: Recording | None
     validation: Recording | None
@@ -33,7 +33,7 @@ class Recordings:
 
 @dataclass(frozen=True)
 class Block:
-    """Consecutive samples of one trajectory."""
+    """A block of consecutive samples of one trajectory."""
 
     trajectory: int
     time: FloatArray
@@ -62,13 +62,12 @@ class SampleSet(Protocol):
     def recomputable(self) -> bool:
         """Whether each sample's state and the model give its rows of the observation matrix back."""
 
-    def blocks(self) -> Iterator[Block]:
-        """Yield the samples in order; every call starts anew."""
+    def iterate_blocks(self) -> Iterator[Block]:
+        """Yield the samples in order, block by block, from the first one at every call."""
 
-    def factors(self) -> FloatArray:
-        """Triangular factors of [W | tau] per trajectory and joint.
-
-        Shape (n_trajectories, n_dof, n_parameters + 1, n_parameters + 1).
+    def compute_factors(self) -> FloatArray:
+        """Return the triangular factors of [W | tau] by trajectory and joint, (n_trajectories, n_dof, n_parameters + 1,
+        n_parameters + 1).
         """
 
 

@@ -1,4 +1,4 @@
-"""Reduced models whose terms are reduced too."""
+"""Reduced models of which terms are removed too."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -29,7 +29,7 @@ class StoredProgram:
 
 @dataclass(frozen=True)
 class TermFront:
-    """Models of one function that no other one of as few operations beats; one row each."""
+    """The Pareto front of one function's models, by operations and error; one row per model."""
 
     operations: IntArray
     torque_error: SetErrors
@@ -94,7 +94,7 @@ class TermModel:
 
 @dataclass(frozen=True)
 class TermReduction:
-    """Functions whose terms were reduced within a budget."""
+    """The functions whose terms were removed within a budget."""
 
     FILE: ClassVar[str] = "terms.h5"
     torque_budget: float

@@ -1,4 +1,4 @@
-"""What a reduced model costs a controller."""
+"""Speed and tracking errors of a controller that uses a reduced model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from paramreduce_cli.records.arrays import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class Speed:
-    """How long an exported function takes on the machine at hand."""
+    """The time that an exported function takes on the machine at hand."""
 
     seconds: Mapping[str, float]
     """Of one evaluation by model, the full one first, s."""
@@ -20,7 +20,7 @@ class Speed:
 
 @dataclass(frozen=True)
 class Paths:
-    """Motions at the times of a controller, each resting at its end while others still move.
+    """A set of motions at the times of a controller; each rests at its end while others still move.
 
     States are (n_samples, n_paths, n_dof).
     """
@@ -36,14 +36,14 @@ class Paths:
 
 @dataclass(frozen=True)
 class Tracking:
-    """How well a controller followed paths with each of several models."""
+    """The tracking errors of a controller with each of several models."""
 
     paths: Paths
     errors: Mapping[str, FloatArray]
     """By the model of the controller: z_d - z, (n_samples, n_paths, n_dof), rad or m."""
 
-    def rms(self, model: str) -> FloatArray:
-        """Root mean square error over time and joints, (n_paths,), rad or m."""
+    def compute_rms(self, model: str) -> FloatArray:
+        """Return the root mean square error over time and joints, (n_paths,), rad or m."""
         squares = self.errors[model] ** 2
         own = [squares[:n, k].mean() for k, n in enumerate(self.paths.samples)]
         return np.sqrt(own)

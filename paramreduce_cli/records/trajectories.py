@@ -1,4 +1,4 @@
-"""Trajectories, and what they had to keep to."""
+"""Trajectories, with the limits and constraints that they keep."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,7 +12,7 @@ DISTANCES = frozenset({"distance", "distance-from-axis"})
 
 @dataclass(frozen=True)
 class Constraint:
-    """Bounds on a quantity of the mechanism along a trajectory.
+    """A bound on a quantity of the mechanism along a trajectory.
 
     What ``bodies`` and ``vectors`` mean depends on the kind:
 
@@ -40,7 +40,7 @@ class Constraint:
 
 @dataclass(frozen=True)
 class JointLimits:
-    """Limits of the independent coordinates, each (n_dof,), rad or m, per s, per s^2."""
+    """The limits of the independent coordinates, (n_dof,) each, rad or m, per s, per s^2."""
 
     lower: FloatArray
     upper: FloatArray
@@ -54,12 +54,12 @@ class JointLimits:
 
     @property
     def middle(self) -> FloatArray:
-        """Of the position ranges."""
+        """Middle of the position ranges, (n_dof,)."""
         return (self.upper + self.lower) / 2
 
     @property
     def reach(self) -> FloatArray:
-        """Half the width of the position ranges."""
+        """Half the width of the position ranges, (n_dof,)."""
         return (self.upper - self.lower) / 2
 
 
@@ -131,7 +131,7 @@ class Trajectories:
 
 @dataclass(frozen=True)
 class Coefficients:
-    """Fourier coefficients brought by the user, each (n_traj, n_dof, 1 + 2 harmonics)."""
+    """The user's Fourier coefficients, (n_trajectories, n_dof, 1 + 2 harmonics) for each set."""
 
     source: str
     period: float

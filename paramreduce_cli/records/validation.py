@@ -1,4 +1,4 @@
-"""What reduced models are worth, and which one was selected."""
+"""Errors and costs of reduced models, and the selected model."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
 
 @dataclass(frozen=True)
 class HeuristicValidation(BySize):
-    """Errors and costs of one heuristic's subsets; every array has one row per subset."""
+    """The errors and costs of one heuristic's subsets; every array has one row per subset."""
 
     torque_error: SetErrors
     acceleration_error: SetErrors
@@ -29,7 +29,7 @@ class HeuristicValidation(BySize):
     mass_matrix: MassMatrices
     operations: Operations
 
-    def error(self, quantity: str) -> SetErrors:
+    def get_errors(self, quantity: str) -> SetErrors:
         """Return the errors of ``torque`` or ``acceleration``."""
         return self.torque_error if quantity == "torque" else self.acceleration_error
 
@@ -63,7 +63,7 @@ class Leanest:
 
 
 class DataChange(StrEnum):
-    """What other data a selection is repeated on."""
+    """A change of the data on which a selection is repeated."""
 
     ALL = "all"
     """The data as they are."""
@@ -74,7 +74,7 @@ class DataChange(StrEnum):
 
 @dataclass(frozen=True)
 class DataVariant:
-    """Data that a selection is repeated on."""
+    """A variant of the data on which a selection is repeated."""
 
     change: DataChange
     number: int = 0
@@ -90,7 +90,7 @@ class DataVariant:
 
 @dataclass(frozen=True)
 class Stability:
-    """What the selection would be on other data; arrays have one row per variant of the data."""
+    """The selections on variants of the data; arrays have one row per variant."""
 
     variants: tuple[DataVariant, ...]
     chosen: BoolArray
@@ -103,27 +103,27 @@ class Stability:
 
 @dataclass(frozen=True)
 class CrossValidation(BySize):
-    """Errors of one heuristic's subsets on parts of the data that were left out."""
+    """The errors of one heuristic's subsets in cross-validation: on parts of the data that were left out of the fit."""
 
     torque_error: FloatArray
     """(n_folds, m)"""
 
     @property
     def mean(self) -> FloatArray:
-        """Over the folds, (m,)."""
+        """Mean error over the folds, (m,)."""
         mean: FloatArray = self.torque_error.mean(axis=0)
         return mean
 
     @property
     def standard_error(self) -> FloatArray:
-        """Of the mean, (m,)."""
+        """Standard error of the mean, (m,)."""
         folds = self.torque_error.shape[0]
         error: FloatArray = self.torque_error.std(axis=0, ddof=1) / np.sqrt(folds)
         return error
 
 
 class About(StrEnum):
-    """Models that a warning is about."""
+    """The models that a warning is about."""
 
     SELECTED = "selected"
     """The selected model."""
@@ -141,7 +141,7 @@ class ModelWarning:
 
 @dataclass(frozen=True)
 class Validation:
-    """What the reduced models are worth, and whether the selected one is accepted."""
+    """The errors and costs of all reduced models, the selected model, and whether it is accepted."""
 
     FILE: ClassVar[str] = "validation.h5"
     heuristics: Mapping[str, HeuristicValidation]

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import LAST, Columns, FloatArray, IntArray, preference_order
+from paramreduce_cli.records import LAST, Columns, FloatArray, IntArray, order_by_preference
 
 
 @dataclass(frozen=True)
@@ -55,7 +55,7 @@ def grouped_columns(
         for group in groups
         if not group.tied
     )
-    return GroupedColumns(Columns(tuple(labels), column), preference_order(wanted), together)
+    return GroupedColumns(Columns(tuple(labels), column), order_by_preference(wanted), together)
 
 
 def merged_factor(factor: FloatArray, columns: Columns) -> FloatArray:

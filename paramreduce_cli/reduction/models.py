@@ -79,7 +79,7 @@ def _of_columns(
 ) -> ReducedModel:
     """A model that keeps standard parameters, which stand for themselves unless more is said."""
     names = model.mechanism.parameter_names
-    chosen = Columns(names, np.arange(len(names))).model(kept, values)
+    chosen = Columns(names, np.arange(len(names))).make_model(kept, values)
     return replace(chosen, expressions=expressions or chosen.names)
 
 
@@ -99,4 +99,4 @@ def reduced_model(
     order = np.argsort(found.subsets[row])
     kept, beta = found.subsets[row][order], found.beta[row][order]
     expressions = approximate_expressions(columns.names, kept, beta, whole)
-    return replace(reduction.model(heuristic, row), expressions=tuple(expressions))
+    return replace(reduction.make_model(heuristic, row), expressions=tuple(expressions))

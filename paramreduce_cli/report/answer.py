@@ -74,7 +74,7 @@ def answer(data: ReportData, asked: str) -> Answer:
 
 def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:
     found = None if data.identification is None else data.identification.reduced
-    deviations = {} if found is None else found.deviations_of(model)
+    deviations = {} if found is None else found.find_deviations(model)
     expressions = model.expressions or model.names
     return tuple(
         ShownParameter(
@@ -119,7 +119,7 @@ def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
 
 def _as_identified(data: ReportData) -> bool:
     found = data.identification
-    return found is not None and bool(found.reduced.deviations_of(data.validation.selected.model))
+    return found is not None and bool(found.reduced.find_deviations(data.validation.selected.model))
 
 
 def _worst_joint(data: ReportData) -> str:
@@ -129,7 +129,7 @@ def _worst_joint(data: ReportData) -> str:
     name, rms = list(data.rms_torque.items())[-1]
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
-    row = result.row(selected.n)
+    row = result.find_row(selected.n)
     errors = result.joint_torque_error[name][row] * rms
     rated = data.model.nominal_torque_given
     sizes = data.model.nominal_torque if rated else np.maximum(rms, NO_TORQUE)

@@ -85,7 +85,7 @@ def _with_neighbours(fresh: BoolArray) -> BoolArray:
 
 
 def _values(data: ReportData, choice: ModelChoice) -> _Values:
-    row = choice.row(data.reduction)
+    row = choice.find_row(data.reduction)
     if row is None:
         return None
     found = data.reduction.heuristics[choice.heuristic]

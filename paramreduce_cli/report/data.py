@@ -132,7 +132,7 @@ def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
     """
     found: dict[str, list[FloatArray]] = {}
     for name, part in (("validation", samples.validation), ("estimation", samples.estimation)):
-        for block in part.blocks() if part is not None else ():
+        for block in part.iterate_blocks() if part is not None else ():
             if block.trajectory >= most:
                 break
             found.setdefault(f"{name} {block.trajectory + 1}", []).append(block.q)

@@ -85,7 +85,7 @@ def _(record: Validation) -> Iterator[Row]:
     for name, judged in record.heuristics.items():
         columns = {
             "n": judged.n,
-            **{f"{what}_error_{which}": judged.error(what)[which]
+            **{f"{what}_error_{which}": judged.get_errors(what)[which]
                for what in ("torque", "acceleration") for which in ("estimation", "validation")},
             **{f"mass_matrix_{key}": values for key, values in vars(judged.mass_matrix).items()},
             **{f"operations_{key}": values for key, values in vars(judged.operations).items()},
@@ -96,13 +96,13 @@ def _(record: Validation) -> Iterator[Row]:
                 | {key: column[k] for key, column in columns.items()}
                 | {f"{what}_error_test{end}": value
                    for what in ("torque", "acceleration")
-                   for end, value in _ends(judged.error(what).test[k])}
+                   for end, value in _ends(judged.get_errors(what).test[k])}
             )  # fmt: skip
 
 
 def _ends(errors: FloatArray) -> Iterator[tuple[str, float]]:
     """Median and worst error over the motions of the test set, with what their columns' names end with."""
-    found = ErrorRange.of(errors)
+    found = ErrorRange.summarise(errors)
     yield from (("", found.median), ("_worst", found.worst))
 
 

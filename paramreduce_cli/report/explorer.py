@@ -62,7 +62,7 @@ class _Models:
 
     def number(self, choice: ModelChoice) -> int:
         """Of a heuristic's model; -1 where there is none."""
-        row = choice.row(self._reduction)
+        row = choice.find_row(self._reduction)
         if row is None:
             return -1
         found = self._reduction.heuristics[choice.heuristic]
@@ -121,10 +121,10 @@ def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
 
 def _drawn(result: HeuristicValidation, what: str, which: str) -> FloatArray:
     """Errors on a set, (m,); medians of the motions of the test set."""
-    errors: FloatArray = result.error(what)[which]
+    errors: FloatArray = result.get_errors(what)[which]
     if which != "test":
         return errors
-    return np.array([ErrorRange.of(row).median for row in errors])
+    return np.array([ErrorRange.summarise(row).median for row in errors])
 
 
 def _counted(operations: FloatArray) -> list[int | None]:

@@ -172,7 +172,7 @@ def _selection(data: ReportData) -> Iterator[str]:
 def _result(data: ReportData) -> Iterator[str]:
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
-    row = result.row(selected.n)
+    row = result.find_row(selected.n)
     errors = [f"{format_percent(float(result.torque_error.estimation[row]))} on the estimation set"]
     if "validation" in data.rms_torque:
         errors.append(
@@ -181,7 +181,7 @@ def _result(data: ReportData) -> Iterator[str]:
     test = result.torque_error.test[row]
     if test.size:
         errors.append(
-            f"{format_percent_range(*ErrorRange.of(test))} on {test.size} motions that no search has looked at"
+            f"{format_percent_range(*ErrorRange.summarise(test))} on {test.size} motions that no search has looked at"
         )
     yield f"The model with {selected.n} parameters of {selected.heuristic} has a relative torque error of {', '.join(errors)}."
     if data.model is not None:

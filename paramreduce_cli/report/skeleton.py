@@ -110,7 +110,7 @@ def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
 def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
     """Centre of mass in the base frame, not a number for a body without mass, (3,), m."""
     whole = np.zeros(4)
-    for rigid in model.mechanism.moving_with(body):
+    for rigid in model.mechanism.list_rigid_parts(body):
         kinds = (Kind.MX, Kind.MY, Kind.MZ, Kind.M)
         whole += rigid.frame @ model.values[[rigid.columns[kind] for kind in kinds]]
     if not whole[3] > 0:

@@ -196,7 +196,7 @@ def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
     axes = drawn.subplots()
     for curve in curves(data):
         for which, line in (("estimation", "-"), ("validation", "--")):
-            values = curve.drawn(visible(curve.result.error(quantity)[which]))
+            values = curve.drawn(visible(curve.result.get_errors(quantity)[which]))
             axes.semilogy(
                 curve.result.n, values, line, color=curve.colour, markersize=3,
                 label=curve.label if line == "-" else None, marker=curve.marker if line == "-" else None,

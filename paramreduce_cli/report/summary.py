@@ -81,7 +81,7 @@ def _leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
             "operations": one.operations,
             "torque_error": {
                 **vars(one.torque_error),
-                "test": _range(ErrorRange.of(one.torque_error.test)),
+                "test": _range(ErrorRange.summarise(one.torque_error.test)),
             },
         }
         for name, one in found.items()
@@ -140,8 +140,8 @@ def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
 def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -> dict[str, Any]:
     heuristic, n = choice.heuristic, choice.n
     result = validation.heuristics[heuristic]
-    row = result.row(n)
-    subset = reduction.heuristics[heuristic].subset(n)
+    row = result.find_row(n)
+    subset = reduction.heuristics[heuristic].get_subset(n)
     return {
         "heuristic": heuristic,
         "parameters": [reduction.columns.names[k] for k in subset],
@@ -236,7 +236,7 @@ def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]
     def errors_on(part: str, what: str) -> Any:
         value = getattr(of, f"{what}_error")[part]
         own = value if row is None else value[row]
-        return _range(ErrorRange.of(own)) if part == "test" else own
+        return _range(ErrorRange.summarise(own)) if part == "test" else own
 
     return {
         f"{what}_error": {part: errors_on(part, what) for part in SETS}
@@ -285,7 +285,7 @@ def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     def entry(part: str, key: str, own: Any) -> Any:
         if part == "operations":
             return _whole(own)
-        return _range(ErrorRange.of(own)) if key == "test" else own
+        return _range(ErrorRange.summarise(own)) if key == "test" else own
 
     return [
         {"n": n}

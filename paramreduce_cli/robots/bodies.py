@@ -1,4 +1,4 @@
-"""What every way of describing bodies says of them."""
+"""Base class of the ways to describe bodies."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -10,65 +10,65 @@ from paramreduce_cli.records import Body, Length, Loops
 
 
 class BodiesDescription(Section, ABC):
-    """Bodies with their joints; an open tree without named lengths where a way says no more."""
+    """A description of bodies with their joints; by default an open tree without named lengths."""
 
     ROWS: ClassVar[str]
     """Key of the list that has a row for every body."""
 
     @abstractmethod
-    def body_names(self) -> list[str]:
-        """Names of all bodies, in order."""
+    def list_body_names(self) -> list[str]:
+        """Return the names of all bodies, in order."""
 
     @abstractmethod
-    def parents(self) -> list[str | None]:
-        """Names of the parents as they are given, None where the row above is meant."""
+    def list_parents(self) -> list[str | None]:
+        """Return the names of the parents as they are given; None where the body of the row above is meant."""
 
     @abstractmethod
-    def generalised_names(self) -> list[str]:
-        """Names of all coordinates, body by body."""
+    def list_coordinates(self) -> list[str]:
+        """Return the names of all generalised coordinates, body by body."""
 
     @abstractmethod
-    def rigid_bodies(self) -> tuple[Body, ...]:
-        """The bodies with their joints of one axis each."""
+    def build_bodies(self) -> tuple[Body, ...]:
+        """Return the bodies with their joints of one axis each."""
 
     @property
     @abstractmethod
     def frames(self) -> str:
-        """Where the table says that the frames of the bodies are, for people."""
+        """Sentence on the frames of the bodies, for the table of the geometry."""
 
     @abstractmethod
-    def table(self) -> tuple[tuple[str, ...], ...]:
-        """The geometry for people, a header row first."""
+    def build_table(self) -> tuple[tuple[str, ...], ...]:
+        """Return the geometry as a table for people, with a header row first."""
 
-    def inertial_names(self) -> list[str]:
-        """Names of the bodies that have inertia."""
-        return self.body_names()
+    def list_inertial_bodies(self) -> list[str]:
+        """Return the names of the bodies that have inertia."""
+        return self.list_body_names()
 
     @property
     def closed(self) -> bool:
         """Whether there are loops."""
         return False
 
-    def independent_names(self) -> list[str]:
-        """Names of the independent coordinates."""
-        return self.generalised_names()
+    def list_independent_coordinates(self) -> list[str]:
+        """Return the names of the independent coordinates."""
+        return self.list_coordinates()
 
-    def driven_names(self) -> list[str]:
-        """Names of the independent coordinates of joints, which drives act on as a rule."""
-        return self.independent_names()
+    def list_driven_coordinates(self) -> list[str]:
+        """Return the names of the independent coordinates that drives act on by default."""
+        return self.list_independent_coordinates()
 
-    def loops(self) -> Loops | None:
-        """How the loops are closed, not yet assembled; None for an open tree."""
+    def build_loops(self) -> Loops | None:
+        """Return the closures of the loops, not yet assembled, or None for an open tree."""
         return None
 
-    def lengths(self) -> tuple[Length, ...]:
-        """Named lengths of the geometry that are not zero."""
+    def list_lengths(self) -> tuple[Length, ...]:
+        """Return the named lengths of the geometry that are not zero."""
         return ()
 
-    def stretched(self, stretch: Callable[[float], float]) -> Self:
-        """The same structure with other lengths, as far as these have names."""
+    def stretch(self, stretch: Callable[[float], float]) -> Self:
+        """Return the same structure with other lengths, as far as lengths have names."""
         return self
 
-    def problems(self) -> Iterator[Problem]:
-        """What does not fit together, by the keys below this section."""
+    def find_problems(self) -> Iterator[Problem]:
+        """Yield contradictions in the description, by the keys below this section."""
         yield from ()

@@ -1,4 +1,4 @@
-"""A robot as its YAML describes it: the mechanism, its parameters, the size of its torques."""
+"""The robot that a YAML file describes: mechanism, parameters, and sizes of torques."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from paramreduce_cli.fields.section import (
 from paramreduce_cli.records import INERTIAL, BoolArray, FloatArray, Mechanism, Parameter
 from paramreduce_cli.robots.bodies import BodiesDescription
 from paramreduce_cli.robots.dh import DHDescription
-from paramreduce_cli.robots.drives import DriveSection, by_drive
+from paramreduce_cli.robots.drives import DriveSection, merge_drives
 from paramreduce_cli.robots.inertia import BodyParameters
 from paramreduce_cli.robots.payloads import PayloadSection
 from paramreduce_cli.robots.tree import TreeDescription
@@ -37,28 +37,29 @@ class Description(Section):
     """Acceleration of gravity in the base frame, m/s^2."""
 
     @model_validator(mode="after")
-    def _one_way_only(self) -> Description:
-        if len(self._given()) != 1:
+    def _check_one_way(self) -> Description:
+        if len(self._list_given()) != 1:
             raise ValueError("give dh or tree, one of them")
         return self
 
-    def _given(self) -> dict[str, BodiesDescription]:
+    def _list_given(self) -> dict[str, BodiesDescription]:
+        """Return the ways of description that the section uses, by name."""
         values = ((name, getattr(self, name)) for name in type(self).model_fields)
         return {name: value for name, value in values if isinstance(value, BodiesDescription)}
 
     @property
     def way(self) -> str:
         """Key of the way in which the bodies are described."""
-        return next(iter(self._given()))
+        return next(iter(self._list_given()))
 
     @property
     def bodies(self) -> BodiesDescription:
-        """The bodies, in the way they are described."""
-        return self._given()[self.way]
+        """Bodies, as the way of description gives them."""
+        return self._list_given()[self.way]
 
 
 class Robot(Section):
-    """What a robot is, whatever is done with it."""
+    """The part of a config that describes the robot, whatever is done with it."""
 
     robot: Annotated[str, Field(pattern=NAME)]
     """Name of the robot; results go to results/ROBOT."""
@@ -83,69 +84,71 @@ class Robot(Section):
     @property
     def n_dof(self) -> int:
         """Number of independent coordinates."""
-        return len(self.description.bodies.independent_names())
+        return len(self.description.bodies.list_independent_coordinates())
 
-    def mechanism(self) -> Mechanism:
-        """The mechanism as it is described; loops are not assembled yet."""
+    def build_mechanism(self) -> Mechanism:
+        """Return the mechanism as it is described; loops are not assembled yet."""
         bodies = self.description.bodies
-        coordinates, rigid = bodies.generalised_names(), bodies.rigid_bodies()
+        coordinates, rigid = bodies.list_coordinates(), bodies.build_bodies()
         index = {body.name: k for k, body in enumerate(rigid)}
         return Mechanism(
             robot=self.robot,
             bodies=rigid,
-            parameters=self.dynamic_parameters(),
+            parameters=self.list_parameters(),
             gravity=np.array(self.description.gravity, dtype=float),
-            lengths=bodies.lengths(),
-            table=bodies.table(),
-            loops=bodies.loops(),
-            payloads=tuple(s.payload(name, index) for name, s in self.payloads.items()),
-            drives=tuple(s.drive(name, coordinates) for name, s in self.each_drive().items()),
+            lengths=bodies.list_lengths(),
+            table=bodies.build_table(),
+            loops=bodies.build_loops(),
+            payloads=tuple(s.build_payload(name, index) for name, s in self.payloads.items()),
+            drives=tuple(
+                s.build_drive(name, coordinates) for name, s in self.list_drives().items()
+            ),
             frames=bodies.frames,
         )
 
-    def stretched(self, stretch: Callable[[float], float]) -> Robot:
-        """The same structure with other lengths, as far as these have names."""
+    def stretch(self, stretch: Callable[[float], float]) -> Robot:
+        """Return the robot with other lengths, as far as lengths have names."""
         old = self.description
-        changed = old.model_copy(update={old.way: old.bodies.stretched(stretch)})
+        changed = old.model_copy(update={old.way: old.bodies.stretch(stretch)})
         return self.model_copy(update={"description": changed})
 
-    def each_drive(self) -> dict[str, DriveSection]:
-        """All drives by name."""
-        return by_drive(self.drives, self.description.bodies.driven_names())
+    def list_drives(self) -> dict[str, DriveSection]:
+        """Return all drives by name."""
+        return merge_drives(self.drives, self.description.bodies.list_driven_coordinates())
 
-    def dynamic_parameters(self) -> tuple[Parameter, ...]:
-        """All parameters: body by body, then payload by payload, then drive by drive."""
+    def list_parameters(self) -> tuple[Parameter, ...]:
+        """Return all parameters: body by body, then payload by payload, then drive by drive."""
         bodies = self.description.bodies
-        rigid = [*bodies.inertial_names(), *self.payloads]
-        slides = {body.coordinate for body in bodies.rigid_bodies() if body.joint == "prismatic"}
+        rigid = [*bodies.list_inertial_bodies(), *self.payloads]
+        slides = {body.coordinate for body in bodies.build_bodies() if body.joint == "prismatic"}
         return (
             *(Parameter(kind, name) for name in rigid for kind in INERTIAL),
             *(
                 Parameter(kind, name, slides.issuperset(section.motion or [name]))
-                for name, section in self.each_drive().items()
-                for kind in section.effects()
+                for name, section in self.list_drives().items()
+                for kind in section.get_values()
             ),
         )
 
-    def body_parameters(self) -> dict[str, BodyParameters]:
-        """The chosen set by body, then payloads."""
+    def get_body_parameters(self) -> dict[str, BodyParameters]:
+        """Return the parameters of the chosen set by body, then those of payloads."""
         chosen = self.parameter_sets[self.parameters or next(iter(self.parameter_sets))]
-        names = self.description.bodies.inertial_names()
+        names = self.description.bodies.list_inertial_bodies()
         return {name: chosen.get(name, BodyParameters()) for name in names} | self.payloads
 
-    def parameter_values(self) -> FloatArray:
-        """Values of all parameters, (n_parameters,), SI."""
-        rigid = [body.values() for body in self.body_parameters().values()]
-        driven = [drive.effects() for drive in self.each_drive().values()]
+    def get_values(self) -> FloatArray:
+        """Return the values of all parameters, (n_parameters,), SI."""
+        rigid = [body.get_values() for body in self.get_body_parameters().values()]
+        driven = [drive.get_values() for drive in self.list_drives().values()]
         return np.array([value for values in rigid + driven for value in values.values()])
 
-    def measured(self) -> BoolArray:
-        """Which independent coordinates have torques that are measured, (n_dof,)."""
-        names = self.description.bodies.independent_names()
+    def find_measured(self) -> BoolArray:
+        """Return which independent coordinates have measured torques, (n_dof,)."""
+        names = self.description.bodies.list_independent_coordinates()
         return np.array([name not in self.unmeasured for name in names])
 
-    def given_nominal_torque(self) -> FloatArray | None:
-        """The characteristic torques where they are given, (n_dof,), N m or N."""
+    def get_nominal_torque(self) -> FloatArray | None:
+        """Return the nominal torques if the config gives them, (n_dof,), N m or N, else None."""
         if self.nominal_torque == "standard-deviation":
             return None
         return expand_per_joint(self.nominal_torque, self.n_dof)

@@ -10,7 +10,7 @@ from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Name, Section
 from paramreduce_cli.records import BASE, Body, FloatArray, Length
 from paramreduce_cli.robots.bodies import BodiesDescription
-from paramreduce_cli.robots.frames import rotation_x, rotation_z, translation, written_angle
+from paramreduce_cli.robots.frames import rotate_x, rotate_z, round_to_quarter_turns, translate
 
 
 class DHJoint(Section):
@@ -35,24 +35,28 @@ class DHJoint(Section):
     b: Number = 0.0
     """Length along the parent's z that places a branch [Khalil2002], m."""
 
-    def frames(self, convention: str) -> tuple[FloatArray, FloatArray]:
-        """From the parent to the joint at rest, and from the moved joint to the body, (4, 4) each."""
-        branch = rotation_z(self.gamma) @ translation(0.0, 0.0, self.b)
-        turn, shift = rotation_x(self.alpha), translation(self.a, 0.0, 0.0)
+    def compute_frames(self, convention: str) -> tuple[FloatArray, FloatArray]:
+        """Return the transforms from the parent to the joint at rest, and from the moved joint to the body, (4, 4)
+        each.
+        """
+        branch = rotate_z(self.gamma) @ translate(0.0, 0.0, self.b)
+        turn, shift = rotate_x(self.alpha), translate(self.a, 0.0, 0.0)
         if convention == "modified":
-            return branch @ turn @ shift @ self._still_part(), np.eye(4)
-        return branch @ self._still_part(), shift @ turn
+            return branch @ turn @ shift @ self._compute_constant_part(), np.eye(4)
+        return branch @ self._compute_constant_part(), shift @ turn
 
-    def _still_part(self) -> FloatArray:
-        """Of theta and d the one that the coordinate does not move; along z the two commute."""
+    def _compute_constant_part(self) -> FloatArray:
+        """Return the transform of d or theta, whichever the coordinate does not change; both act along z, so the order
+        does not matter.
+        """
         if self.type == "revolute":
-            return translation(0.0, 0.0, self.d)
-        return rotation_z(self.theta)
+            return translate(0.0, 0.0, self.d)
+        return rotate_z(self.theta)
 
     @property
     def offset(self) -> float:
         """Added to the coordinate, rad or m."""
-        return written_angle(self.theta) if self.type == "revolute" else self.d
+        return round_to_quarter_turns(self.theta) if self.type == "revolute" else self.d
 
 
 class DHDescription(BodiesDescription):
@@ -65,40 +69,40 @@ class DHDescription(BodiesDescription):
     joints: Annotated[list[DHJoint], Field(min_length=1)]
     """One row per body, parents above their children."""
 
-    def body_names(self) -> list[str]:
-        """Names of all bodies, in order."""
+    def list_body_names(self) -> list[str]:
+        """Return the names of all bodies, in order."""
         return [joint.name or str(k + 1) for k, joint in enumerate(self.joints)]
 
-    def parents(self) -> list[str | None]:
-        """Names of the parents as they are given, None where the row above is meant."""
+    def list_parents(self) -> list[str | None]:
+        """Return the names of the parents as they are given; None where the body of the row above is meant."""
         return [joint.parent for joint in self.joints]
 
-    def generalised_names(self) -> list[str]:
-        """Names of all coordinates."""
-        return [f"z_{name}" for name in self.body_names()]
+    def list_coordinates(self) -> list[str]:
+        """Return the names of all coordinates."""
+        return [f"z_{name}" for name in self.list_body_names()]
 
-    def rigid_bodies(self) -> tuple[Body, ...]:
-        """The bodies with their joints."""
-        names = self.body_names()
+    def build_bodies(self) -> tuple[Body, ...]:
+        """Return the bodies with their joints."""
+        names = self.list_body_names()
         index = {"base": BASE} | {name: k for k, name in enumerate(names)}
         bodies = []
         for k, (name, joint) in enumerate(zip(names, self.joints, strict=True)):
             parent = k - 1 if joint.parent is None else index[joint.parent]
-            frames = joint.frames(self.convention)
+            frames = joint.compute_frames(self.convention)
             bodies.append(Body(name, parent, joint.type, *frames, f"z_{name}", joint.offset))
         return tuple(bodies)
 
-    def lengths(self) -> tuple[Length, ...]:
-        """Lengths of the geometry that are not zero."""
+    def list_lengths(self) -> tuple[Length, ...]:
+        """Return the lengths of the geometry that are not zero."""
         lengths = (
             Length(key, name, float(getattr(joint, key)))
-            for name, joint in zip(self.body_names(), self.joints, strict=True)
+            for name, joint in zip(self.list_body_names(), self.joints, strict=True)
             for key in ("a", "d", "b")
         )
         return tuple(length for length in lengths if length.value != 0.0)
 
-    def stretched(self, stretch: Callable[[float], float]) -> Self:
-        """The same structure with other lengths, to see what follows from the structure alone."""
+    def stretch(self, stretch: Callable[[float], float]) -> Self:
+        """Return the same structure with other lengths, which shows what follows from the structure alone."""
         joints = [
             joint.model_copy(
                 update={"a": stretch(joint.a), "d": stretch(joint.d), "b": stretch(joint.b)}
@@ -109,37 +113,39 @@ class DHDescription(BodiesDescription):
 
     @property
     def frames(self) -> str:
-        """Where the table says that the frames of the bodies are, for people."""
+        """Sentence on the convention of the frames, for the table of the geometry."""
         axis = "of joint i" if self.convention == "modified" else "of the joint after body i"
         return (
             f"{self.convention} Denavit-Hartenberg, z of frame i along the axis {axis}; m and rad"
         )
 
-    def table(self) -> tuple[tuple[str, ...], ...]:
-        """The geometry for people, a header row first."""
+    def build_table(self) -> tuple[tuple[str, ...], ...]:
+        """Return the geometry as a table for people, with a header row first."""
         branching = any(joint.gamma or joint.b for joint in self.joints)
         header = ["body", "parent", "joint", *(["gamma", "b"] if branching else [])]
         table = [(*header, "a", "alpha", "d", "theta")]
         above = "base"
-        for name, joint in zip(self.body_names(), self.joints, strict=True):
-            angle, length = _angle_text(joint.theta), f"{joint.d:g}"
+        for name, joint in zip(self.list_body_names(), self.joints, strict=True):
+            angle, length = _format_angle(joint.theta), f"{joint.d:g}"
             if joint.type == "revolute":
-                angle = _with_coordinate(joint.theta, angle, name)
+                angle = _add_coordinate(joint.theta, angle, name)
             else:
-                length = _with_coordinate(joint.d, length, name)
+                length = _add_coordinate(joint.d, length, name)
             cells = [name, joint.parent or above, joint.type]
             if branching:
-                cells += [_angle_text(joint.gamma), f"{joint.b:g}"]
-            table.append((*cells, f"{joint.a:g}", _angle_text(joint.alpha), length, angle))
+                cells += [_format_angle(joint.gamma), f"{joint.b:g}"]
+            table.append((*cells, f"{joint.a:g}", _format_angle(joint.alpha), length, angle))
             above = name
         return tuple(table)
 
 
-def _with_coordinate(offset: float, text: str, name: str) -> str:
+def _add_coordinate(offset: float, text: str, name: str) -> str:
+    """Return the text of an offset plus the coordinate of a joint."""
     return f"z_{name}" if offset == 0 else f"z_{name} + {text}"
 
 
-def _angle_text(angle: float) -> str:
+def _format_angle(angle: float) -> str:
+    """Return an angle as text: a simple multiple of pi if it is one, else four digits."""
     for denominator in (1, 2, 3, 4, 6):
         multiple = angle * denominator / np.pi
         if abs(multiple - round(multiple)) < 1e-12:

@@ -1,4 +1,4 @@
-"""Rotors, friction and springs as a YAML gives them."""
+"""Drives in a YAML file: rotors, friction and springs."""
 
 from __future__ import annotations
 
@@ -20,7 +20,9 @@ Value = Number | Literal["unknown"]
 
 
 class DriveSection(Section):
-    """What acts along one coordinate, or along a sum of several, besides the inertia of bodies; each value a number, or `unknown` for a parameter that is yet to be found."""
+    """A drive along one coordinate, or along a weighted sum of several; each value is a number, or `unknown` for a
+    parameter that is still to be found.
+    """
 
     motion: Annotated[dict[str, Number], Field(min_length=1)] | None = None
     """Weights of the coordinates in the motion it acts along, such as {z_1: 100} for a motor behind a gear; if left out the coordinate it is named after."""
@@ -40,13 +42,14 @@ class DriveSection(Section):
     """Coulomb friction goes as tanh(speed / smoothing), rad/s (m/s); zero for the true sign."""
 
     @model_validator(mode="after")
-    def _acts(self) -> DriveSection:
-        if not self.effects() and "smoothing" not in self.model_fields_set:
+    def _check_not_empty(self) -> DriveSection:
+        """Raise ValueError if the section gives nothing."""
+        if not self.get_values() and "smoothing" not in self.model_fields_set:
             raise ValueError(f"says nothing; give one of {', '.join(kind.key for kind in DRIVE)}")
         return self
 
-    def effects(self) -> dict[Kind, float]:
-        """Values of its parameters by kind; zero for those yet to be found."""
+    def get_values(self) -> dict[Kind, float]:
+        """Return the values of the drive's parameters by kind; zero for unknown ones."""
         given = {kind: getattr(self, kind.key) for kind in DRIVE}
         return {
             kind: 0.0 if value == "unknown" else value
@@ -54,22 +57,22 @@ class DriveSection(Section):
             if value is not None
         }
 
-    def unknown(self) -> list[str]:
-        """Keys of the values that are yet to be found."""
+    def list_unknown(self) -> list[str]:
+        """Return the keys of the values that are still to be found."""
         return [kind.key for kind in DRIVE if getattr(self, kind.key) == "unknown"]
 
-    def over(self, other: DriveSection | None) -> DriveSection:
-        """The same, with what it leaves out taken from another one."""
+    def merge_defaults(self, other: DriveSection | None) -> DriveSection:
+        """Return the section with missing keys taken from another one."""
         if other is None:
             return self
         own = {key: getattr(self, key) for key in self.model_fields_set}
         return other.model_copy(update=own)
 
-    def drive(self, name: str, coordinates: Sequence[str]) -> Drive:
-        """The drive as a record.
+    def build_drive(self, name: str, coordinates: Sequence[str]) -> Drive:
+        """Return the drive as a record.
 
         Args:
-            name: Of the drive.
+            name: Name of the drive.
             coordinates: Names of the generalised coordinates.
         """
         weights = np.zeros(len(coordinates))
@@ -78,25 +81,27 @@ class DriveSection(Section):
         return Drive(name, weights, self.smoothing, self.rest)
 
 
-def by_drive(
+def merge_drives(
     sections: Mapping[str, DriveSection], driven: Iterable[str]
 ) -> dict[str, DriveSection]:
-    """The section of every drive, with what all driven coordinates have.
+    """Return the section of every drive, with the defaults for all driven coordinates merged in.
 
     Args:
-        sections: As given.
+        sections: Sections as given.
         driven: Names of the driven coordinates.
     """
     general = sections.get(ALL)
     found = dict.fromkeys(driven, general) if general is not None else {}
     for name, section in sections.items():
         if name != ALL:
-            found[name] = section.over(found.get(name))
-    return {name: section for name, section in found.items() if section.effects()}
+            found[name] = section.merge_defaults(found.get(name))
+    return {name: section for name, section in found.items() if section.get_values()}
 
 
-def problems(sections: Mapping[str, DriveSection], coordinates: Sequence[str]) -> Iterator[Problem]:
-    """What does not fit the mechanism, by the keys below ``drives``."""
+def find_drive_problems(
+    sections: Mapping[str, DriveSection], coordinates: Sequence[str]
+) -> Iterator[Problem]:
+    """Yield contradictions with the mechanism, by the keys below ``drives``."""
     for name, section in sections.items():
         if name == ALL and section.motion is not None:
             yield (ALL, "motion"), "is for one drive; give that a name of its own"

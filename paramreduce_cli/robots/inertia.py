@@ -1,4 +1,4 @@
-"""The standard parameters of a body as a YAML gives them."""
+"""Standard parameters of a body in a YAML file."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ _FIRST_MOMENTS = (Kind.MX, Kind.MY, Kind.MZ)
 _TENSOR = (Kind.IXX, Kind.IXY, Kind.IXZ, Kind.IYY, Kind.IYZ, Kind.IZZ)
 
 
-def _upper_triangle(value: Any) -> Any:
-    """The six elements of a tensor that may be written as a symmetric matrix."""
+def _take_upper_triangle(value: Any) -> Any:
+    """Return the six elements of a tensor that may be written as a symmetric matrix."""
     rows = isinstance(value, list) and len(value) == 3 and all(isinstance(r, list) for r in value)
     if not rows or any(len(row) != 3 for row in value):
         return value
@@ -26,7 +26,7 @@ def _upper_triangle(value: Any) -> Any:
 
 
 class BodyParameters(Section):
-    """Standard parameters of one body about its frame's origin; what is left out is zero."""
+    """The standard parameters of one body about the origin of its frame; missing ones are zero."""
 
     m: Number = 0.0
     """Mass, kg."""
@@ -51,31 +51,33 @@ class BodyParameters(Section):
     com: Triple | None = None
     """Centre of mass in the body's frame, m; instead of mx, my, mz. Without inertias: a point mass."""
     inertia_com: (
-        Annotated[list[Number], BeforeValidator(_upper_triangle), Field(min_length=6, max_length=6)]
+        Annotated[
+            list[Number], BeforeValidator(_take_upper_triangle), Field(min_length=6, max_length=6)
+        ]
         | None
     ) = None
     """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] or all three rows, about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
 
     @model_validator(mode="after")
-    def _one_way_only(self) -> BodyParameters:
-        if self.com is not None and self._gives(_FIRST_MOMENTS):
+    def _check_one_way(self) -> BodyParameters:
+        if self.com is not None and self._has_any(_FIRST_MOMENTS):
             raise ValueError("give com or mx, my, mz, not both")
         if self.inertia_com is not None and self.com is None:
             raise ValueError("inertia_com needs com")
-        if self.inertia_com is not None and self._gives(_TENSOR):
+        if self.inertia_com is not None and self._has_any(_TENSOR):
             raise ValueError("give inertia_com or Ixx ... Izz, not both")
         return self
 
-    def _gives(self, kinds: tuple[Kind, ...]) -> bool:
+    def _has_any(self, kinds: tuple[Kind, ...]) -> bool:
         return any(kind.symbol in self.model_fields_set for kind in kinds)
 
-    def values(self) -> dict[Kind, float]:
-        """Standard parameters by kind, kg, kg m, kg m^2."""
+    def get_values(self) -> dict[Kind, float]:
+        """Return the standard parameters by kind, kg, kg m, kg m^2."""
         values = {kind: float(getattr(self, kind.symbol)) for kind in INERTIAL}
         if self.com is not None:
             c = np.array(self.com)
             values |= zip(_FIRST_MOMENTS, (self.m * c).tolist(), strict=True)
-            if not self._gives(_TENSOR):
+            if not self._has_any(_TENSOR):
                 shift = self.m * (c @ c * np.eye(3) - np.outer(c, c))
                 tensor = np.array(self.inertia_com or [0.0] * 6) + shift[np.triu_indices(3)]
                 values |= zip(_TENSOR, tensor.tolist(), strict=True)
@@ -86,19 +88,20 @@ _ROUNDING = 1e-9
 """Share of the largest second moment that is no more than the digits of a file."""
 
 
-def physical(moments: FloatArray) -> bool:
-    """Whether second moments of mass, such as a pseudo-inertia matrix, are positive semidefinite.
+def is_positive_semidefinite(moments: FloatArray) -> bool:
+    """Return whether second moments of mass, such as a pseudo-inertia matrix, are positive semidefinite up to rounding.
 
     Args:
-        moments: Symmetric, (n, n).
+        moments: Symmetric matrix, (n, n).
     """
     eigenvalues = np.linalg.eigvalsh(moments)
     largest = max(abs(float(eigenvalues[-1])), float(np.finfo(float).tiny))
     return bool(eigenvalues[0] >= -_ROUNDING * largest)
 
 
-def pseudo_inertia(values: dict[Kind, float]) -> FloatArray:
-    """The pseudo-inertia matrix of a body, (4, 4) [Wensing2018]; some mass distribution has it if it is positive semidefinite.
+def compute_pseudo_inertia(values: dict[Kind, float]) -> FloatArray:
+    """Return the pseudo-inertia matrix of a body, (4, 4) [Wensing2018]; some mass distribution has it if and only if it
+    is positive semidefinite.
 
     Args:
         values: All ten standard parameters by kind.

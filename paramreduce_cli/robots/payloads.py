@@ -1,4 +1,4 @@
-"""What bodies carry, as a YAML gives it."""
+"""Payloads in a YAML file."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -6,7 +6,7 @@ from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.section import Name
 from paramreduce_cli.records import Payload
 from paramreduce_cli.robots.inertia import BodyParameters
-from paramreduce_cli.robots.placement import Placement, transform
+from paramreduce_cli.robots.placement import Placement, compose_steps
 
 
 class PayloadSection(BodyParameters):
@@ -17,18 +17,20 @@ class PayloadSection(BodyParameters):
     at: Placement = []
     """Its frame in that of the body: a point, or steps; the body's own frame if left out."""
 
-    def payload(self, name: str, bodies: Mapping[str, int]) -> Payload:
-        """The payload as a record.
+    def build_payload(self, name: str, bodies: Mapping[str, int]) -> Payload:
+        """Return the payload as a record.
 
         Args:
-            name: Of the payload.
+            name: Name of the payload.
             bodies: Indices of the bodies by name.
         """
-        return Payload(name, bodies[self.body], transform(self.at))
+        return Payload(name, bodies[self.body], compose_steps(self.at))
 
 
-def problems(sections: Mapping[str, PayloadSection], bodies: Sequence[str]) -> Iterator[Problem]:
-    """What does not fit the mechanism, by the keys below ``payloads``."""
+def find_payload_problems(
+    sections: Mapping[str, PayloadSection], bodies: Sequence[str]
+) -> Iterator[Problem]:
+    """Yield contradictions with the mechanism, by the keys below ``payloads``."""
     for name, section in sections.items():
         if name in bodies:
             yield (name,), f"{name!r} is taken by a body; give the payload a name of its own"

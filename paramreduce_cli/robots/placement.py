@@ -1,4 +1,4 @@
-"""Points, directions and placements of frames as a YAML gives them."""
+"""Points, directions and frames in a YAML file."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pydantic import AfterValidator, BeforeValidator, WithJsonSchema, model_vali
 from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import SCALAR, VECTOR, Section, Triple
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.robots.frames import rotation_x, rotation_y, rotation_z, translation
+from paramreduce_cli.robots.frames import rotate_x, rotate_y, rotate_z, translate
 
 
 class Step(Section):
@@ -27,13 +27,14 @@ class Step(Section):
     """Turn about z, rad."""
 
     @model_validator(mode="after")
-    def _one(self) -> Step:
+    def _check_one_step(self) -> Step:
         if len(self.model_fields_set) != 1:
             raise ValueError("a step is one of xyz, rx, ry, rz; write one step per item")
         return self
 
 
-def _as_steps(value: Any) -> Any:
+def _list_steps(value: Any) -> Any:
+    """Return a list of steps from a single step, a single point, or a list of steps."""
     if isinstance(value, dict):
         return [value]
     if isinstance(value, list) and value and not any(isinstance(v, dict | list) for v in value):
@@ -50,7 +51,7 @@ _STEP = {
 }
 Placement = Annotated[
     list[Step],
-    BeforeValidator(_as_steps),
+    BeforeValidator(_list_steps),
     WithJsonSchema({"anyOf": [VECTOR, _STEP, {"type": "array", "items": _STEP}]}),
 ]
 """A point [x, y, z], or steps that are taken one after the other."""
@@ -63,11 +64,12 @@ _NAMED_DIRECTIONS = {
 }
 
 
-def _as_direction(value: Any) -> Any:
+def _read_direction(value: Any) -> Any:
     return _NAMED_DIRECTIONS.get(value, value) if isinstance(value, str) else value
 
 
-def _not_zero(value: list[float]) -> list[float]:
+def _check_direction(value: list[float]) -> list[float]:
+    """Return a direction, or raise ValueError if its length is zero."""
     if not any(value):
         raise ValueError("a direction needs a length; write x, y, z, -x, ... or [x, y, z]")
     return value
@@ -75,18 +77,21 @@ def _not_zero(value: list[float]) -> list[float]:
 
 DIRECTION = {"anyOf": [{"enum": list(_NAMED_DIRECTIONS)}, VECTOR]}
 Direction = Annotated[
-    Triple, BeforeValidator(_as_direction), AfterValidator(_not_zero), WithJsonSchema(DIRECTION)
+    Triple,
+    BeforeValidator(_read_direction),
+    AfterValidator(_check_direction),
+    WithJsonSchema(DIRECTION),
 ]
 """``x``, ``y``, ``z``, ``-x``, ... or [x, y, z] of any length."""
 
 
-def transform(steps: Sequence[Step]) -> FloatArray:
-    """Steps one after the other as a homogeneous transform, (4, 4), m."""
-    turns = {"rx": rotation_x, "ry": rotation_y, "rz": rotation_z}
+def compose_steps(steps: Sequence[Step]) -> FloatArray:
+    """Return the homogeneous transform, (4, 4), m, of steps that follow each other."""
+    turns = {"rx": rotate_x, "ry": rotate_y, "rz": rotate_z}
     result = np.eye(4)
     for step in steps:
         if step.xyz is not None:
-            result = result @ translation(*step.xyz)
+            result = result @ translate(*step.xyz)
         for key, turn in turns.items():
             angle = getattr(step, key)
             if angle is not None:

@@ -25,8 +25,8 @@ from paramreduce_cli.records import (
     Loops,
 )
 from paramreduce_cli.robots.bodies import BodiesDescription
-from paramreduce_cli.robots.frames import rotation_vector
-from paramreduce_cli.robots.placement import DIRECTION, Direction, Placement, transform
+from paramreduce_cli.robots.frames import to_axis_angle
+from paramreduce_cli.robots.placement import DIRECTION, Direction, Placement, compose_steps
 
 JointMotion = tuple[Literal["revolute", "prismatic"], FloatArray]
 """A kind of motion and the direction of its axis, (3,)."""
@@ -36,7 +36,8 @@ _NO_TURN = 1e-12
 """What is printed as zero, rad or m."""
 
 
-def _as_directions(value: Any) -> Any:
+def _list_directions(value: Any) -> Any:
+    """Return a list of directions from a single direction or a list."""
     plain = isinstance(value, list) and value and isinstance(value[0], int | float)
     return [value] if plain or not isinstance(value, list) else value
 
@@ -48,8 +49,8 @@ _ONE_OR_MORE_DIRECTIONS = WithJsonSchema(
 JointKind = Literal["revolute", "prismatic", "universal", "spherical", "free"]
 
 
-def joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[JointMotion]:
-    """The motions of a joint, one after the other.
+def list_joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[JointMotion]:
+    """Return the motions of a joint, one after the other.
 
     Args:
         kind: ``revolute``, ``prismatic``, ``universal``, ``spherical`` or ``free``.
@@ -61,7 +62,7 @@ def joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[JointMotio
         return [("revolute", axis) for axis in (_X, _Y, _Z)]
     if kind == "free":
         slides: list[JointMotion] = [("prismatic", axis) for axis in (_X, _Y, _Z)]
-        return slides + joint_motions("spherical", [])
+        return slides + list_joint_motions("spherical", [])
     if kind == "universal":
         first, second = axes or (_X, _Y)
         return [("revolute", np.asarray(first)), ("revolute", np.asarray(second))]
@@ -69,15 +70,15 @@ def joint_motions(kind: str, axes: Sequence[Sequence[float]]) -> list[JointMotio
     return [("revolute" if kind == "revolute" else "prismatic", np.asarray(axis, dtype=float))]
 
 
-def rotation_to(axis: FloatArray) -> FloatArray:
-    """A rotation that takes z to a direction, (3, 3); without rounding for the six axes."""
+def rotate_z_to(axis: FloatArray) -> FloatArray:
+    """Return a rotation that takes z to a direction, (3, 3), exact for the six directions of the axes."""
     unit = np.asarray(axis, dtype=float) / np.linalg.norm(axis)
     for k, direction in enumerate(np.eye(3)):
         if np.array_equal(np.abs(unit), direction):
             cyclic = np.roll(np.eye(3), k + 1, axis=0)
             return cyclic if unit[k] > 0 else cyclic @ np.diag([1.0, -1.0, -1.0])
     if unit[2] < 0:
-        return rotation_to(-unit) @ np.diag([1.0, -1.0, -1.0])
+        return rotate_z_to(-unit) @ np.diag([1.0, -1.0, -1.0])
     x, y, c = unit
     skew = np.array([[0, 0, x], [0, 0, y], [-x, -y, 0]])  # of z cross the axis
     result: FloatArray = np.eye(3) + skew + skew @ skew / (1 + c)
@@ -93,7 +94,9 @@ class TreeBody(Section):
     """Body it is mounted on."""
     joint: JointKind = "revolute"
     """`universal` turns about two axes, `spherical` about x, y and z, `free` slides along x, y and z, then turns about them."""
-    axes: Annotated[list[Direction], BeforeValidator(_as_directions), _ONE_OR_MORE_DIRECTIONS] = []
+    axes: Annotated[
+        list[Direction], BeforeValidator(_list_directions), _ONE_OR_MORE_DIRECTIONS
+    ] = []
     """Axes of the joint in its frame; if left out z, or x and y for a universal joint."""
     at: Placement = []
     """The joint's frame in the parent's: a point, or steps; the body's frame is there at zero coordinates."""
@@ -103,7 +106,8 @@ class TreeBody(Section):
     """Whether the body has no mass and so no parameters."""
 
     @model_validator(mode="after")
-    def _counts(self) -> TreeBody:
+    def _check_counts(self) -> TreeBody:
+        """Raise ValueError if the joint has another number of axes or coordinates than its kind."""
         axes, coordinates = JOINT_AXES[self.joint], JOINT_COORDINATES[self.joint]
         if self.axes and len(self.axes) != axes:
             raise ValueError(f"a {self.joint} joint takes {axes} axes, not {len(self.axes)}")
@@ -113,24 +117,24 @@ class TreeBody(Section):
             )
         return self
 
-    def motions(self) -> list[JointMotion]:
-        """The motions of the joint, one after the other."""
-        return joint_motions(self.joint, self.axes)
+    def list_motions(self) -> list[JointMotion]:
+        """Return the motions of the joint, one after the other."""
+        return list_joint_motions(self.joint, self.axes)
 
-    def chain(self, parent: int, start: int) -> list[Body]:
-        """The bodies of one joint: frames between its axes, the named one at its end.
+    def build_chain(self, parent: int, start: int) -> list[Body]:
+        """Return the bodies of one joint: massless bodies between its axes, and the named body at the end.
 
         Args:
             parent: Index of the body it is mounted on.
             start: Index of the first of them.
         """
-        motions, coordinates = self.motions(), self.coordinate_names()
+        motions, coordinates = self.list_motions(), self.list_coordinates()
         chain = []
-        placement = transform(self.at)
+        placement = compose_steps(self.at)
         for k, (kind, axis) in enumerate(motions):
             last = k == len(motions) - 1
             turn = np.eye(4)
-            turn[:3, :3] = rotation_to(axis)
+            turn[:3, :3] = rotate_z_to(axis)
             chain.append(
                 Body(
                     name=self.name if last else f"{self.name}:{k + 1}",
@@ -145,20 +149,20 @@ class TreeBody(Section):
             placement = np.eye(4)
         return chain
 
-    def row(self) -> tuple[str, ...]:
-        """Of the table for people."""
-        axes = [axis for _, axis in self.motions()]
+    def build_row(self) -> tuple[str, ...]:
+        """Return the body's row in the table of the geometry."""
+        axes = [axis for _, axis in self.list_motions()]
         return (
             self.name + (" (massless)" if self.massless else ""),
             self.parent,
             self.joint,
-            "; ".join(_numbers(axis) for axis in axes) if len(axes) < 3 else "x y z",
-            _placement_text(transform(self.at)),
-            " ".join(self.coordinate_names()),
+            "; ".join(_format_numbers(axis) for axis in axes) if len(axes) < 3 else "x y z",
+            _format_placement(compose_steps(self.at)),
+            " ".join(self.list_coordinates()),
         )
 
-    def coordinate_names(self) -> list[str]:
-        """Names of the joint's coordinates."""
+    def list_coordinates(self) -> list[str]:
+        """Return the names of the joint's coordinates."""
         count = JOINT_COORDINATES[self.joint]
         if self.coordinates:
             return list(self.coordinates)
@@ -168,7 +172,7 @@ class TreeBody(Section):
 
 
 class ClosureSection(Section):
-    """What holds two bodies of the tree together, so that a loop is closed."""
+    """A closure that holds two bodies of the tree together, so that a loop is closed."""
 
     name: Name | None = None
     """Name for messages; `loop_1`, `loop_2`, ... if left out."""
@@ -186,7 +190,8 @@ class ClosureSection(Section):
     """Of a coupling, rad or m; zero if left out."""
 
     @model_validator(mode="after")
-    def _belongs(self) -> ClosureSection:
+    def _check_keys(self) -> ClosureSection:
+        """Raise ValueError if keys are given that do not belong to this type of closure."""
         coupling = self.type == "coupling"
         if (self.type == "distance") != (self.length is not None):
             raise ValueError("length belongs to a closure of type distance, and only there")
@@ -196,19 +201,19 @@ class ClosureSection(Section):
             raise ValueError("at says where on each of the two bodies; a coupling has none")
         return self
 
-    def closure(self, number: int, index: Mapping[str, int]) -> Closure:
-        """The closure as a record.
+    def build_closure(self, number: int, index: Mapping[str, int]) -> Closure:
+        """Return the closure as a record.
 
         Args:
-            number: Of the closure, for its name if it has none.
-            index: Of the bodies and the base, by name.
+            number: Number of the closure, which names it if it has no name.
+            index: Indices of the bodies and the base by name.
         """
         (one, other), (first, second) = self.bodies, self.at or ([], [])
         return Closure(
             self.name or f"loop_{number}",
             self.type,
             (index[one], index[other]),
-            (transform(first), transform(second)),
+            (compose_steps(first), compose_steps(second)),
             self.length or 0.0,
             self.ratio or 1.0,
             self.offset or 0.0,
@@ -216,7 +221,7 @@ class ClosureSection(Section):
 
 
 class TreeDescription(BodiesDescription):
-    """Bodies and joints in frames of one's own choice, with closures that make loops of them."""
+    """A description of bodies and joints in frames of the user's choice, with closures that make loops."""
 
     ROWS: ClassVar[str] = "bodies"
 
@@ -230,74 +235,74 @@ class TreeDescription(BodiesDescription):
     """Values of coordinates near a closed assembly, rad or m; zero for those left out. Independent ones keep them."""
 
     @model_validator(mode="after")
-    def _with_closures(self) -> TreeDescription:
+    def _check_closures(self) -> TreeDescription:
         if bool(self.closures) != bool(self.independent):
             raise ValueError("closures and independent belong together; give both or neither")
         if self.guess and not self.closures:
             raise ValueError("a guess is for closing loops, but there are no closures")
         return self
 
-    def body_names(self) -> list[str]:
-        """Names of all bodies, in order."""
+    def list_body_names(self) -> list[str]:
+        """Return the names of all bodies, in order."""
         return [body.name for body in self.bodies]
 
-    def inertial_names(self) -> list[str]:
-        """Names of the bodies that have inertia."""
+    def list_inertial_bodies(self) -> list[str]:
+        """Return the names of the bodies that have inertia."""
         return [body.name for body in self.bodies if not body.massless]
 
-    def parents(self) -> list[str | None]:
-        """Names of the parents as they are given."""
+    def list_parents(self) -> list[str | None]:
+        """Return the names of the parents as they are given."""
         return [body.parent for body in self.bodies]
 
-    def generalised_names(self) -> list[str]:
-        """Names of all coordinates, body by body."""
-        return [name for body in self.bodies for name in body.coordinate_names()]
+    def list_coordinates(self) -> list[str]:
+        """Return the names of all coordinates, body by body."""
+        return [name for body in self.bodies for name in body.list_coordinates()]
 
     @property
     def closed(self) -> bool:
         """Whether there are loops."""
         return bool(self.closures)
 
-    def independent_names(self) -> list[str]:
-        """Names of the independent coordinates."""
-        return list(self.independent) or self.generalised_names()
+    def list_independent_coordinates(self) -> list[str]:
+        """Return the names of the independent coordinates."""
+        return list(self.independent) or self.list_coordinates()
 
-    def driven_names(self) -> list[str]:
-        """Names of the independent coordinates but those of bodies that float freely."""
+    def list_driven_coordinates(self) -> list[str]:
+        """Return the names of the independent coordinates, without those of bodies that float freely."""
         floating = [
-            n for body in self.bodies if body.joint == "free" for n in body.coordinate_names()
+            n for body in self.bodies if body.joint == "free" for n in body.list_coordinates()
         ]
-        return [name for name in self.independent_names() if name not in floating]
+        return [name for name in self.list_independent_coordinates() if name not in floating]
 
-    def rigid_bodies(self) -> tuple[Body, ...]:
-        """The bodies with their joints of one axis each."""
+    def build_bodies(self) -> tuple[Body, ...]:
+        """Return the bodies with their joints of one axis each."""
         bodies: list[Body] = []
         index = {"base": BASE}
         for row in self.bodies:
-            bodies += row.chain(index[row.parent], len(bodies))
+            bodies += row.build_chain(index[row.parent], len(bodies))
             index[row.name] = len(bodies) - 1
         return tuple(bodies)
 
-    def loops(self) -> Loops | None:
-        """How the loops are closed; not yet assembled. None for an open tree."""
+    def build_loops(self) -> Loops | None:
+        """Return the closures of the loops, not yet assembled, or None for an open tree."""
         if not self.closures:
             return None
-        index = {"base": BASE} | {body.name: k for k, body in enumerate(self.rigid_bodies())}
-        names = self.generalised_names()
+        index = {"base": BASE} | {body.name: k for k, body in enumerate(self.build_bodies())}
+        names = self.list_coordinates()
         return Loops(
-            tuple(closure.closure(k + 1, index) for k, closure in enumerate(self.closures)),
+            tuple(closure.build_closure(k + 1, index) for k, closure in enumerate(self.closures)),
             tuple(names.index(name) for name in self.independent),
             np.array([float(self.guess.get(name, 0.0)) for name in names]),
         )
 
-    def problems(self) -> Iterator[Problem]:
-        """What does not fit together, by the keys below this section."""
-        bodies, coordinates = ["base", *self.body_names()], self.generalised_names()
+    def find_problems(self) -> Iterator[Problem]:
+        """Yield contradictions in the description, by the keys below this section."""
+        bodies, coordinates = ["base", *self.list_body_names()], self.list_coordinates()
         for k, body in enumerate(self.bodies):
-            for name in body.coordinate_names():
+            for name in body.list_coordinates():
                 if coordinates.count(name) > 1:
                     yield ("bodies", k), f"coordinate {name!r} belongs to several joints"
-        several = {body.name for body in self.bodies if len(body.coordinate_names()) > 1}
+        several = {body.name for body in self.bodies if len(body.list_coordinates()) > 1}
         for k, closure in enumerate(self.closures):
             for j, name in enumerate(closure.bodies):
                 if name not in bodies:
@@ -320,28 +325,28 @@ class TreeDescription(BodiesDescription):
 
     @property
     def frames(self) -> str:
-        """Where the table says that the frames of the bodies are, for people."""
+        """Sentence on the placement of the frames, for the table of the geometry."""
         return "each placed in the frame of the body it is on where all coordinates are zero; m and rad"
 
-    def table(self) -> tuple[tuple[str, ...], ...]:
-        """The geometry for people, a header row first."""
+    def build_table(self) -> tuple[tuple[str, ...], ...]:
+        """Return the geometry as a table for people, with a header row first."""
         table: list[tuple[str, ...]] = [("body", "on", "joint", "axes", "at", "coordinates")]
-        table += [body.row() for body in self.bodies]
+        table += [body.build_row() for body in self.bodies]
         for k, section in enumerate(self.closures):
             number = section.length or section.ratio
             kind = f"{section.type} {number:g}" if number else section.type
-            places = "; ".join(_placement_text(transform(frame)) for frame in section.at)
+            places = "; ".join(_format_placement(compose_steps(frame)) for frame in section.at)
             name, bodies = section.name or f"loop_{k + 1}", " - ".join(section.bodies)
             table.append((name, bodies, f"closure: {kind}", "", places, ""))
         return tuple(table)
 
 
-def _placement_text(placement: FloatArray) -> str:
-    """Where a frame is, and about which axis and by how much it is turned."""
-    text = _numbers(placement[:3, 3])
-    angle, axis = rotation_vector(placement[:3, :3])
-    return text if angle < _NO_TURN else f"{text}, turned {angle:.4g} about {_numbers(axis)}"
+def _format_placement(placement: FloatArray) -> str:
+    """Return position, rotation axis and angle of a frame as text."""
+    text = _format_numbers(placement[:3, 3])
+    angle, axis = to_axis_angle(placement[:3, :3])
+    return text if angle < _NO_TURN else f"{text}, turned {angle:.4g} about {_format_numbers(axis)}"
 
 
-def _numbers(values: Sequence[float] | FloatArray) -> str:
+def _format_numbers(values: Sequence[float] | FloatArray) -> str:
     return " ".join(f"{value:.4g}" for value in np.where(np.abs(values) < _NO_TURN, 0.0, values))

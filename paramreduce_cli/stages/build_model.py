@@ -46,14 +46,14 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     The ranks are decided on seeded random states. An interruption leaves nothing: it takes less than
     a minute for thirty joints.
     """
-    mechanism = assembled(robot.mechanism())
+    mechanism = assembled(robot.build_mechanism())
     rng = np.random.default_rng(_SEED)
     states = random_states(mechanism, _STATES, rng)
     K = Dynamics(mechanism).regressor(*states)
-    measured = robot.measured()
+    measured = robot.find_measured()
     W = K[:, measured].reshape(-1, K.shape[2])
-    values = robot.parameter_values()
-    given = robot.given_nominal_torque()
+    values = robot.get_values()
+    given = robot.get_nominal_torque()
     nominal = np.std(K @ values, axis=0) if given is None else given
     nominal = np.where(measured, nominal, np.inf)
     if not np.all(nominal > 0):
@@ -94,7 +94,7 @@ def _say_other_modes(
     for mode in find_assembly_modes(mechanism):
         try:
             states = random_states(mode, _STATES // 2, np.random.default_rng(_SEED))
-            K = Dynamics(mode).regressor(*states)[:, robot.measured()]
+            K = Dynamics(mode).regressor(*states)[:, robot.find_measured()]
             affects = affecting_parameters(mode, K)
             W = K.reshape(-1, K.shape[2])
             found = base_parameters(W, _preference(model, mode), model.rank_tolerance, affects)
@@ -138,8 +138,8 @@ def _expressions(
     """
     betas, geometries = [base.beta], [mechanism]
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
-        changed = robot.stretched(lambda length: length * rng.uniform(0.8, 1.25)).mechanism()
-        K = Dynamics(changed, once=True).regressor(*states)[:, robot.measured()]
+        changed = robot.stretch(lambda length: length * rng.uniform(0.8, 1.25)).build_mechanism()
+        K = Dynamics(changed, once=True).regressor(*states)[:, robot.find_measured()]
         betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns, affects))
         geometries.append(changed)
     lengths = [{length.name: length.value for length in entry.lengths} for entry in geometries]

@@ -50,7 +50,7 @@ def identify(
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set.", command="sample")
     training, held_out = samples.estimation, samples.validation
-    factors, n_samples = training.factors(), training.n_samples
+    factors, n_samples = training.compute_factors(), training.n_samples
     scale = np.where(np.isfinite(model.nominal_torque), _sizes(training), np.inf)
     deviation = np.where(np.isfinite(scale), 1.0, np.inf)
     if identification.estimator != "ordinary":
@@ -101,15 +101,18 @@ def _estimate(
     training, held_out = samples.estimation, samples.validation
     assert held_out is not None
     columns = _columns(chosen)
-    factors = _merged(training.factors(), columns)
+    factors = _merged(training.compute_factors(), columns)
     values = least_squares(combined_factor(factors, deviation))
     if wanted.estimator == "robust":
         values, deviation = robust_fit(
-            lambda: (((b.W @ columns).reshape(*b.tau.shape, -1), b.tau) for b in training.blocks()),
+            lambda: (
+                ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau)
+                for b in training.iterate_blocks()
+            ),
             values,
             deviation,
         )
-    rows = rows_of(training.blocks(), columns, training.n_samples)
+    rows = rows_of(training.iterate_blocks(), columns, training.n_samples)
     fitted = LinearFit(rows, values, deviation)
     own, other = (_errors(part, columns @ values, deviation) for part in (training, held_out))
     estimate = Estimate(
@@ -132,7 +135,7 @@ def _errors(
     """Error of all joints together, and root mean squares joint by joint."""
     measured = np.isfinite(deviation)
     left, whole = np.zeros(measured.size), np.zeros(measured.size)
-    for block in part.blocks():
+    for block in part.iterate_blocks():
         residual = block.tau - (block.W @ standard).reshape(block.tau.shape)
         left += np.sum(residual**2, axis=0)
         whole += np.sum(block.tau**2, axis=0)
@@ -154,7 +157,7 @@ def _folds(factors: FloatArray, deviation: FloatArray) -> FloatArray:
 
 def _sizes(part: SampleSet) -> FloatArray:
     """Root mean squares of the torques, (n_dof,)."""
-    total = np.sum([np.sum(block.tau**2, axis=0) for block in part.blocks()], axis=0)
+    total = np.sum([np.sum(block.tau**2, axis=0) for block in part.iterate_blocks()], axis=0)
     return np.where(total > 0, np.sqrt(total / part.n_samples), 1.0)
 
 
@@ -165,7 +168,7 @@ def _consistency(
         return None
     held_out = samples.validation
     assert held_out is not None
-    factor = combined_factor(samples.estimation.factors(), deviation)
+    factor = combined_factor(samples.estimation.compute_factors(), deviation)
     known = physics.physical_parameters(model.mechanism, model.values, factor)
     try:
         standard = physics.consistent(factor, known, wanted.consistency)
@@ -199,7 +202,7 @@ def _consistency(
 def _shown(part: SampleSet) -> list[Block]:
     """The first samples, for figures."""
     found: list[Block] = []
-    for block in part.blocks():
+    for block in part.iterate_blocks():
         if block.trajectory != 0 or sum(b.time.size for b in found) >= _MOST_SHOWN:
             break
         found.append(block)

@@ -74,7 +74,7 @@ def reduce(
     weights = _weights(reduction, samples)
     grouped = selection_columns(reduction, samples)
     columns = grouped.columns
-    factor = merged_factor(combined_factor(samples.estimation.factors(), weights), columns)
+    factor = merged_factor(combined_factor(samples.estimation.compute_factors(), weights), columns)
     problem = selection_problem(factor, model, grouped, samples.values)
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
@@ -149,13 +149,13 @@ def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> 
 def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
     weights = samples.nominal_torque
     if wanted.weighting == "none":
-        n_dof = next(iter(samples.estimation.blocks())).tau.shape[1]
+        n_dof = next(iter(samples.estimation.iterate_blocks())).tau.shape[1]
         return np.where(np.isinf(weights), np.inf, 1.0) if weights is not None else np.ones(n_dof)
     if weights is None:
-        weights = standard_deviation(block.tau for block in samples.estimation.blocks())
+        weights = standard_deviation(block.tau for block in samples.estimation.iterate_blocks())
     if wanted.weighting == "noise":
         found = samples.estimation
-        weights = joint_noise(found.factors(), weights, found.n_samples)
+        weights = joint_noise(found.compute_factors(), weights, found.n_samples)
     small, large = SIZES
     good = (weights > small) & (weights < large) | np.isinf(weights)
     if not good.all():
@@ -206,7 +206,7 @@ def _criterion_inputs(
         if nominal is None:
             raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
         every = max(1, -(-samples.estimation.n_samples // most))
-        blocks = list(thinned_blocks(samples.estimation.blocks(), every))
+        blocks = list(thinned_blocks(samples.estimation.iterate_blocks(), every))
         q, dq, ddz, tau = (
             np.concatenate([getattr(block, key) for block in blocks])
             for key in ("q", "dq", "ddz", "tau")
@@ -301,11 +301,11 @@ def _with_norms(
 ) -> dict[str, Subsets]:
     """One pass over the samples for the 1- and infinity norms of all models together."""
     models = [
-        columns.model(subset, f.parameters).standard
+        columns.make_model(subset, f.parameters).standard
         for entry in found.values()
         for subset, f in zip(entry.subsets, entry.fits, strict=True)
     ]
-    errors = torque_errors(samples.estimation.blocks(), np.column_stack(models), weights)
+    errors = torque_errors(samples.estimation.iterate_blocks(), np.column_stack(models), weights)
     heuristics = {}
     start = 0
     for name, entry in found.items():

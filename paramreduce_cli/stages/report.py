@@ -77,7 +77,7 @@ def report(
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
-    motion = first_motion(shown.blocks(), selected.model)
+    motion = first_motion(shown.iterate_blocks(), selected.model)
     running = _running(model, selected, Exported.IDM)
     direct = _running(model, selected, Exported.DDM) if running else {}
     states = {} if model is None else _states(model, motion)
@@ -200,7 +200,7 @@ def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
     for name in SETS:
         one = getattr(samples, name)
         if one is not None:
-            squares = (one.factors()[..., -1] ** 2).sum(axis=(0, 2)) / nominal**2
+            squares = (one.compute_factors()[..., -1] ** 2).sum(axis=(0, 2)) / nominal**2
             least = np.maximum(squares, np.finfo(float).tiny)
             measured = np.where(np.isfinite(nominal), nominal, 0.0)
             found[name] = measured * np.sqrt(least / one.n_samples)

@@ -396,7 +396,7 @@ def _torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
     states: Iterator[StateBlock | Block] = iter(found.states())
     first = next(states, None)
     if first is None or first.tau is None:
-        return (block.tau for block in found.blocks())
+        return (block.tau for block in found.iterate_blocks())
     return (block.tau for block in itertools.chain([first], states) if block.tau is not None)
 
 

@@ -205,7 +205,7 @@ def _measured(
         n = sample_set.n_samples
 
         def told_of(what: str) -> Iterator[Block]:
-            return told(sample_set.blocks(), n, f"{what} of the {name} set", run.progress)
+            return told(sample_set.iterate_blocks(), n, f"{what} of the {name} set", run.progress)
 
         def parts(blocks: Iterable[Block]) -> Iterator[Iterable[Block]]:
             if not by_motion:
@@ -258,9 +258,9 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
         return torque_errors(blocks, models.values, reduction.nominal_torque), nothing
 
     estimation, validation = (
-        measure(part.blocks()) for part in (samples.estimation, samples.validation)
+        measure(part.iterate_blocks()) for part in (samples.estimation, samples.validation)
     )
-    blocks = samples.test.blocks() if samples.test is not None else ()
+    blocks = samples.test.iterate_blocks() if samples.test is not None else ()
     test = [measure(own) for _, own in groupby(blocks, lambda block: block.trajectory)]
     heuristics = {
         name: _judged(found.n, estimation, validation, test, models.rows[name])
@@ -273,7 +273,7 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
 def _check_coordinates(model: Model, samples: Samples) -> None:
     n_q = model.mechanism.n_q
     for part in (samples.estimation, samples.validation, samples.test):
-        if part is not None and next(iter(part.blocks())).q.shape[1] != n_q:
+        if part is not None and next(iter(part.iterate_blocks())).q.shape[1] != n_q:
             raise DataError(
                 f"samples.h5 holds no q, dq, ddq of all {n_q} coordinates, which the loops need.",
                 command="sample",
@@ -297,7 +297,7 @@ class _Models:
         for name, found in reduction.heuristics.items():
             rows = []
             for k in range(found.n.size):
-                column = reduction.model(name, k).standard
+                column = reduction.make_model(name, k).standard
                 number = numbers.setdefault(column.tobytes(), len(columns))
                 if number == len(columns):
                     columns.append(column)
@@ -389,7 +389,7 @@ def _cross_validation(
     run: Run,
 ) -> dict[str, CrossValidation]:
     """Errors with each trajectory left out, of the heuristics that select by torque."""
-    factors = samples.estimation.factors()
+    factors = samples.estimation.compute_factors()
     if len(factors) < 2:
         raise ConfigError(
             "needs at least two trajectories, or folds of a log, to leave one out.",
@@ -454,7 +454,7 @@ def _stability(
         fitting = [subset for subset in found if subset.size <= selected.n]
         return fitting[-1] if fitting else np.zeros(0, np.int64)
 
-    own = samples.estimation.factors()
+    own = samples.estimation.compute_factors()
     variants = [(DataVariant(DataChange.ALL), reduction.factor)]
     for k in range(len(own) if len(own) > 1 else 0):
         left_out = DataVariant(DataChange.WITHOUT_TRAJECTORY, k + 1)
@@ -462,7 +462,7 @@ def _stability(
     rows = samples.estimation.n_samples * weights.size
     for every in _THINNED:
         if rows // every >= 2 * problem.candidates.size:
-            blocks = thinned_blocks(samples.estimation.blocks(), every)
+            blocks = thinned_blocks(samples.estimation.iterate_blocks(), every)
             thinned = DataVariant(DataChange.THINNED, every)
             variants.append((thinned, factor(joint_factors(blocks))))
     return stability(problem, variants, chosen, run.progress)

@@ -102,7 +102,7 @@ class Judge:
         self._coordinates = Coordinates(model.mechanism, once=True)
         ranges = [
             [(x.min(axis=0), x.max(axis=0)) for x in (b.q, b.dq, b.ddq)]
-            for b in samples.estimation.blocks()
+            for b in samples.estimation.iterate_blocks()
         ]
         reached = np.array(ranges)[:, :, 0].min(axis=0), np.array(ranges)[:, :, 1].max(axis=0)
         self._bounds = _bounds(limits, list(model.mechanism.independent), *reached)
@@ -128,7 +128,7 @@ class Judge:
 
     def thinned(self, part: SampleSet, most: int) -> TermSamples:
         """So many samples of a set at most, evenly spread."""
-        return self._made(thinned_blocks(part.blocks(), -(-part.n_samples // most)))
+        return self._made(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // most)))
 
     def _made(self, blocks: Iterable[Block]) -> TermSamples:
         return term_samples(
@@ -157,7 +157,7 @@ class Judge:
         part = self._samples.test
         if part is None:
             return []
-        blocks = thinned_blocks(part.blocks(), -(-part.n_samples // _JUDGED))
+        blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED))
         motions = groupby(blocks, lambda block: block.trajectory)
         return [self._made(own) for _, own in motions]
 
@@ -180,7 +180,7 @@ class Judge:
         for part in (self._samples.estimation, self._samples.validation):
             blocks: list[Block] = []
             if part is not None:
-                blocks = list(thinned_blocks(part.blocks(), -(-part.n_samples // _JUDGED)))
+                blocks = list(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED)))
             result.append([self._made(some) for some in _together(blocks)])
         return result
 
@@ -239,7 +239,7 @@ class Judge:
     @cached_property
     def _inside(self) -> StatesInside:
         part = self._samples.estimation
-        blocks = thinned_blocks(part.blocks(), -(-part.n_samples // _KNOWN))
+        blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _KNOWN))
         known = np.concatenate([b.q for b in blocks])
         lower, upper = self._bounds
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)

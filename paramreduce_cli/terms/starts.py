@@ -62,7 +62,7 @@ def starts_within(
     entries: dict[frozenset[str], Start] = {}
     for name, found in reduction.heuristics.items():
         for row in np.flatnonzero(found.torque_error <= torque_error).tolist():
-            chosen = reduction.model(name, row).restricted(model.affecting)
+            chosen = reduction.make_model(name, row).drop_unaffecting(model.affecting)
             key = frozenset(chosen.names)
             if found.n[row] <= reduction.rank and key not in entries:
                 cost = lean.estimate(chosen.kept, direct=direct)

@@ -213,21 +213,21 @@ def test_a_large_observation_matrix_is_computed_again(two_link_copy, monkeypatch
     store = Store(two_link_copy)
     (sample,) = (stage for stage in pipeline() if stage.name == "sample")
     kept, _ = load_file(store.path(Samples), Samples, "two_link", "")
-    expected = [block.W for block in kept.validation.blocks()]
+    expected = [block.W for block in kept.validation.iterate_blocks()]
     monkeypatch.setattr(sample_files, "_MOST_KEPT", 0)
     Runner(config_of("two_link", ONE_FORMAT), store).run(sample, force=True)
 
     with h5py.File(store.path(Samples)) as file:
         assert "W" not in file["validation"]
     found, _ = load_file(store.path(Samples), Samples, "two_link", "")
-    for block, W in zip(found.validation.blocks(), expected, strict=True):
+    for block, W in zip(found.validation.iterate_blocks(), expected, strict=True):
         np.testing.assert_array_equal(block.W, W)
 
     with h5py.File(store.path(Model), "a") as file:
         file.attrs["digest"] = "another"
     changed, _ = load_file(store.path(Samples), Samples, "two_link", "")
     with pytest.raises(ArtifactError, match=r"is not the model that .* was computed with"):
-        next(changed.validation.blocks())
+        next(changed.validation.iterate_blocks())
 
 
 def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):

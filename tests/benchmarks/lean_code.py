@@ -30,7 +30,7 @@ DEFINITIONS = ["BOOST_MPL_LIMIT_LIST_SIZE=30", "BOOST_MPL_LIMIT_VECTOR_SIZE=30",
 """Of Pinocchio's headers, as its CMake targets say."""
 PINNED = "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); os.execv(sys.argv[2], sys.argv[2:])"
 FS_18 = "m_3 Izz_5 Izz_3 my_6 mx_6 my_5 mx_2 my_4 Izz_4 my_3 Izz_6 Ixx_3 Ixz_2 mx_4 Ixx_4 mx_5 Iyy_3 my_2"
-DYNAMIC = [Kind.of(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
+DYNAMIC = [Kind.parse(s) for s in ["m", "mx", "my", "mz", "Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz"]]
 """Pinocchio's order."""
 
 

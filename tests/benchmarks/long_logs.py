@@ -63,7 +63,7 @@ def measured(*command):
 def write_log(folder, n_samples):
     """A config with a log of a smooth motion, torques with noise."""
     config = load_config(ROBOT)
-    mechanism, phi = config.mechanism(), config.parameter_values()
+    mechanism, phi = config.build_mechanism(), config.get_values()
     dynamics, rng = Dynamics(mechanism), np.random.default_rng(0)
     time = np.arange(n_samples) / 1000
     series = 0.5 * rng.normal(size=(mechanism.n_dof, 11))

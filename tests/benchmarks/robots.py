@@ -95,7 +95,7 @@ def peer():
 def pinocchio_nanoseconds(config):
     """Of one evaluation by Pinocchio, the least of many turns; all joints turn about z."""
     robot = load_config(config)
-    mechanism, phi = robot.mechanism(), robot.parameter_values()
+    mechanism, phi = robot.build_mechanism(), robot.get_values()
     lines = [str(mechanism.n_q)]
     for rigid in mechanism.rigid:
         body = mechanism.bodies[rigid.body]

@@ -211,7 +211,7 @@ def test_relations_are_ordered_by_the_values_that_are_known(invoke, two_link_res
     shutil.copy(two_link_results / "reduction.h5", alone)
     reduction = load_file(alone, Reduction, None, "")[0]
     model = load_file(two_link_results / "model.h5", Model, None, "")[0]
-    row = reduction.heuristics["forward-selection"].row(2)
+    row = reduction.heuristics["forward-selection"].find_row(2)
     for folder, known in ((two_link_results, model.values), (tmp_path, None)):
         out = invoke("inspect", folder / "reduction.h5", *asked).out
         wanted = reduced_model(reduction, "forward-selection", row, known).expressions

@@ -36,7 +36,7 @@ def test_configs_that_ship_are_valid_and_satisfy_the_json_schema(path):
 
 def test_misprint_of_the_papers_table_stays_in_its_own_set():
     for name, Ixz_6 in (("unrounded", 0.0002), ("table", 0.002)):
-        assert config_of("puma560", f"parameters={name}").parameter_values()[56] == Ixz_6
+        assert config_of("puma560", f"parameters={name}").get_values()[56] == Ixz_6
 
 
 @pytest.mark.parametrize(
@@ -163,7 +163,7 @@ def test_overrides(write_config):
 
 
 def test_centre_of_mass_form_is_the_parallel_axis_theorem():
-    values = config_of("two_link").parameter_values()
+    values = config_of("two_link").get_values()
     across = 1 / 24 + 2 * 0.25**2
     assert values[:10] == pytest.approx([2, 0.5, 0, 0, 1e-3, 0, 0, across, 0, across])
     assert values[15] == pytest.approx(-1.0 * 0.2 * 0.01)  # Ixy_fore of a point mass

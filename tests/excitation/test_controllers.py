@@ -147,7 +147,7 @@ def test_limits_that_no_motion_keeps_are_said():
 
 @pytest.fixture(scope="module")
 def ur10():
-    return config_of("ur10").mechanism()
+    return config_of("ur10").build_mechanism()
 
 
 def test_distances_are_never_overestimated(ur10):
@@ -276,7 +276,7 @@ def test_a_way_around_what_is_in_the_way(ur10):
     ceiling = {"name": "ceiling", "point": [0, 0, CEILING], "normal": [0, 0, -1]}
     section = ClearanceSection(radius=0.05, planes=[{"name": "table"}, ceiling])
     config = config_of("ur10")
-    model = types.SimpleNamespace(mechanism=ur10, values=config.parameter_values())
+    model = types.SimpleNamespace(mechanism=ur10, values=config.get_values())
     constraints = tuple(section.constraints(model.mechanism))
     trajectories = types.SimpleNamespace(
         limits=config.trajectories.limits(6), constraints=constraints, period=1.0

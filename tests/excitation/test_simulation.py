@@ -42,7 +42,7 @@ def test_accelerations_are_those_of_the_oracle(simulated):
     model, samples = simulated
     mechanism, oracle = model.mechanism, Lagrange(model.mechanism)
     independent = list(mechanism.independent)
-    for block in samples.estimation.blocks():
+    for block in samples.estimation.iterate_blocks():
         for k in range(0, block.time.size, 20):
             q, dq, tau = block.q[k], block.dq[k], block.tau[k]
             ddq = forward_dynamics(oracle, independent, q, dq, model.values, tau)[independent]
@@ -52,7 +52,7 @@ def test_accelerations_are_those_of_the_oracle(simulated):
 def test_torques_fit_the_full_model_and_are_zero_where_there_is_no_input(simulated):
     model, samples = simulated
     passive = [name not in ("s", "z_wheel") for name in model.mechanism.coordinate_names]
-    blocks = list(samples.estimation.blocks())
+    blocks = list(samples.estimation.iterate_blocks())
     assert {block.trajectory for block in blocks} == {0, 1}
     for block in blocks:
         predicted = (block.W @ model.values).reshape(block.tau.shape)
@@ -87,7 +87,7 @@ def test_loops_stay_closed(simulated):
     model, samples = simulated
     if model.mechanism.loops is None:
         pytest.skip("has no loops")
-    block = next(iter(samples.validation.blocks()))
+    block = next(iter(samples.validation.iterate_blocks()))
     again = Coordinates(model.mechanism).positions(block.z, None)
     assert again == pytest.approx(block.q, abs=1e-9)
 

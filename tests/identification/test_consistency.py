@@ -20,8 +20,8 @@ pytest.importorskip("cvxpy")
 def problem(robot="two_link", noise=0.0, known=1.0, seed=0):
     """Factor of data of the robot of a config, and what is known: the truth times a factor."""
     config = config_of(robot)
-    mechanism = config.mechanism()
-    truth = config.parameter_values()
+    mechanism = config.build_mechanism()
+    truth = config.get_values()
     rng = np.random.default_rng(seed)
     W = Dynamics(mechanism, once=True).regressor(*random_states(mechanism, 200, rng))
     W = W.reshape(-1, truth.size)
@@ -74,5 +74,5 @@ def test_no_entropic_distance_to_what_cannot_exist():
 def test_nothing_known_is_no_obstacle():
     config = load_config(TWO_LINK)
     factor, _, _, _ = problem(noise=0.05)
-    physical = physical_parameters(config.mechanism(), np.zeros(20), factor)
+    physical = physical_parameters(config.build_mechanism(), np.zeros(20), factor)
     assert np.all(smallest_eigenvalues(physical, consistent(factor, physical, "euclidean")) > 0)

@@ -18,7 +18,9 @@ from paramreduce_cli.records import MeasuredLog, Model, RawLog, RawLogs
 def arm(tmp_path_factory):
     from simulated_logs import log_config
 
-    return Dynamics(load_config(log_config(tmp_path_factory.mktemp("arm"))).mechanism(), once=True)
+    return Dynamics(
+        load_config(log_config(tmp_path_factory.mktemp("arm"))).build_mechanism(), once=True
+    )
 
 
 def made(log, **keys):
@@ -28,7 +30,7 @@ def made(log, **keys):
 
 
 def gathered(sample_set):
-    blocks = list(sample_set.blocks())
+    blocks = list(sample_set.iterate_blocks())
     keys = ("time", "z", "dz", "ddz", "tau", "W")
     whole = {key: np.concatenate([getattr(b, key) for b in blocks]) for key in keys}
     return whole, np.concatenate([[b.trajectory] * b.time.size for b in blocks])
@@ -70,7 +72,7 @@ def test_motions_that_are_read_by_rows_are_those_in_memory(measured_results, mon
     for one, other in ((log.training, stored.training), (log.held_out, stored.held_out)):
         sets = [LoggedSet(motions, log, dynamics, "x") for motions in (one, other)]
         assert sets[0].n_samples == sets[1].n_samples > 50
-        assert np.array_equal(sets[0].factors(), sets[1].factors())
+        assert np.array_equal(sets[0].compute_factors(), sets[1].compute_factors())
         for a, b in zip(*(found.states() for found in sets), strict=True):
             assert np.array_equal(a.tau, b.tau)
             assert np.array_equal(a.ddz, b.ddz)
@@ -81,7 +83,7 @@ def test_an_exact_model_stays_exact(arm, cutoff):
     """Friction with steps too, as its columns pass the same filter."""
     log = made(two_link_log(noise=0.0), state_cutoff="none", torque_cutoff=cutoff, outliers="keep")
     found = LoggedSet(log.training, log, arm, "x")
-    factor = combined_factor(found.factors(), None)
+    factor = combined_factor(found.compute_factors(), None)
     left = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0]
     error = np.linalg.norm(factor[:, -1] - factor[:, :-1] @ left) / np.linalg.norm(factor[:, -1])
     assert error < 2e-4  # differentiated speeds are the only error

@@ -89,7 +89,7 @@ def closed_mechanism(output):
     config = load_config(output)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # the guess that was written is one
-        return config, assembled(config.mechanism())
+        return config, assembled(config.build_mechanism())
 
 
 def check_against_pinocchio(path, config, mechanism, pairs):
@@ -105,7 +105,7 @@ def check_against_pinocchio(path, config, mechanism, pairs):
         *rng.uniform(-1, 1, (2, 6, home.size)),
     )
     states = coordinates.states(z, dz, ddz)
-    own = Dynamics(mechanism, once=True).inverse(*states, config.parameter_values())
+    own = Dynamics(mechanism, once=True).inverse(*states, config.get_values())
     order = [model.joints[model.getJointId(name)] for name in mechanism.generalised_names]
     for q, dq, ddq, tau in zip(*states, own, strict=True):
         full, speed, acceleration = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
@@ -164,7 +164,7 @@ def test_a_four_bar_whose_ends_are_joined(invoke, tmp_path, kind):
     )
     config = load_config(output)
     with pytest.warns(match="equations that close the loops 2 are independent"):
-        mechanism = assembled(config.mechanism())
+        mechanism = assembled(config.build_mechanism())
     assert config.description.bodies.independent == ["q_crank"]
     check_against_pinocchio(path, config, mechanism, [("end", "top")])
 
@@ -315,7 +315,7 @@ def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, t
     with pytest.warns(
         match=r"do not close with zero for q1; they are closed with all coordinates free to move, at guess: \{"
     ):
-        found = assembled(load_config(output).mechanism())
+        found = assembled(load_config(output).build_mechanism())
     assert abs(found.loops.assembly[found.independent[0]]) > 0.1
     output.write_text(
         "\n".join(lines).replace(
@@ -323,7 +323,7 @@ def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, t
         )
     )
     with pytest.raises(NumericalError, match=r"cannot be closed from the guess with q1 = 0\.01"):
-        assembled(load_config(output).mechanism())
+        assembled(load_config(output).build_mechanism())
 
 
 def test_lists_for_all_coordinates_are_cut_to_the_independent_ones(tmp_path, invoke):
@@ -331,7 +331,7 @@ def test_lists_for_all_coordinates_are_cut_to_the_independent_ones(tmp_path, inv
 
     text = (CONFIGS / "four_bar.yaml").read_text()
     bodies = load_config(CONFIGS / "four_bar.yaml").description.bodies
-    place = bodies.generalised_names().index(bodies.independent[0])
+    place = bodies.list_coordinates().index(bodies.independent[0])
     values = [1.5, 2.5, 3.5]
     path = tmp_path / "config.yaml"
     path.write_text(text)

@@ -44,9 +44,9 @@ def test_closures_over_an_imported_tree(tmp_path, invoke):
     path.write_text(text)
     config = load_config(path)
     with pytest.warns(match="follow from the others"):
-        mechanism = assembled(config.mechanism())
+        mechanism = assembled(config.build_mechanism())
     assert mechanism.n_dof == 1
-    oracle, phi = Lagrange(mechanism), config.parameter_values()
+    oracle, phi = Lagrange(mechanism), config.get_values()
     states = random_states(mechanism, 10, np.random.default_rng(0))
     found = Dynamics(mechanism).inverse(*states, phi)
     for tau, q, dq, ddq in zip(found, *states, strict=True):

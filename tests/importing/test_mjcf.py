@@ -107,7 +107,7 @@ def mujoco_torques(path, states, friction=True):
 
 
 def own_torques(config, states):
-    return Dynamics(config.mechanism(), once=True).inverse(*states, config.parameter_values())
+    return Dynamics(config.build_mechanism(), once=True).inverse(*states, config.get_values())
 
 
 def test_torques_are_those_of_mujoco(tmp_path):
@@ -124,10 +124,10 @@ def test_limits_and_drives_are_taken_over(tmp_path):
     path = written(tmp_path, ARM)
     config = loaded(path, tmp_path)
     assert config.robot == "an_arm"
-    assert config.description.bodies.generalised_names() == ["shoulder", "lift", "elbow"]
+    assert config.description.bodies.list_coordinates() == ["shoulder", "lift", "elbow"]
     limits = config.trajectories.limits(3)
     assert np.degrees([limits.lower[0], limits.upper[0]]) == pytest.approx([-110, 40], abs=1e-3)
-    effects = {kind.symbol: value for kind, value in config.drives["elbow"].effects().items()}
+    effects = {kind.symbol: value for kind, value in config.drives["elbow"].get_values().items()}
     assert effects == pytest.approx({"Ia": 0.02, "fv": 0.3, "fc": 0.4})
     warnings = " ".join(imported(SourceSection(file=path)).warnings)
     assert "shoulder counts from the pose of the file" in warnings
@@ -192,7 +192,7 @@ def test_equalities_become_closures(tmp_path):
     ]
     assert tree.independent == ["left", "right"]
     with pytest.warns(match="follow from the others"):
-        mechanism = assembled(config.mechanism())
+        mechanism = assembled(config.build_mechanism())
     z = np.array([[0.05, -0.1]])
     q = Coordinates(mechanism).positions(z, None)
     names = list(mechanism.generalised_names)
@@ -266,7 +266,7 @@ def test_torques_of_robots_are_those_of_mujoco(tmp_path, name):
     if (model.jnt_type < 2).any():
         pytest.skip("has joints of several coordinates, compared elsewhere")
     config = loaded(path, tmp_path, uncoupled=True)
-    names = config.description.bodies.generalised_names()
+    names = config.description.bodies.list_coordinates()
     order = [
         names.index(mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_JOINT, k) or f"joint_{k}")
         for k in range(model.njnt)
@@ -342,7 +342,7 @@ def test_bodies_without_a_name_get_one_that_is_free(tmp_path):
         .replace('body2="right_rod"', 'body2="right"')
     )
     config = loaded(written(tmp_path, text), tmp_path)
-    assert "body_4_" in config.description.bodies.body_names()
+    assert "body_4_" in config.description.bodies.list_body_names()
 
 
 def test_choices_that_would_change_loops_are_refused(tmp_path):

@@ -58,7 +58,7 @@ def pinocchio_torques(model, states):
 
 
 def own_torques(config, states):
-    return Dynamics(config.mechanism(), once=True).inverse(*states, config.parameter_values())
+    return Dynamics(config.build_mechanism(), once=True).inverse(*states, config.get_values())
 
 
 def states_of(n, count=20):
@@ -94,7 +94,7 @@ def test_names_limits_and_torques_are_taken_over(tmp_path):
     path = written(tmp_path, ARM)
     config = loaded(path, tmp_path)
     assert config.robot == "an_arm"
-    assert config.description.bodies.generalised_names() == ["shoulder", "j_lift", "grip"]
+    assert config.description.bodies.list_coordinates() == ["shoulder", "j_lift", "grip"]
     limits = config.trajectories.limits(3)
     assert limits.lower == pytest.approx([-2, 0, -np.pi])
     assert limits.upper == pytest.approx([1.5, 0.3, np.pi])
@@ -107,7 +107,7 @@ def test_names_limits_and_torques_are_taken_over(tmp_path):
 def test_a_chain_a_branch_left_out_and_another_root(tmp_path):
     path = written(tmp_path, ARM)
     names = [
-        loaded(path, tmp_path, **choice).description.bodies.body_names()
+        loaded(path, tmp_path, **choice).description.bodies.list_body_names()
         for choice in ({"tip": "1"}, {"ignored": ("slide",)}, {"root": "1"}, {"floating": True})
     ]
     assert names == [
@@ -133,14 +133,14 @@ def following(old, *more):
 def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
     path = written(tmp_path, following('<mimic joint="shoulder" multiplier="-0.5" offset="0.1"/>'))
     config = loaded(path, tmp_path)
-    assert config.description.bodies.independent_names() == ["shoulder", "grip"]
-    mechanism = assembled(config.mechanism())
+    assert config.description.bodies.list_independent_coordinates() == ["shoulder", "grip"]
+    mechanism = assembled(config.build_mechanism())
     z, dz, ddz = states_of(2)
     S, offset = np.array([[1, 0], [-0.5, 0], [0, 1]]), np.array([0, 0.1, 0])
     model = pin.buildModelFromUrdf(str(written(tmp_path, ARM)))
     expected = pinocchio_torques(model, (z @ S.T + offset, dz @ S.T, ddz @ S.T)) @ S
     states = Coordinates(mechanism).states(z, dz, ddz)
-    found = Dynamics(mechanism, once=True).inverse(*states, config.parameter_values())
+    found = Dynamics(mechanism, once=True).inverse(*states, config.get_values())
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
@@ -203,7 +203,7 @@ def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_coun
     locked = dict.fromkeys(moving[kept:], 0.0)
     choice = {"locked": locked, "floating": floating, "uncoupled": True}
     config = loaded(ROBOTS / file, tmp_path, **choice)
-    mechanism = config.mechanism()
+    mechanism = config.build_mechanism()
     states = random_states(mechanism, 150, np.random.default_rng(0))
     K = Dynamics(mechanism, once=True).regressor(*states)
     W = K.reshape(-1, K.shape[2])
@@ -223,7 +223,7 @@ def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_coun
 def test_torques_of_robots(tmp_path, file):
     config = loaded(ROBOTS / file, tmp_path, uncoupled=True)
     model = pin.buildModelFromUrdf(str(ROBOTS / file))
-    names = config.description.bodies.generalised_names()
+    names = config.description.bodies.list_coordinates()
     order = [model.names.tolist().index(name) - 1 for name in names]
     states = states_of(model.njoints - 1)
     own = own_torques(config, [some[:, order] for some in states])
@@ -333,12 +333,12 @@ def test_parameters_go_back_into_the_file(tmp_path, invoke):
     given = (output, "--results", tmp_path / "r")
     invoke("run", *given, settings=settings)
     own = load_config(output, settings)
-    mechanism, states = own.mechanism(), states_of(3)
+    mechanism, states = own.build_mechanism(), states_of(3)
     with h5py.File(tmp_path / "r" / "reduction.h5") as file:
         found = file["forward-selection"]
         reduced = np.zeros(mechanism.n_parameters)
         reduced[found["subsets/5"][()]] = found["parameters/5"][()]
-    models = {"full": own.parameter_values(), "base": own.parameter_values()}
+    models = {"full": own.get_values(), "base": own.get_values()}
     for model, phi in (models | {"forward-selection:5": reduced}).items():
         chosen = ("--format", "urdf", "--model", model, "--output", tmp_path / model)
         said = invoke("export", *given, *chosen, settings=settings).err

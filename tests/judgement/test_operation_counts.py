@@ -32,7 +32,7 @@ def test_counts_are_those_of_each_model_by_itself(validated):
     counted = 0
     for name, result in validation.heuristics.items():
         for row in np.flatnonzero(np.isfinite(result.operations.inverse)):
-            expected = counts.lean(reduction.model(name, int(row)))
+            expected = counts.lean(reduction.make_model(name, int(row)))
             assert [result.operations.inverse[row], result.operations.direct[row]] == expected
             counted += 1
     assert counted > 10
@@ -43,7 +43,7 @@ def test_what_is_shown_is_counted_and_the_front_is_of_it(validated):
     selected = validation.selected
     for name, result in validation.heuristics.items():
         known = np.isfinite(result.operations.inverse)
-        assert known[result.row(selected.n)]
+        assert known[result.find_row(selected.n)]
         if name in (selected.heuristic, "forward-selection"):
             assert known.all()
     assert not all(
@@ -51,4 +51,4 @@ def test_what_is_shown_is_counted_and_the_front_is_of_it(validated):
     )
     for choice in validation.pareto:
         result = validation.heuristics[choice.heuristic]
-        assert np.isfinite(result.operations.inverse[result.row(choice.n)])
+        assert np.isfinite(result.operations.inverse[result.find_row(choice.n)])

@@ -16,7 +16,7 @@ def models(two_link_results):
         load_file(store.path(record), record, None, "")[0] for record in (Model, Reduction)
     )
     found = [
-        reduction.model(name, k)
+        reduction.make_model(name, k)
         for name, f in reduction.heuristics.items()
         for k in range(f.n.size)
     ]

@@ -22,7 +22,7 @@ from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.random_states import random_states
 from paramreduce_cli.records import Constraint, Mechanism
 from paramreduce_cli.robots import Description, Robot
-from paramreduce_cli.robots.frames import translation
+from paramreduce_cli.robots.frames import translate
 
 REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8, "delta": 0.3,
          "humanoid_leg": 0.2}  # fmt: skip
@@ -32,14 +32,14 @@ REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8, "delt
 @pytest.fixture(scope="module", params=CLOSED_LOOPS)
 def case(request):
     config = config_of(request.param)
-    mechanism = assembled(config.mechanism())
+    mechanism = assembled(config.build_mechanism())
     rng = np.random.default_rng(3)
-    phi = config.parameter_values() + rng.normal(size=mechanism.n_parameters) * 1e-2
+    phi = config.get_values() + rng.normal(size=mechanism.n_parameters) * 1e-2
     return mechanism, Lagrange(mechanism), phi
 
 
 def closed(robot):
-    return assembled(config_of(robot).mechanism())
+    return assembled(config_of(robot).build_mechanism())
 
 
 def states_of(mechanism, count=4):
@@ -303,8 +303,8 @@ def chain_with(kind):
         closure |= {"bodies": ["b0", "b6"], "ratio": -2.0, "offset": float(q[6] + 2 * q[0])}
     else:
         open_tree = Description.model_validate({"tree": {"bodies": bodies}}).bodies
-        mechanism = Mechanism("chain", open_tree.rigid_bodies(), (), np.zeros(3), (), ())
-        pose = body_poses(mechanism, q)[6] @ translation(*TOOL)
+        mechanism = Mechanism("chain", open_tree.build_bodies(), (), np.zeros(3), (), ())
+        pose = body_poses(mechanism, q)[6] @ translate(*TOOL)
         angles = rotation_steps(pose[:3, :3])
         closure["at"] = [[{"xyz": pose[:3, 3].tolist()}, *angles], TOOL]
         if kind == "universal":  # y of the last body across x of the base's frame
@@ -317,7 +317,7 @@ def chain_with(kind):
     sets = {"set": {f"b{k}": inertia for k in range(7)}}
     text = {"robot": "chain", "description": {"tree": tree}, "parameter_sets": sets}
     if kind != "coupling":  # depend shall what the equations determine best
-        oracle = Lagrange(Robot.model_validate(text).mechanism())
+        oracle = Lagrange(Robot.model_validate(text).build_mechanism())
         _, J, _ = oracle.closures(q, np.zeros(7))
         order = scipy.linalg.qr(np.array(J), mode="r", pivoting=True)[1]
         tree["independent"] = [f"q{k}" for k in sorted(order[EQUATIONS[kind] :])]
@@ -336,9 +336,9 @@ def rotation_steps(R):
 @pytest.mark.parametrize("kind", list(EQUATIONS))
 def test_every_kind_of_closure_against_lagrange(kind):
     robot = chain_with(kind)
-    mechanism = assembled(robot.mechanism())
+    mechanism = assembled(robot.build_mechanism())
     assert mechanism.n_dof == 7 - EQUATIONS[kind]
-    oracle, phi = Lagrange(mechanism), robot.parameter_values()
+    oracle, phi = Lagrange(mechanism), robot.get_values()
     rng = np.random.default_rng(2)
     coordinates = Coordinates(mechanism)
     z0 = mechanism.loops.assembly[list(mechanism.independent)]
@@ -358,7 +358,7 @@ def test_every_kind_of_closure_against_lagrange(kind):
 def test_coupled_joints_add_up_their_columns():
     """Of the open chain, with R = d q / d z."""
     robot = chain_with("coupling")
-    mechanism = assembled(robot.mechanism())
+    mechanism = assembled(robot.build_mechanism())
     states = Coordinates(mechanism).states(*np.random.default_rng(0).normal(size=(3, 4, 6)))
     open_chain = dataclasses.replace(mechanism, loops=None)
     whole = Dynamics(open_chain, once=True).regressor(*states)
@@ -375,7 +375,7 @@ def test_equations_that_follow_from_others_are_dropped():
     with pytest.warns(
         ParamreduceWarning, match=r"of the 5 equations .* 2 are independent; .*pin \(z\)"
     ):
-        hinged = assembled(config.mechanism())
+        hinged = assembled(config.build_mechanism())
     assert len(hinged.loops.kept) == 2
     plane = closed("four_bar")
     states = states_of(plane)
@@ -385,7 +385,7 @@ def test_equations_that_follow_from_others_are_dropped():
 
 def test_equations_that_are_needed_elsewhere_are_not_dropped():
     closure = "{name: pin, type: revolute, bodies: [coupler, rocker], at: [[coupler, 0, 0], [rocker, 0, 0]]}"
-    mechanism = config_of("four_bar", f"description.tree.closures=[{closure}]").mechanism()
+    mechanism = config_of("four_bar", f"description.tree.closures=[{closure}]").build_mechanism()
     here, there = np.zeros((2, 5, 3))
     here[0, 0] = here[1, 1] = there[0, 0] = there[2, 2] = 1.0
     with pytest.raises(NumericalError, match="not the same ones"):

@@ -62,7 +62,7 @@ def case(request):
     if name in MECHANISMS:
         mechanism = with_everything(MECHANISMS[name]())
         return mechanism, Lagrange(mechanism), tree_states(mechanism, 12)
-    mechanism = with_everything(assembled(config_of(name).mechanism()))
+    mechanism = with_everything(assembled(config_of(name).build_mechanism()))
     return mechanism, Lagrange(mechanism), random_states(mechanism, 6, np.random.default_rng(1))
 
 

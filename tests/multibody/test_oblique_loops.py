@@ -16,7 +16,7 @@ ANGLES = np.random.default_rng(0).uniform(-3, 3, size=(12, 3)).round(3).tolist()
 def test_a_slider_has_two_equations_in_any_plane(tmp_path, angles):
     turns = ", ".join(f"{{r{axis}: {a}}}" for axis, a in zip("xyz", angles, strict=True))
     with pytest.warns(ParamreduceWarning, match="of the 5 equations that close the loops 2 are"):
-        mechanism = assembled(load_text(tmp_path, SLIDER, turns=turns).mechanism())
+        mechanism = assembled(load_text(tmp_path, SLIDER, turns=turns).build_mechanism())
     assert len(mechanism.loops.kept) == 2
     q = ca.SX.sym("q", 3)
     phi = closure_equations(mechanism, q)

@@ -38,7 +38,7 @@ SIZES = [
 def arm(folder, length, ratio, gravity):
     path = folder / "config.yaml"
     path.write_text(CONFIG.format(a=length, b=length / 4, ratio=ratio, rotor=1e-9, gravity=gravity))
-    return load_config(path).mechanism()
+    return load_config(path).build_mechanism()
 
 
 def effects(mechanism):

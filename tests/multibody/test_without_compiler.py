@@ -20,7 +20,7 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import random_states
 warnings.simplefilter("ignore", ParamreduceWarning)
-mechanism = assembled(load_config(Path(sys.argv[1])).mechanism())
+mechanism = assembled(load_config(Path(sys.argv[1])).build_mechanism())
 q, dq, ddq = random_states(mechanism, 5, np.random.default_rng(0))
 print(repr(Dynamics(mechanism).regressor(q, dq, ddq).ravel().tolist()))
 lined_up = np.zeros((3, mechanism.n_q))  # both far links along one line

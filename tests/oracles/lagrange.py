@@ -25,7 +25,7 @@ class Lagrange:
             kinetic, potential = kinetic + own_kinetic, potential + own_potential
         lost = 0
         for drive in mechanism.drives:
-            value = {kind: phi[c] for kind, c in mechanism.drive_columns(drive).items()}
+            value = {kind: phi[c] for kind, c in mechanism.find_drive_columns(drive).items()}
             position, speed = ca.dot(drive.weights, q), ca.dot(drive.weights, dq)
             kinetic += value.get(Kind.ROTOR, 0) * speed**2 / 2
             potential += value.get(Kind.STIFFNESS, 0) * (position - drive.rest) ** 2 / 2

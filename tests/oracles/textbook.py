@@ -56,7 +56,7 @@ def torques(mechanism, q, dq, ddq, phi, gravity):
         omega.append(own_w), rate.append(own_dw), acceleration.append(own_a)
     forces, moments = [], []
     for i in range(n):
-        own = mechanism.moving_with(i)
+        own = mechanism.list_rigid_parts(i)
         if not own:
             forces.append(ca.SX(3, 1)), moments.append(ca.SX(3, 1))
             continue

@@ -448,9 +448,9 @@ def test_of_equal_proofs_the_furthest_search_is_kept():
         together = merged(proofs)
         for n, log, status in zip(together.n, together.logs, together.status, strict=True):
             if status == "best-found" and np.array_equal(
-                *(one.of_size(n).lower_bound for one in limited)
+                *(one.get_size(n).lower_bound for one in limited)
             ):
-                assert np.array_equal(log, limited[1].of_size(n).logs[0])
+                assert np.array_equal(log, limited[1].get_size(n).logs[0])
 
 
 def test_jobs_split_a_search_that_an_earlier_artifact_has_begun():

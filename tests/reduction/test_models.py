@@ -35,12 +35,12 @@ def grouped_reduction():
 
 
 def test_tied_parameters_have_one_value():
-    model = grouped_reduction().model("swap", 1)
+    model = grouped_reduction().make_model("swap", 1)
     assert model.names == ("a", "both", "d")  # as in the columns, not as they were taken
     assert model.position.tolist() == [0, 1, 1, 2]
     assert model.standard.tolist() == [5.0, 6.0, 6.0, 4.0]
     assert model.ties == {2: 1}
-    assert model.restricted(np.array([True, False, True, True])).ties == {}
+    assert model.drop_unaffecting(np.array([True, False, True, True])).ties == {}
 
 
 def test_what_is_not_kept_is_zero():
@@ -55,9 +55,9 @@ def test_what_is_not_kept_is_zero():
 def test_sizes_that_groups_leave_out_are_not_offered():
     reduction = grouped_reduction()
     assert known_choices(reduction) == ["swap:1|3"]
-    assert ModelChoice.parse("swap:3").row(reduction) == 1
+    assert ModelChoice.parse("swap:3").find_row(reduction) == 1
     for text in ("swap:2", "swap", "swap:", "swap:x", "qr:1"):
-        assert ModelChoice.parse(text).row(reduction) is None
+        assert ModelChoice.parse(text).find_row(reduction) is None
 
 
 def test_the_first_size_beyond_the_rank_is_a_size_not_a_place():

@@ -99,7 +99,7 @@ def test_the_front_is_what_nothing_beats(seed):
     def beaten(one):
         return any(two != one and np.all(np.array(two) <= one) for two in everything)
 
-    front = [values(m.heuristic, results[m.heuristic].row(m.n)) for m in pareto_front(results)]
+    front = [values(m.heuristic, results[m.heuristic].find_row(m.n)) for m in pareto_front(results)]
     assert len(front) == len(set(front))
     assert set(front) == {one for one in everything if not beaten(one)}
 

@@ -93,7 +93,7 @@ def test_values_of_the_same_fit_are_told_by_their_deviations():
 
     def found(others):
         model = types.SimpleNamespace(names=("b", "a"), values=np.array(others))
-        return Estimate.deviations_of(estimate, model)
+        return Estimate.find_deviations(estimate, model)
 
     assert found([2.0, 1.0]) == {"a": 0.1, "b": 1e-12}
     assert found([2.0001, 1.004])  # far less than a deviation, or round-off

@@ -77,7 +77,7 @@ def test_the_error_of_a_path_is_over_its_own_samples():
     paths = Paths(np.arange(4.0), np.array([2, 4]), *[np.zeros((4, 2, 1))] * 3)
     errors = np.ones((4, 2, 1))
     errors[2:, 0] = 100.0
-    assert Tracking(paths, {"m": errors}).rms("m").tolist() == [1.0, 1.0]
+    assert Tracking(paths, {"m": errors}).compute_rms("m").tolist() == [1.0, 1.0]
 
 
 def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):

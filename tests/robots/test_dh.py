@@ -3,7 +3,7 @@ import pytest
 from conftest import dh, mechanism_of
 
 from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.robots.frames import rotation_x, rotation_z
+from paramreduce_cli.robots.frames import rotate_x, rotate_z
 
 
 def transform(axis, angle, along):
@@ -28,7 +28,7 @@ def test_one_link_is_the_product_of_its_textbook_transforms(convention, joint):
 
 
 def test_right_angles_are_exact():
-    for rotation in (rotation_x, rotation_z):
+    for rotation in (rotate_x, rotate_z):
         for quarters in range(-4, 5):
             assert set(np.abs(rotation(quarters * np.pi / 2)).ravel()) <= {0.0, 1.0}
 
@@ -56,6 +56,6 @@ def test_table_for_people_shows_angles_as_fractions_of_pi():
 @pytest.mark.parametrize("angle", [1e-9, 1e-6, 1e-5, 0.1, np.pi / 2 + 1e-6, np.pi / 3])
 def test_rotations_by_any_angle_are_rotations(angle):
     """Also by angles whose cosine alone looks like that of a right one."""
-    for rotation in (rotation_x, rotation_z):
+    for rotation in (rotate_x, rotate_z):
         R = rotation(angle)[:3, :3]
         assert np.abs(R @ R.T - np.eye(3)).max() < 1e-15

@@ -45,7 +45,7 @@ def test_modes_are_closed_and_keep_the_independent_coordinates(robot):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        mechanism = assembled(config_of(robot).mechanism())
+        mechanism = assembled(config_of(robot).build_mechanism())
     modes = find_assembly_modes(mechanism)
     assert modes
     q = ca.SX.sym("q", mechanism.n_q)

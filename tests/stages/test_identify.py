@@ -34,8 +34,8 @@ def test_errors_are_those_of_the_samples(identification, measured_results):
     path = Store(measured_results / "results").path(Samples)
     samples = load_file(path, Samples, "two_link", "sample")[0]
     for part, which in ((samples.estimation, "train"), (samples.validation, "held_out")):
-        W = np.concatenate([b.W for b in part.blocks()])
-        tau = np.concatenate([b.tau for b in part.blocks()])
+        W = np.concatenate([b.W for b in part.iterate_blocks()])
+        tau = np.concatenate([b.tau for b in part.iterate_blocks()])
         for estimate in (identification.full, identification.reduced):
             left = tau.ravel() - W @ estimate.standard
             assert getattr(estimate, which) == pytest.approx(

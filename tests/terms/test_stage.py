@@ -146,7 +146,7 @@ def errors_by_definition(runner, name):
     result = []
     for part in (samples.estimation, samples.validation):
         off = total = 0.0
-        for b in part.blocks():
+        for b in part.iterate_blocks():
             n = b.q.shape[1]
             tangent = np.broadcast_to(np.eye(n), (len(b.q), n, n))
             inputs = [*b.q.T, *b.dq.T, *b.ddq.T]
@@ -339,7 +339,7 @@ def test_the_worst_state_of_loops_is_assembled_inside_the_limits(four_bar):
 
 def largest_torque(runner):
     """Largest torque of the estimation set."""
-    return max(np.abs(b.tau).max() for b in loaded(runner, Samples).estimation.blocks())
+    return max(np.abs(b.tau).max() for b in loaded(runner, Samples).estimation.iterate_blocks())
 
 
 def recomputed_in_c(runner, name):
@@ -357,7 +357,7 @@ def recomputed_in_c(runner, name):
     results = {"inverse": [np.empty(n)], "direct": [np.empty((n, n)), np.empty(n)]}[name]
     off, total = np.zeros(2), np.zeros(2)
     nominal, scale = model_weights(runner), samples.nominal_acceleration
-    for block in samples.validation.blocks():
+    for block in samples.validation.iterate_blocks():
         tangent = Coordinates(mechanism).tangent(block.q)
         R = tangent[:, dependent]
         b = block.ddq[:, dependent] - np.einsum("kij,kj->ki", R, block.ddz)
@@ -563,7 +563,7 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
     runner = Runner(config, Store(measured_copy / "results"))
     with pytest.raises(ConfigError):
         runner.run(STAGES["reduce-terms"])
-    blocks = loaded(runner, Samples).estimation.blocks()
+    blocks = loaded(runner, Samples).estimation.iterate_blocks()
     training = np.hstack([np.vstack([b.z.T, b.dz.T]) for b in blocks])
 
     def places(some):

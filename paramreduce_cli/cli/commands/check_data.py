@@ -49,7 +49,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     loaded = load_config(config, overrides) if config is not None else None
     raw = load_log(file)
     names = list(raw.columns)
-    mechanism = None if loaded is None else loaded.mechanism()
+    mechanism = None if loaded is None else loaded.build_mechanism()
     joints = _joints(names) if mechanism is None else list(mechanism.coordinate_names)
     section = None if loaded is None else loaded.sampling.log
     if section is None:
@@ -62,7 +62,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
         found = None
         if mechanism is not None and loaded is not None:
-            found = quality(mechanism, log, loaded.measured())
+            found = quality(mechanism, log, loaded.find_measured())
     for text in log.steps:
         say(text)
     table = rich.table.Table(box=rich.box.SIMPLE, pad_edge=False, collapse_padding=True)

@@ -218,7 +218,7 @@ def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
     text = config_text(replace(robot, independent=robot.independent or every), choice)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)  # they come with the final text
-        mechanism = _check(text).mechanism()
+        mechanism = _check(text).build_mechanism()
     return close_loops(robot, mechanism, asked=bool(choice.independent))
 
 

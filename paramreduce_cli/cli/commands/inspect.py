@@ -173,7 +173,7 @@ def _parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
     """Of a model, with what the files beside it know of them."""
     model = _beside(folder / "model.h5", Model)
     found = _beside(folder / "identification.h5", Identification)
-    deviations = {} if found is None else found.reduced.deviations_of(chosen)
+    deviations = {} if found is None else found.reduced.find_deviations(chosen)
     units = [] if model is None else [p.unit for p in model.mechanism.parameters]
     return [
         _Parameter(name, value, units[k] if units else "", deviations.get(name), expression)
@@ -215,7 +215,7 @@ def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
 
     reduction, _ = load_file(file, Reduction, None, "reduce")
     choice = ModelChoice.parse(chosen)
-    row = choice.row(reduction)
+    row = choice.find_row(reduction)
     if row is None:
         choices = known_choices(reduction)
         raise ConfigError(

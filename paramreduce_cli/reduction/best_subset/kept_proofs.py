@@ -76,7 +76,7 @@ class KeptProofs:
             if n not in proofs.n:
                 self._items.kept[_size_key(n)] = None
                 continue
-            own = proofs.of_size(n)
+            own = proofs.get_size(n)
             ended = own.status[0] is not ProofStatus.BEST_FOUND or not cut_short
             key = _size_key(n) + ("" if ended else _UNFINISHED)
             self._items.kept[key] = ProofItem(self._factor, own)

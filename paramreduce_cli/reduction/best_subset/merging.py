@@ -93,7 +93,9 @@ def merged(proofs: Sequence[Proofs]) -> Proofs:
     units = proofs[-1].units
     usable = [one for one in proofs if _same_units(one.units, units)]
     sizes = sorted({n for one in usable for n in one.n.tolist()})
-    return _stacked([_merged_size([one.of_size(n) for one in usable if n in one.n]) for n in sizes])
+    return _stacked(
+        [_merged_size([one.get_size(n) for one in usable if n in one.n]) for n in sizes]
+    )
 
 
 def _merged_size(proofs: Sequence[Proofs]) -> Proofs:

@@ -30,7 +30,7 @@ def tracking(data: ReportData) -> Figure | None:
     top.set_ylabel("path, rad or m")
     legend_beside(top)
     for axes, (name, errors) in zip(below, result.errors.items(), strict=True):
-        rms = 1e3 * result.rms(name)
+        rms = 1e3 * result.compute_rms(name)
         axes.set_ylabel("off, mrad or mm")
         told = (
             f"{name}: {np.median(rms):.2g} mrad rms ({rms.min():.2g} to {rms.max():.2g} over {rms.size} "

@@ -12,7 +12,7 @@ def drives(data: ReportData) -> Table:
     mechanism = data.robot_model.mechanism
     rows = []
     for drive in mechanism.drives:
-        columns = mechanism.drive_columns(drive)
+        columns = mechanism.find_drive_columns(drive)
         cells = [
             _cell(mechanism.parameters[columns[kind]], data.robot_model.values[columns[kind]])
             if kind in columns

@@ -13,7 +13,7 @@ def joint_errors(data: ReportData) -> Table:
     """Root mean squares of what the selected model misses of each joint's torque, and as a share of that torque."""
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
-    row = result.row(selected.n)
+    row = result.find_row(selected.n)
     rows = []
     for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist():
         cells = [data.joint_label(j)]

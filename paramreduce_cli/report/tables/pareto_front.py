@@ -14,14 +14,14 @@ def pareto_front(data: ReportData) -> Table:
     rows = []
     for model in data.validation.pareto:
         r = data.validation.heuristics[model.heuristic]
-        k = r.row(model.n)
+        k = r.find_row(model.n)
         errors = [
             text
             for what in ("torque", "acceleration")
             for text in (
-                format_percent(float(r.error(what).estimation[k])),
-                format_percent(float(r.error(what).validation[k])),
-                format_percent_range(*ErrorRange.of(r.error(what).test[k])),
+                format_percent(float(r.get_errors(what).estimation[k])),
+                format_percent(float(r.get_errors(what).validation[k])),
+                format_percent_range(*ErrorRange.summarise(r.get_errors(what).test[k])),
             )
         ]
         counts = (r.operations.inverse, r.operations.direct)

@@ -12,7 +12,7 @@ def selected_subsets(data: ReportData) -> Table:
     n, names = data.validation.selected.n, data.reduction.columns.names
     rows = []
     for name, found in data.reduction.heuristics.items():
-        row = found.row(n)
+        row = found.find_row(n)
         if row is not None:
             kept = " ".join(names[k] for k in sorted(found.subsets[row]))
             rows.append((name, format_percent(float(found.torque_error[row])), kept))

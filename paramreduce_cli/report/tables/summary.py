@@ -15,16 +15,16 @@ def summary(data: ReportData) -> Table:
     model = (str(data.n_affecting), str(data.reduction.rank), str(n))
     rows = []
     for name, r in data.validation.heuristics.items():
-        k = r.row(n)
+        k = r.find_row(n)
         if k is not None:
             d, M = (
                 function_cells(
                     key,
                     full.get(f"operations_{key}"),
                     r.operations[key][k],
-                    r.error(error).estimation[k],
-                    r.error(error).validation[k],
-                    ErrorRange.of(r.error(error).test[k]),
+                    r.get_errors(error).estimation[k],
+                    r.get_errors(error).validation[k],
+                    ErrorRange.summarise(r.get_errors(error).test[k]),
                 )
                 for key, error in (("inverse", "torque"), ("direct", "acceleration"))
             )

@@ -22,9 +22,9 @@ def terms(data: ReportData) -> Table:
     for name, one in (data.terms.functions if data.terms is not None else {}).items():
         shown = (
             _known(one.torque_error.estimation), _known(one.torque_error.validation),
-            format_percent_range(*ErrorRange.of(one.torque_error.test)),
+            format_percent_range(*ErrorRange.summarise(one.torque_error.test)),
             _known(one.acceleration_error.estimation), _known(one.acceleration_error.validation),
-            format_percent_range(*ErrorRange.of(one.acceleration_error.test)),
+            format_percent_range(*ErrorRange.summarise(one.acceleration_error.test)),
             _known(one.random_torque_error), _known(one.random_acceleration_error),
         )  # fmt: skip
         eigenvalue = one.smallest_eigenvalue
