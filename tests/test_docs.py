@@ -19,7 +19,7 @@ from pydantic import ValidationError
 from paramreduce_cli import api
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config import load_config
-from paramreduce_cli.config.loading import config_schema
+from paramreduce_cli.config.loading import get_schema
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.export.choice import chosen_model
 from paramreduce_cli.export.languages import languages
@@ -51,7 +51,7 @@ def test_every_key_of_a_config_is_on_its_page(generated):
     rows = [
         re.split(r"(?<!\\)\|", line)[1:-1] for line in page.splitlines() if line.startswith("| `")
     ]
-    assert sorted(row[0].strip(" `") for row in rows) == sorted(schema_keys(config_schema()))
+    assert sorted(row[0].strip(" `") for row in rows) == sorted(schema_keys(get_schema()))
     for key, takes, about in rows:
         kind = takes.split("<br>")[0]
         text, _, example = about.partition("<br>*Example*: ")

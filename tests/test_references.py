@@ -36,7 +36,7 @@ def test_selection_on_the_committed_trajectories(robot):
     wanted = config.trajectories
     trajectories = Trajectories(
         summary["trajectories"]["period"], wanted.points, "", "", wanted.use_full_range, False, "",
-        wanted.limits(config.n_dof), (), series("estimation"), series("validation"), (), (),
+        wanted.build_limits(config.n_dof), (), series("estimation"), series("validation"), (), (),
     )  # fmt: skip
     samples = sample(config.sampling, model, trajectories, Recordings(None, None, None))
     counted = config.validation.operations

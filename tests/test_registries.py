@@ -6,7 +6,7 @@ import sys
 
 import pytest
 
-from paramreduce_cli.config import config_schema
+from paramreduce_cli.config import get_schema
 from paramreduce_cli.excitation.criteria import criteria as excitation_criteria
 from paramreduce_cli.excitation.scalings import scalings
 from paramreduce_cli.export.languages import languages
@@ -55,7 +55,7 @@ def test_figures_and_tables_have_places_of_their_own(name):
 
 
 def test_the_schema_offers_them():
-    definitions = config_schema()["$defs"]
+    definitions = get_schema()["$defs"]
     trajectories = definitions["TrajectoriesSection"]["properties"]
     assert set(trajectories["criterion"]["enum"]) == {"condition-number", "d-optimality"}
     assert {"weighted", "full"} < set(trajectories["scaling"]["enum"])

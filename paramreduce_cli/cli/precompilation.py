@@ -54,12 +54,12 @@ def _prove_best_subsets() -> None:
 def _leave_out_terms() -> None:
     """Run the small arm as far as its functions without terms; their operations are counted on the way."""
     from paramreduce_cli.config import load_config
-    from paramreduce_cli.config.examples import examples
+    from paramreduce_cli.config.examples import list_examples
     from paramreduce_cli.records import Run, TermReduction
     from paramreduce_cli.running.in_memory import made_in_memory
     from paramreduce_cli.running.pipeline import stages_to_run
 
-    config = load_config(examples()[_EXAMPLE], _QUICK)
+    config = load_config(list_examples()[_EXAMPLE], _QUICK)
     records: dict[type, Any] = {}
     for stage in stages_to_run(config):
         records[stage.output] = made_in_memory(stage, config, records, Run())

@@ -23,7 +23,7 @@ from paramreduce_cli.cli.options import (
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, show_progress, warn_user
-from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
@@ -57,7 +57,7 @@ def stage_command(name: str) -> click.Command:
         loaded = load_config(config, overrides) if config is not None and robot else None
         settings = None if loaded is not None else load_settings(config, overrides)
         store = results_store(loaded, results)
-        placed = placed_errors(config, overrides)
+        placed = locate_errors(config, overrides)
         lock = "" if part is None else f"-{stage.name}-{part.number}-{part.count}"
         with placed, store.locked(lock, wait=wait), show_progress(stage.name, quiet) as progress:
             if loaded is not None:

@@ -173,10 +173,10 @@ def _misspelt_robot(word: str, words: list[str]) -> list[str] | None:
 
 def _example_meant(word: str) -> str:
     """Return the call that copies the example of a robot's name; empty where there is none."""
-    from paramreduce_cli.config.examples import examples  # late: it loads much
+    from paramreduce_cli.config.examples import list_examples  # late: it loads much
 
     name = Path(word).name.removesuffix(".yaml")
-    return _typed(["init", "--example", name]) if name in examples() else ""
+    return _typed(["init", "--example", name]) if name in list_examples() else ""
 
 
 def _corrected(error: ParamreduceError, words: list[str]) -> list[str] | None:

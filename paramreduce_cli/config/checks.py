@@ -1,4 +1,4 @@
-"""What the parts of a config must say about each other."""
+"""Checks of the parts of a config against each other."""
 
 from collections.abc import Callable, Iterator
 
@@ -23,29 +23,29 @@ _FEWEST_STEPS, _MOST_STEPS = 10, 1_000_000
 Check = Callable[[Config], Iterator[Problem]]
 
 
-def check(config: Config) -> list[Problem]:
-    """All problems between the parts of a config that is valid part by part."""
-    tree = [*_bodies(config), *_payloads_and_drives(config)]
+def find_problems(config: Config) -> list[Problem]:
+    """Return all contradictions between the parts of a config, each part of which is valid by itself."""
+    tree = [*_check_bodies(config), *_check_payloads_and_drives(config)]
     if tree:
         return tree
     return [problem for one in _CHECKS for problem in one(config)]
 
 
 def find_warnings(config: Config) -> list[str]:
-    """What is odd in a config that can be used: what cannot be, values that are not known, units that may be others."""
+    """Return sentences on odd values of a usable config: impossible bodies, unknown values, likely wrong units."""
     kinds = (
-        _odd_bodies,
+        _warn_of_bodies,
         find_implausible_bodies,
         find_implausible_gravity,
-        _odd_drives,
-        _odd_limits,
+        _warn_of_drives,
+        _warn_of_limits,
         find_implausible_speeds,
-        _odd_terms,
+        _warn_of_terms,
     )
     return [f"{text}; going on" for one in kinds for text in one(config)]
 
 
-def _bodies(config: Config) -> Iterator[Problem]:
+def _check_bodies(config: Config) -> Iterator[Problem]:
     bodies = config.description.bodies
     path: Key = ("description", config.description.way, bodies.ROWS)
     names = bodies.list_body_names()
@@ -64,7 +64,7 @@ def _bodies(config: Config) -> Iterator[Problem]:
         seen.add(name)
 
 
-def _payloads_and_drives(config: Config) -> Iterator[Problem]:
+def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
     bodies = config.description.bodies
     for key, message in payloads.find_payload_problems(config.payloads, bodies.list_body_names()):
         yield ("payloads", *key), message
@@ -72,7 +72,7 @@ def _payloads_and_drives(config: Config) -> Iterator[Problem]:
         yield ("drives", *key), message
 
 
-def _tracking(config: Config) -> Iterator[Problem]:
+def _check_tracking(config: Config) -> Iterator[Problem]:
     if config.report.tracking is not None and config.unmeasured:
         yield ("report", "tracking"), "needs the torques of all joints; leave it out"
     if config.report.tracking is not None and config.description.bodies.closed:
@@ -82,12 +82,12 @@ def _tracking(config: Config) -> Iterator[Problem]:
         )
 
 
-def _description(config: Config) -> Iterator[Problem]:
+def _check_description(config: Config) -> Iterator[Problem]:
     for key, message in config.description.bodies.find_problems():
         yield ("description", config.description.way, *key), message
 
 
-def _constraints(config: Config) -> Iterator[Problem]:
+def _check_constraints(config: Config) -> Iterator[Problem]:
     description = config.description
     bodies = ["base", *description.bodies.list_body_names()]
     coordinates = description.bodies.list_coordinates()
@@ -113,12 +113,12 @@ def _constraints(config: Config) -> Iterator[Problem]:
             yield (*path, "quantity"), "singularity is of loops, but there is no closure"
 
 
-def _known_parameters(config: Config) -> list[str]:
+def _list_parameters(config: Config) -> list[str]:
     return [parameter.name for parameter in config.list_parameters()]
 
 
-def _groups(config: Config) -> Iterator[Problem]:
-    known = _known_parameters(config)
+def _check_groups(config: Config) -> Iterator[Problem]:
+    known = _list_parameters(config)
     owner: dict[str, str] = {}
     for k, entry in enumerate(config.reduction.groups):
         path: Key = ("reduction", "groups", k)
@@ -133,7 +133,7 @@ def _groups(config: Config) -> Iterator[Problem]:
         for j, name in enumerate(entry.parameters or []):
             if name not in known:
                 yield (*path, "parameters", j), UnknownNameError("parameter", name, known)
-        for group, members in entry.groups().items():
+        for group, members in entry.list_groups().items():
             if group in known or group in owner.values():
                 yield (*path, "name"), f"the name {group!r} is taken"
             for j, name in enumerate(members):
@@ -144,7 +144,7 @@ def _groups(config: Config) -> Iterator[Problem]:
             owner |= dict.fromkeys(members, group)
 
 
-def _symmetries(config: Config) -> Iterator[Problem]:
+def _check_symmetries(config: Config) -> Iterator[Problem]:
     names = config.description.bodies.list_independent_coordinates()
     for k, images in enumerate(config.sampling.symmetries):
         if sorted(name.removeprefix("-") for name in images) != sorted(names):
@@ -156,7 +156,7 @@ def _symmetries(config: Config) -> Iterator[Problem]:
         yield ("sampling", "symmetries"), "complete trajectories, not recordings; leave them out"
 
 
-def _simulation(config: Config) -> Iterator[Problem]:
+def _check_simulation(config: Config) -> Iterator[Problem]:
     wanted = config.sampling.simulation
     if wanted is None:
         return
@@ -177,16 +177,16 @@ def _simulation(config: Config) -> Iterator[Problem]:
         if Kind.COULOMB in drive.get_values() and not drive.smoothing:
             yield ("drives",), f"{name} needs a smoothing: a sign that jumps cannot be simulated"
     sampling = config.sampling
-    if any(sampling.files().values()) or sampling.symmetries:
+    if any(sampling.list_recordings().values()) or sampling.symmetries:
         yield path, "makes all sets; leave out files and symmetries"
 
 
-def _massless(config: Config) -> Iterator[Problem]:
+def _check_inertia(config: Config) -> Iterator[Problem]:
     if not config.description.bodies.list_inertial_bodies():
         yield ("description", "tree", "bodies"), "are all massless, so that there is no parameter"
 
 
-def _parameter_sets(config: Config) -> Iterator[Problem]:
+def _check_parameter_sets(config: Config) -> Iterator[Problem]:
     names = config.description.bodies.list_inertial_bodies()
     for label, bodies in config.parameter_sets.items():
         for body in bodies:
@@ -205,14 +205,14 @@ def _parameter_sets(config: Config) -> Iterator[Problem]:
         )
 
 
-def _per_joint(config: Config) -> Iterator[Problem]:
+def _check_per_joint(config: Config) -> Iterator[Problem]:
     n = config.n_dof
     for path, unit in PER_JOINT.items():
         values = read_per_joint(config, path)
         if isinstance(values, list) and len(values) not in (1, n):
             yield (
                 path,
-                f"has {len(values)} values, but {config.robot} has {n} {_what_moves(config)}. Give "
+                f"has {len(values)} values, but {config.robot} has {n} {_name_coordinates(config)}. Give "
                 f"one for each, or one for all, in {unit}",
             )
     for k, pose in enumerate(config.report.poses or []):
@@ -220,11 +220,11 @@ def _per_joint(config: Config) -> Iterator[Problem]:
             yield ("report", "poses", k), f"has {len(pose)} values, but there are {n} joints"
 
 
-def _what_moves(config: Config) -> str:
+def _name_coordinates(config: Config) -> str:
     return "independent coordinates" if config.description.bodies.closed else "joints"
 
 
-def _limits(config: Config) -> Iterator[Problem]:
+def _check_limits(config: Config) -> Iterator[Problem]:
     for k, (lower, upper) in enumerate(config.trajectories.position_limits):
         path: Key = ("trajectories", "position_limits")
         if len(config.trajectories.position_limits) > 1:
@@ -251,8 +251,8 @@ def _limits(config: Config) -> Iterator[Problem]:
         yield ("trajectories", "polished"), f"is {t.polished}, but there are {t.starts} starts"
 
 
-def _acceptance(config: Config) -> Iterator[Problem]:
-    """Limits of errors on a test set where there will be none."""
+def _check_acceptance(config: Config) -> Iterator[Problem]:
+    """Yield limits of errors on a test set if the config leads to no test set."""
     sampling, motions = config.sampling, config.trajectories
     if sampling.test_file is not None:
         return
@@ -271,7 +271,7 @@ def _acceptance(config: Config) -> Iterator[Problem]:
             yield ("validation", "accept", name), f"is on a test set, but there is none; {instead}"
 
 
-def _unmeasured(config: Config) -> Iterator[Problem]:
+def _check_unmeasured(config: Config) -> Iterator[Problem]:
     names = config.description.bodies.list_independent_coordinates()
     for k, name in enumerate(config.unmeasured):
         if name not in names:
@@ -290,8 +290,8 @@ def _unmeasured(config: Config) -> Iterator[Problem]:
         yield ("unmeasured",), "leaves no torque to explain; leave out what is measured"
 
 
-def _parameter_names(config: Config) -> Iterator[Problem]:
-    known = _known_parameters(config)
+def _check_base_columns(config: Config) -> Iterator[Problem]:
+    known = _list_parameters(config)
     for k, name in enumerate(config.model.base_columns or []):
         if name not in known:
             yield ("model", "base_columns", k), UnknownNameError("parameter", name, known)
@@ -299,7 +299,7 @@ def _parameter_names(config: Config) -> Iterator[Problem]:
             yield ("model", "base_columns", k), f"{name} stands there twice"
 
 
-def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
+def _check_selection(config: Config) -> Iterator[Problem]:
     total = len(config.list_parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:
@@ -325,25 +325,25 @@ def _numbers_of_parameters(config: Config) -> Iterator[Problem]:
 
 
 _CHECKS: tuple[Check, ...] = (
-    _description,
-    _tracking,
-    _constraints,
-    _groups,
-    _symmetries,
-    _simulation,
-    _massless,
-    _parameter_sets,
-    _per_joint,
-    _limits,
-    _acceptance,
-    _unmeasured,
-    _parameter_names,
-    _numbers_of_parameters,
+    _check_description,
+    _check_tracking,
+    _check_constraints,
+    _check_groups,
+    _check_symmetries,
+    _check_simulation,
+    _check_inertia,
+    _check_parameter_sets,
+    _check_per_joint,
+    _check_limits,
+    _check_acceptance,
+    _check_unmeasured,
+    _check_base_columns,
+    _check_selection,
 )
 
 
-def _odd_bodies(config: Config) -> Iterator[str]:
-    """Bodies that cannot exist; reduced sets are not physical either, so that is no error."""
+def _warn_of_bodies(config: Config) -> Iterator[str]:
+    """Yield bodies that cannot exist; reduced sets are not physical either, so this is no error."""
     for name, body in config.get_body_parameters().items():
         if body.m < 0:
             yield f"body {name} has the negative mass {body.m:g} kg"
@@ -356,16 +356,16 @@ def _odd_bodies(config: Config) -> Iterator[str]:
             )
 
 
-def _odd_limits(config: Config) -> Iterator[str]:
-    """Positions that hardly any joint reaches."""
+def _warn_of_limits(config: Config) -> Iterator[str]:
+    """Yield positions that hardly any joint reaches."""
     for lower, upper in config.trajectories.position_limits:
         if max(abs(lower), abs(upper)) > RATHER_DEGREES:
             yield f"trajectories.position_limits of [{lower:g}, {upper:g}] are in rad (m), not degrees"
             return
 
 
-def _odd_terms(config: Config) -> Iterator[str]:
-    """A budget that nothing has to keep to."""
+def _warn_of_terms(config: Config) -> Iterator[str]:
+    """Yield budgets that restrict nothing."""
     terms = config.terms
     if (
         terms is not None
@@ -375,8 +375,8 @@ def _odd_terms(config: Config) -> Iterator[str]:
         yield "terms.acceleration_error is of the direct dynamics, which is not under terms.functions"
 
 
-def _odd_drives(config: Config) -> Iterator[str]:
-    """Values that are not known, and what cannot be."""
+def _warn_of_drives(config: Config) -> Iterator[str]:
+    """Yield drives with unknown or impossible values."""
     sampling = config.sampling
     missing = {name: drive.list_unknown() for name, drive in config.list_drives().items()}
     found = [f"{' and '.join(keys)} of {name}" for name, keys in missing.items() if keys]

@@ -1,4 +1,4 @@
-"""Distances that bodies must keep from each other and from planes, as a config gives them."""
+"""Clearances in a config: distances that bodies keep from each other and from planes."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _KEY = ("trajectories", "clearance")
 
 
 class CapsuleSection(Section):
-    """All that is within a radius of a line between two points of a body's frame."""
+    """A capsule: all points within a radius of a line between two points of a body's frame."""
 
     start: Triple = [0, 0, 0]
     """One end, m."""
@@ -42,7 +42,10 @@ class PlaneSection(Section):
 
 
 class ClearanceSection(Section):
-    """Distances that bodies keep from each other and from planes; every body is a capsule from its own joint to the next one, unless it is given otherwise."""
+    """A demand that bodies keep distances from each other and from planes.
+
+    By default every body is a capsule from its own joint to the next.
+    """
 
     radius: Positive = 0.06
     """Of capsules that are not given, m."""
@@ -57,17 +60,17 @@ class ClearanceSection(Section):
     planes: list[PlaneSection] = []
     """That bodies stay above; the base and those that the first joint carries are not looked at."""
 
-    def constraints(self, mechanism: Mechanism) -> Iterator[Constraint]:
-        """One for each pair of bodies, and for each body and plane.
+    def build_constraints(self, mechanism: Mechanism) -> Iterator[Constraint]:
+        """Yield a constraint for each pair of bodies, and for each body and plane.
 
         Raises:
             ConfigError: Bodies are named that there are not.
         """
-        spheres = self._spheres(mechanism)
+        spheres = self._cover_bodies(mechanism)
         ignored = {frozenset(pair) for pair in self.ignore}
         names = {BASE: BASE_NAME} | {k: body.name for k, body in enumerate(mechanism.bodies)}
         for a, b in combinations(spheres, 2):
-            near = _joints_between(mechanism, a, b) < self.apart
+            near = _count_joints_between(mechanism, a, b) < self.apart
             if near or frozenset((names[a], names[b])) in ignored:
                 continue
             (points_a, radii_a), (points_b, radii_b) = spheres[a], spheres[b]
@@ -79,14 +82,14 @@ class ClearanceSection(Section):
             normal = np.array(plane.normal, dtype=float)
             frame = np.vstack([plane.point, normal / np.linalg.norm(normal)])
             for body, (points, radii) in spheres.items():
-                if _joints_between(mechanism, BASE, body) > 1:
+                if _count_joints_between(mechanism, BASE, body) > 1:
                     yield Constraint(
                         name=f"{names[body]}-{plane.name}", kind="above-plane", bodies=(body, BASE),
                         vectors=(points, radii, frame), lower=self.gap, upper=np.inf,
                     )  # fmt: skip
 
-    def _spheres(self, mechanism: Mechanism) -> dict[int, tuple[FloatArray, FloatArray]]:
-        """Centres (k, 3) and radii (k,) of spheres that cover the capsules of each body."""
+    def _cover_bodies(self, mechanism: Mechanism) -> dict[int, tuple[FloatArray, FloatArray]]:
+        """Return centres (k, 3) and radii (k,) of spheres that cover the capsules of each body."""
         numbers = {body.name: k for k, body in enumerate(mechanism.bodies)} | {BASE_NAME: BASE}
         named = [*self.capsules, *(name for pair in self.ignore for name in pair)]
         for name in named:
@@ -95,23 +98,25 @@ class ClearanceSection(Section):
         found = {}
         for name, body in sorted(numbers.items(), key=lambda item: item[1]):
             given = self.capsules.get(name)
-            capsules = self._usual(mechanism, body) if given is None else given
-            covers = [_covered(np.array([c.start, c.end], dtype=float), c.radius) for c in capsules]
+            capsules = self._build_default_capsules(mechanism, body) if given is None else given
+            covers = [
+                _cover_capsule(np.array([c.start, c.end], dtype=float), c.radius) for c in capsules
+            ]
             if covers:
                 points, radii = zip(*covers, strict=True)
                 found[body] = (np.vstack(points), np.concatenate(radii))
         return found
 
-    def _usual(self, mechanism: Mechanism, body: int) -> list[CapsuleSection]:
-        """From a body's joint to those that it carries."""
+    def _build_default_capsules(self, mechanism: Mechanism, body: int) -> list[CapsuleSection]:
+        """Return capsules from a body's joint to the joints that the body carries."""
         ends = [other.parent_to_joint[:3, 3] for other in mechanism.bodies if other.parent == body]
         if not ends and body != BASE:
             ends = [np.zeros(3)]
         return [CapsuleSection(end=end.tolist(), radius=self.radius) for end in ends]
 
 
-def _covered(ends: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
-    """Spheres that cover a capsule: a radius apart, and so much larger that nothing shows between."""
+def _cover_capsule(ends: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
+    """Return spheres that cover a capsule, a radius apart and slightly larger, so that nothing shows between them."""
     length = float(np.linalg.norm(ends[1] - ends[0]))
     count = int(np.ceil(length / radius)) + 1
     half = length / max(1, count - 1) / 2
@@ -119,14 +124,14 @@ def _covered(ends: FloatArray, radius: float) -> tuple[FloatArray, FloatArray]:
     return points, np.full(count, float(np.hypot(radius, half)))
 
 
-def _joints_between(mechanism: Mechanism, a: int, b: int) -> int:
-    """On the way through the tree from one body to another."""
-    way_a, way_b = (_to_base(mechanism, body) for body in (a, b))
+def _count_joints_between(mechanism: Mechanism, a: int, b: int) -> int:
+    """Return the number of joints on the path through the tree from one body to another."""
+    way_a, way_b = (_list_path_to_base(mechanism, body) for body in (a, b))
     common = len(set(way_a) & set(way_b))
     return len(way_a) + len(way_b) - 2 * common
 
 
-def _to_base(mechanism: Mechanism, body: int) -> list[int]:
+def _list_path_to_base(mechanism: Mechanism, body: int) -> list[int]:
     way = []
     while body != BASE:
         way.append(body)

@@ -1,4 +1,4 @@
-"""Columns of a recording, matched with the joints of a robot by their usual names."""
+"""Matching of a recording's columns to the joints of a robot by their names."""
 
 import itertools
 import re
@@ -42,14 +42,16 @@ def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str 
     Raises:
         ConfigError: Time, positions or torques have no usual name, or several columns fit one joint.
     """
-    times = [name for name in names if _plain(name) in _TIMES]
-    times += [name for name in names if _plain(name.rpartition("/")[2]) in _TIMES]
+    times = [name for name in names if _normalise(name) in _TIMES]
+    times += [name for name in names if _normalise(name.rpartition("/")[2]) in _TIMES]
     found: dict[str, str | list[str]] = {}
     for key, words in _WORDS.items():
-        columns = _numbered(names, words, len(joints)) or match_joint_names(names, words, joints)
+        columns = _match_numbered(names, words, len(joints)) or match_joint_names(
+            names, words, joints
+        )
         if columns is not None:
             found[key] = columns
-    more = _more_joints(names, len(joints))
+    more = _count_surplus_joints(names, len(joints))
     if more and not match_joint_names(names, _WORDS["position"], joints):
         raise ConfigError(
             f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}): is "
@@ -59,17 +61,17 @@ def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str 
     if missing:
         raise ConfigError(
             f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by "
-            f"any usual name among {', '.join(names[:30])}. {_remedy(names, joints)}"
+            f"any usual name among {', '.join(names[:30])}. {_suggest_locking(names, joints)}"
         )
-    return {"time": _time_of(times, found["position"]), **found}
+    return {"time": _choose_time(times, found["position"]), **found}
 
 
-def joints_by_name(names: Sequence[str]) -> list[str]:
-    """Joints whose positions stand in columns of their names, such as ``/joint_states/position/elbow``."""
+def list_named_joints(names: Sequence[str]) -> list[str]:
+    """Return the joints whose positions are in columns of their names, such as ``/joint_states/position/elbow``."""
     words = _WORDS["position"]
     found: dict[str, None] = {}
     for name in names:
-        parts = _segments(name)
+        parts = _split_name(name)
         others = [part for part in parts if part.lower() not in words]
         before, _, last = name.rpartition("_")
         if others and len(others) < len(parts):
@@ -79,51 +81,51 @@ def joints_by_name(names: Sequence[str]) -> list[str]:
     return list(found)
 
 
-def _more_joints(names: Sequence[str], n: int) -> int:
-    """How many joints the numbered columns are of, if more than n; else zero."""
+def _count_surplus_joints(names: Sequence[str], n: int) -> int:
+    """Return the number of joints that the numbered columns have, if there are more than n, else zero."""
     most = n
-    while all(_numbered(names, _WORDS[key], most + 1) is not None for key in _NEEDED):
+    while all(_match_numbered(names, _WORDS[key], most + 1) is not None for key in _NEEDED):
         most += 1
     return most if most > n else 0
 
 
-def _remedy(names: Sequence[str], joints: Sequence[str]) -> str:
-    """What to do about joints without columns: to lock those after the ones that the log has, if it has any."""
+def _suggest_locking(names: Sequence[str], joints: Sequence[str]) -> str:
+    """Return what to do about joints without columns: lock those beyond the joints that the log has."""
     by_hand = "Write sampling.log.columns by hand"
-    most = [_joints_counted(names, _WORDS[key], len(joints)) for key in _NEEDED]
+    most = [_count_joints(names, _WORDS[key], len(joints)) for key in _NEEDED]
     if 0 < min(most) == max(most) < len(joints):
         locks = " ".join(f"--lock {joint}=0" for joint in joints[most[0] :][:_MOST_JOINTS])
         return f"The log has {most[0]} joints: if the others stood still, try {locks}. Or: {by_hand[0].lower()}{by_hand[1:]}."
     return f"{by_hand}; joints that the log does not have are locked by init's --lock JOINT=VALUE."
 
 
-def _joints_counted(names: Sequence[str], words: Sequence[str], n: int) -> int:
-    """How many joints the numbered columns are of, n at most."""
-    return next((k for k in range(n, 0, -1) if _numbered(names, words, k) is not None), 0)
+def _count_joints(names: Sequence[str], words: Sequence[str], n: int) -> int:
+    """Return the number of joints that the numbered columns have, n at most."""
+    return next((k for k in range(n, 0, -1) if _match_numbered(names, words, k) is not None), 0)
 
 
-def _time_of(times: Sequence[str], positions: str | list[str]) -> str:
-    """The time that stands with the positions: of the same topic or group."""
+def _choose_time(times: Sequence[str], positions: str | list[str]) -> str:
+    """Return the time column of the same topic or group as the positions."""
     name = positions if isinstance(positions, str) else positions[0]
-    return max(times, key=lambda time: _alike(time, name))
+    return max(times, key=lambda time: _count_common_characters(time, name))
 
 
-def _alike(one: str, other: str) -> int:
-    """Characters with which both begin."""
+def _count_common_characters(one: str, other: str) -> int:
+    """Return the number of leading characters that two names share."""
     pairs = zip(one, other, strict=False)
     return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
-def _plain(name: str) -> str:
+def _normalise(name: str) -> str:
     return name.strip().strip("/").lower()
 
 
-def _numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
-    """A pattern where joints count from 1, a list where from 0; None if there are none."""
+def _match_numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[str] | None:
+    """Return a pattern if joints count from 1, a list if they count from 0, None if no columns fit."""
     known = set(names)
     stems = {match[1] for name in names if (match := re.fullmatch(r"(.*?)\[?(\d+)\]?", name))}
-    for stem in sorted(stems, key=lambda stem: (_rank(stem, words), stem)):
-        if _rank(stem, words) == _UNLIKE:
+    for stem in sorted(stems, key=lambda stem: (_rank_stem(stem, words), stem)):
+        if _rank_stem(stem, words) == _UNLIKE:
             continue
         for form in (f"{stem}{NUMBER}", f"{stem}[{NUMBER}]"):
             if all(form.replace(NUMBER, str(j + 1)) in known for j in range(n)):
@@ -137,9 +139,9 @@ def _numbered(names: Sequence[str], words: Sequence[str], n: int) -> str | list[
 _UNLIKE = 1000
 
 
-def _rank(stem: str, words: Sequence[str]) -> int:
-    """How likely a stem is one of the words: the earlier the word, the likelier; what was asked for comes last."""
-    word = _plain(re.split(r"[/.]", stem.rstrip("_./"))[-1])
+def _rank_stem(stem: str, words: Sequence[str]) -> int:
+    """Return how likely a stem is one of the words: earlier words are likelier, and commanded values come last."""
+    word = _normalise(re.split(r"[/.]", stem.rstrip("_./"))[-1])
     for k, known in enumerate(words):
         if word == known or (len(known) > 2 and word.endswith(f"_{known}")):
             return k + len(words) * any(part in word for part in _WANTED_ONLY)
@@ -165,10 +167,10 @@ def match_joint_names(
     Raises:
         ConfigError: Several columns fit one joint equally well.
     """
-    exact = {joint: _likeliest(_exact(names, words, joint), words) for joint in joints}
+    exact = {joint: _keep_likeliest(_match_exactly(names, words, joint), words) for joint in joints}
     taken = {name for found in exact.values() for name in found}
     partial = {
-        joint: exact[joint] or _likeliest(_partial(names, words, joint, taken), words)
+        joint: exact[joint] or _keep_likeliest(_match_partly(names, words, joint, taken), words)
         for joint in joints
     }
     if not all(partial.values()):
@@ -191,12 +193,12 @@ def _check_unambiguous(found: Mapping[str, Sequence[str]]) -> None:
             )
 
 
-def _exact(names: Sequence[str], words: Collection[str], joint: str) -> list[str]:
-    """Columns in which the whole name of a joint stands beside a word of the quantity."""
+def _match_exactly(names: Sequence[str], words: Collection[str], joint: str) -> list[str]:
+    """Return the columns with a joint's whole name beside a word of the quantity."""
     joined = {text for word in words for text in (f"{joint}_{word}", f"{word}_{joint}")}
     found = []
     for name in names:
-        segments = _segments(name)
+        segments = _split_name(name)
         others = {segment.lower().strip("_") for segment in segments if segment != joint}
         whole = joint in segments and not others.isdisjoint(words)
         if whole or any(segment in joined for segment in segments):
@@ -204,28 +206,28 @@ def _exact(names: Sequence[str], words: Collection[str], joint: str) -> list[str
     return found
 
 
-def _partial(
+def _match_partly(
     names: Sequence[str], words: Collection[str], joint: str, taken: Collection[str]
 ) -> list[str]:
-    """Columns in which a joint's name is part of a longer one, beside a word of the quantity."""
+    """Return the columns with a joint's name as part of a longer name, beside a word of the quantity."""
     pattern = re.compile(rf"(?<![A-Za-z0-9]){re.escape(joint)}(?![A-Za-z0-9])")
     found = []
     for name in names:
         if name in taken or not pattern.search(name):
             continue
-        rest = [part.lower() for part in _segments(pattern.sub("", name))]
+        rest = [part.lower() for part in _split_name(pattern.sub("", name))]
         tokens = {token for part in rest for token in part.split("_") if len(token) > _SHORT}
         if not (tokens | {part.strip("_") for part in rest}).isdisjoint(words):
             found.append(name)
     return found
 
 
-def _likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
-    """Keep the columns with the likeliest word; what was asked for counts where nothing was measured."""
+def _keep_likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
+    """Keep the columns with the likeliest word; commanded values count if nothing was measured."""
 
     def rank(name: str) -> int:
         tokens = {part.lower() for part in re.split(r"[/._]", name)}
-        whole = {part.lower().strip("_") for part in _segments(name)} | tokens
+        whole = {part.lower().strip("_") for part in _split_name(name)} | tokens
         first = min((k for k, word in enumerate(words) if word in whole), default=len(words))
         return first + len(words) * (not tokens.isdisjoint(_WANTED_ONLY))
 
@@ -233,5 +235,5 @@ def _likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
     return [name for name, place in zip(found, ranks, strict=True) if place == min(ranks)]
 
 
-def _segments(name: str) -> list[str]:
+def _split_name(name: str) -> list[str]:
     return [part for part in re.split(r"[/.]", name) if part]

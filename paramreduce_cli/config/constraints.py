@@ -1,4 +1,4 @@
-"""Bounds on quantities of a mechanism, as a config gives them."""
+"""Constraints in a config: bounds on quantities of a mechanism."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _QUANTITY_KEYS = {
 
 
 class ConstraintSection(Section):
-    """Bounds on a quantity of the mechanism."""
+    """A constraint: bounds on a quantity of the mechanism."""
 
     name: Name
     """Name for messages and tables."""
@@ -53,7 +53,8 @@ class ConstraintSection(Section):
     """Direction of the axis in that body's frame."""
 
     @model_validator(mode="after")
-    def _complete(self) -> ConstraintSection:
+    def _check_keys(self) -> ConstraintSection:
+        """Raise ValueError if keys are missing, or do not belong to the quantity."""
         needed, possible = _QUANTITY_KEYS[self.quantity]
         given = self.model_fields_set - {"name", "quantity", "min", "max"}
         if missing := needed - given:
@@ -73,8 +74,8 @@ class ConstraintSection(Section):
             raise ValueError("distance to singularity takes a min between 0 and 1 and no max")
         return self
 
-    def constraint(self, mechanism: Mechanism) -> Constraint:
-        """The bounds as a record."""
+    def build_constraint(self, mechanism: Mechanism) -> Constraint:
+        """Return the constraint as a record."""
         bodies = {body.name: k for k, body in enumerate(mechanism.bodies)} | {"base": BASE}
         owners: list[int] = []
         vectors: list[list[float]] = []

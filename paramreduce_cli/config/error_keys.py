@@ -1,4 +1,4 @@
-"""Which key of a config a numerical error is about, and what can be done there."""
+"""Keys of the config that numerical errors are about, with remedies."""
 
 from paramreduce_cli.errors import Cause, ConfigError, Key, NumericalError
 
@@ -35,7 +35,7 @@ _KEYS: dict[Cause, tuple[Key, str]] = {
 }
 
 
-def name_key(error: NumericalError) -> ConfigError:
-    """A numerical error as one about a key, with the remedy that the key offers."""
+def locate_error(error: NumericalError) -> ConfigError:
+    """Return a numerical error as an error of a config key, with the remedy that the key offers."""
     key, remedy = _KEYS[error.cause]
     return ConfigError(str(error), key, remedy=remedy)

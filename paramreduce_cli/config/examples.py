@@ -1,4 +1,4 @@
-"""The configs that come along: beside the package in its repository, or as data of its distribution."""
+"""Example configs: from the repository of the package, or from the data of its distribution."""
 
 import difflib
 import importlib.metadata
@@ -14,8 +14,8 @@ _LIKE = 0.5
 _INSTALLED = "share/paramreduce/configs/"
 
 
-def examples() -> dict[str, Path]:
-    """Files of the robots that come along, by name."""
+def list_examples() -> dict[str, Path]:
+    """Return the files of all example robots by name."""
     beside = Path(__file__).parents[2] / "configs"
     if (beside.parent / "pyproject.toml").exists():
         files = list(beside.glob("*.yaml"))
@@ -26,11 +26,11 @@ def examples() -> dict[str, Path]:
     return {path.stem: path for path in sorted(files)}
 
 
-def exists_already(path: Path, config: Path | None = None) -> ConfigError:
-    """Return the error that a command would replace a file, with a path for the config that is free.
+def make_exists_error(path: Path, config: Path | None = None) -> ConfigError:
+    """Return the error that a command would overwrite a file, with a free path for the config.
 
     Args:
-        path: File that would be replaced.
+        path: File that would be overwritten.
         config: Config that comes with this file, and would have to be in another folder; None if it is the file.
     """
     numbers = range(2, 1000)
@@ -59,7 +59,7 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     Raises:
         ConfigError: There is no such robot, or a file is there already.
     """
-    known = examples()
+    known = list_examples()
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1, cutoff=_LIKE)
         raise ConfigError(
@@ -72,7 +72,7 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     pairs = [(source, path), *((source.parent / e, path.parent / e) for e in inside)]
     taken = [new for old, new in pairs if new.exists() and new.read_bytes() != old.read_bytes()]
     if taken:
-        raise exists_already(taken[0], None if taken[0] == path else path)
+        raise make_exists_error(taken[0], None if taken[0] == path else path)
     try:
         for original, target in pairs:
             target.parent.mkdir(parents=True, exist_ok=True)

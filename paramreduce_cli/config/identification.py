@@ -1,4 +1,4 @@
-"""What a config says of values that are to be found from measured torques."""
+"""Settings of the identification from measured torques."""
 
 from typing import Literal
 
@@ -6,7 +6,7 @@ from paramreduce_cli.fields.section import Section
 
 
 class IdentificationSection(Section):
-    """How values are found from measured torques."""
+    """The settings for identifying parameters from measured torques."""
 
     estimator: Literal["ordinary", "weighted", "robust"] = "weighted"
     """Least squares: plain; each joint weighted by the noise of its residuals; or besides with less weight for outliers (Huber)."""

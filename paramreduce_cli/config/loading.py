@@ -1,4 +1,4 @@
-"""From a YAML file to a Config, with every error of the file reported at once."""
+"""Loading of a YAML file as a Config, with all of its errors reported at once."""
 
 import copy
 import difflib
@@ -14,12 +14,12 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from paramreduce_cli.config import reading
-from paramreduce_cli.config.checks import check, find_warnings
+from paramreduce_cli.config.checks import find_problems, find_warnings
 from paramreduce_cli.config.cutting import cut_to_independent
 from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
-from paramreduce_cli.config.sections import keys_named
+from paramreduce_cli.config.sections import find_keys
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, prepend_key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import read_constants
@@ -42,17 +42,21 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         ConfigError: With all that is wrong, one problem a line: file, line, key, what is wrong
             and what would be right.
     """
-    document = _read(path)
+    document = _read_document(path)
     if not isinstance(document.data, dict):
-        raise _no_mapping(path)
+        raise _make_no_mapping_error(path)
     for text in overrides:
         try:
             reading.apply_override(document, text)
         except ValueError as error:
             raise ConfigError(str(error)) from error
-    config, problems = _validate(document.data)
+    config, problems = _find_all_problems(document.data)
     lines = [f"{document.source}, line {line}: {message}." for line, message in document.problems]
-    lines += [_line(document, problem) for problem in problems if problem[0] not in document.unread]
+    lines += [
+        _format_problem(document, problem)
+        for problem in problems
+        if problem[0] not in document.unread
+    ]
     if lines or config is None:
         lines, remedy = list(dict.fromkeys(lines)), ""
         if "description" not in document.data:
@@ -60,7 +64,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         more = len(lines) - _MOST_PROBLEMS
         if more > 0:
             lines[_MOST_PROBLEMS:] = [f"{path}: and {more} more problems like these."]
-        rejected, choices = _correction(document, problems) if len(lines) == 1 else ("", [])
+        rejected, choices = _correct_setting(document, problems) if len(lines) == 1 else ("", [])
         raise ConfigError(
             "\n".join(lines),
             rejected=rejected, choices=choices, remedy=remedy,
@@ -68,7 +72,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         )  # fmt: skip
     for text in find_warnings(config):
         warnings.warn(text, ParamreduceWarning, stacklevel=2)
-    return _with_paths(_without_unused_tests(config), path.parent)
+    return _resolve_paths(_drop_unused_tests(config), path.parent)
 
 
 def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
@@ -81,13 +85,13 @@ def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
     Raises:
         ConfigError: As for :func:`load_config`.
     """
-    document = reading.read_yaml("{}", "settings") if path is None else _read(path)
+    document = reading.read_yaml("{}", "settings") if path is None else _read_document(path)
     try:
         for text in overrides if isinstance(document.data, dict) else ():
             reading.apply_override(document, text)
     except ValueError as error:
         raise ConfigError(str(error)) from error
-    return _validated(document, Settings)
+    return _validate_section(document, Settings)
 
 
 def load_section(path: Path, kind: type[S]) -> S:
@@ -100,10 +104,11 @@ def load_section(path: Path, kind: type[S]) -> S:
     Raises:
         ConfigError: As for :func:`load_config`.
     """
-    return _validated(_read(path), kind)
+    return _validate_section(_read_document(path), kind)
 
 
-def _validated(document: Document, kind: type[S]) -> S:
+def _validate_section(document: Document, kind: type[S]) -> S:
+    """Return a document as a section, or raise ConfigError with all problems."""
     if not isinstance(document.data, dict):
         raise ConfigError(
             f"{document.source}: must be a mapping of {', '.join(kind.model_fields)}."
@@ -114,19 +119,21 @@ def _validated(document: Document, kind: type[S]) -> S:
     try:
         return kind.model_validate(document.data, context={"constants": {}})
     except ValidationError as error:
-        problems = _one_per_key([_describe(entry, document.data, kind) for entry in error.errors()])
-        lines = [_line(document, problem) for problem in problems]
+        problems = _merge_by_key(
+            [_describe_entry(entry, document.data, kind) for entry in error.errors()]
+        )
+        lines = [_format_problem(document, problem) for problem in problems]
         raise ConfigError("\n".join(dict.fromkeys(lines))) from error
 
 
 def has_robot(path: Path) -> bool:
-    """Whether a YAML describes a robot, or holds settings alone; one that is no mapping is to be a robot's."""
-    data = _read(path).data
+    """Return whether a YAML file describes a robot; files that are no mapping count as a robot's."""
+    data = _read_document(path).data
     return not isinstance(data, dict) or not set(data) <= set(Settings.model_fields)
 
 
 @contextmanager
-def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[None]:
+def locate_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[None]:
     """Add file and line to errors of later work that are about a key of the config.
 
     Args:
@@ -138,24 +145,25 @@ def placed_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
     except ConfigError as error:
         if path is None or not error.key:
             raise
-        document = _read(path)
+        document = _read_document(path)
         for text in overrides:
             reading.apply_override(document, text)
-        error.place = document.place(error.key)
+        error.place = document.describe_place(error.key)
         error.in_file = error.place.startswith(f"{document.source}, line ")
         raise
 
 
-def config_schema() -> dict[str, Any]:
-    """The JSON Schema of a config, for editors."""
+def get_schema() -> dict[str, Any]:
+    """Return the JSON Schema of a config, for editors."""
     return Config.model_json_schema()
 
 
-def _read(path: Path) -> Document:
+def _read_document(path: Path) -> Document:
+    """Return the document in a file, or raise ConfigError if it cannot be read."""
     try:
         text = path.read_text(encoding="utf-8")
     except FileNotFoundError as error:
-        raise _missing(path) from error
+        raise _make_missing_error(path) from error
     except (OSError, UnicodeDecodeError) as error:
         raise ConfigError(
             f"{path}: cannot be read as text ({error}).", rejected=str(path)
@@ -172,8 +180,10 @@ def _read(path: Path) -> Document:
         raise ConfigError(f"{path}: this is not YAML: {error}.") from error
 
 
-def _missing(path: Path) -> ConfigError:
-    """Return the error that a config is not there, with the one that may be meant or a way to make it."""
+def _make_missing_error(path: Path) -> ConfigError:
+    """Return the error that a config does not exist, with the config that is probably meant, or a command that makes
+    one.
+    """
     message = f"{path}: there is no such file."
     below = Path("configs") / path.with_suffix(".yaml").name
     meant = [m for m in (path.with_suffix(".yaml"), below) if m != path and m.is_file()]
@@ -192,7 +202,7 @@ def _missing(path: Path) -> ConfigError:
     return ConfigError(message, rejected=str(path), choices=choices, remedy=remedy)
 
 
-def _no_mapping(path: Path) -> ConfigError:
+def _make_no_mapping_error(path: Path) -> ConfigError:
     """Return the error that a file is no config at all."""
     if path.suffix in _ROBOT_FILES:
         remedy = f"`paramreduce init {path}` makes a config of it."
@@ -201,8 +211,8 @@ def _no_mapping(path: Path) -> ConfigError:
     return ConfigError(message, remedy="`paramreduce init --dh NAME` writes one.")
 
 
-def _correction(document: Document, problems: list[Problem]) -> tuple[str, list[str]]:
-    """Return the setting of the call that has an unknown name, and what it should be; nothing where no name is near."""
+def _correct_setting(document: Document, problems: list[Problem]) -> tuple[str, list[str]]:
+    """Return the setting of the call that has an unknown name, and its correction; nothing if no name is near."""
     if len(problems) != 1:
         return "", []
     ((path, error),) = problems
@@ -214,17 +224,17 @@ def _correction(document: Document, problems: list[Problem]) -> tuple[str, list[
     names = key.split(".")
     if error.is_key:
         names[len(path) - 1 : len(path)] = [error.nearest] if error.nearest else []
-        places = keys_named(error.name) if len(path) == 1 and not error.nearest else []
+        places = find_keys(error.name) if len(path) == 1 and not error.nearest else []
         if error.nearest or len(places) == 1:
             return text, [f"{'.'.join(names) or places[0]}={value}"]
     elif error.nearest:
         depth = len(names)
-        return text, [f"{key}={_exchanged_item(value, path[depth:], error.nearest)}"]
+        return text, [f"{key}={_replace_item(value, path[depth:], error.nearest)}"]
     return "", []
 
 
-def _exchanged_item(value: str, place: Key, name: str) -> str:
-    """Return a value as it was typed with another name in its place; the place is empty for the value itself."""
+def _replace_item(value: str, place: Key, name: str) -> str:
+    """Return a value as it was typed, with another name at a place in it; an empty place means the value itself."""
     if not place:
         return name
     items = yaml.safe_load(value)
@@ -235,34 +245,38 @@ def _exchanged_item(value: str, place: Key, name: str) -> str:
     return str(yaml.safe_dump(items, default_flow_style=True, width=10**6)).strip()
 
 
-def _validate(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
-    """Structural errors first; then, with those cut out, whatever the rest still reveals."""
+def _find_all_problems(data: dict[str, Any]) -> tuple[Config | None, list[Problem]]:
+    """Return the config and its problems: structural ones first; then, with those parts cut out, the rest."""
     constants, unreadable = read_constants(data.get("constants"))
     mistaken: list[Problem] = [(("constants", name), text) for name, text in unreadable.items()]
     try:
-        config = cut_to_independent(_parse(data, constants))
-        return config, mistaken + check(config)
+        config = cut_to_independent(_parse_config(data, constants))
+        return config, mistaken + find_problems(config)
     except ValidationError as error:
-        problems = mistaken + _one_per_key([_describe(entry, data) for entry in error.errors()])
+        problems = mistaken + _merge_by_key(
+            [_describe_entry(entry, data) for entry in error.errors()]
+        )
     remainder = copy.deepcopy(data)
     for path, _ in sorted(problems, key=lambda p: len(p[0]), reverse=True):
-        _cut(remainder, path)
+        _remove_key(remainder, path)
     try:
-        rest = check(_parse(remainder, constants))
+        rest = find_problems(_parse_config(remainder, constants))
     except ValidationError:
         rest = []
     wrong = [path for path, _ in problems]
-    return None, problems + [p for p in rest if not any(_touches(p[0], w) for w in wrong)]
+    return None, problems + [
+        p for p in rest if not any(_is_ancestor_or_descendant(p[0], w) for w in wrong)
+    ]
 
 
-def _parse(data: dict[str, Any], constants: dict[str, float]) -> Config:
+def _parse_config(data: dict[str, Any], constants: dict[str, float]) -> Config:
     if isinstance(data.get("constants"), dict):
         data = {**data, "constants": constants}
     return Config.model_validate(data, context={"constants": constants})
 
 
-def _one_per_key(problems: list[Problem]) -> list[Problem]:
-    """A value that fits no member of a union is one problem, not one per member."""
+def _merge_by_key(problems: list[Problem]) -> list[Problem]:
+    """Return one problem for each key; a value that fits no member of a union has one for each member before."""
     found: dict[Key, list[str | UnknownNameError]] = {}
     for path, message in problems:
         found.setdefault(path, []).append(message)
@@ -275,12 +289,13 @@ def _one_per_key(problems: list[Problem]) -> list[Problem]:
     ]
 
 
-def _touches(a: Key, b: Key) -> bool:
+def _is_ancestor_or_descendant(a: Key, b: Key) -> bool:
     short = min(len(a), len(b))
     return a[:short] == b[:short]
 
 
-def _cut(data: Any, path: Key) -> None:
+def _remove_key(data: Any, path: Key) -> None:
+    """Remove a key from nested data, if it is there."""
     for step in path[:-1]:
         try:
             data = data[step]
@@ -290,9 +305,10 @@ def _cut(data: Any, path: Key) -> None:
         data.pop(path[-1], None)
 
 
-def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
-    path = _real_path(entry["loc"], data, kind)
-    owner, key = _model_at(path[:-1], kind), path[-1] if path else ""
+def _describe_entry(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
+    """Return the key and the message of one of pydantic's errors."""
+    path = _strip_union_steps(entry["loc"], data, kind)
+    owner, key = _find_section(path[:-1], kind), path[-1] if path else ""
     if entry["type"] == "extra_forbidden" and owner is not None:
         former = FORMER_KEYS.get(path)
         return path, former or UnknownNameError("key", str(key), owner.model_fields)
@@ -315,14 +331,14 @@ def _describe(entry: Any, data: Any, kind: type[Section] = Config) -> Problem:
     return path, f"{message.rstrip('.')}." + (f" It says: {meaning}" if meaning else "")
 
 
-def _real_path(location: Iterable[str | int], data: Any, kind: type[Section]) -> Key:
-    """Pydantic's location without the steps that name a member of a union."""
+def _strip_union_steps(location: Iterable[str | int], data: Any, kind: type[Section]) -> Key:
+    """Return pydantic's location without the steps that name a member of a union."""
     path: list[str | int] = []
     steps = list(location)
     for k, step in enumerate(steps):
         last = k == len(steps) - 1
         if isinstance(data, dict) and (step in data or (last and isinstance(step, str))):
-            if step not in data and _model_at(tuple(path), kind) is None:
+            if step not in data and _find_section(tuple(path), kind) is None:
                 continue
             path.append(step)
             data = data.get(str(step))
@@ -332,8 +348,8 @@ def _real_path(location: Iterable[str | int], data: Any, kind: type[Section]) ->
     return tuple(path)
 
 
-def _model_at(path: Key, kind: type[Section]) -> type[BaseModel] | None:
-    """The section of a schema that a path leads to."""
+def _find_section(path: Key, kind: type[Section]) -> type[BaseModel] | None:
+    """Return the section of a schema that a path leads to, or None."""
     annotation: Any = kind
     for step in path:
         if isinstance(annotation, type) and issubclass(annotation, BaseModel):
@@ -351,7 +367,7 @@ def _model_at(path: Key, kind: type[Section]) -> type[BaseModel] | None:
 
 
 def _unwrap(annotation: Any) -> Any:
-    """The part of an optional or annotated type that can hold keys."""
+    """Return the part of an optional or annotated type that can hold keys."""
     if hasattr(annotation, "__metadata__"):
         return _unwrap(annotation.__origin__)
     if get_origin(annotation) in (Union, UnionType):
@@ -361,14 +377,15 @@ def _unwrap(annotation: Any) -> Any:
     return annotation
 
 
-def _line(document: Document, problem: Problem) -> str:
+def _format_problem(document: Document, problem: Problem) -> str:
+    """Return a problem as a line with file, line and key."""
     path, message = problem[0], str(problem[1])
     end = "" if message.rstrip().endswith((".", "?")) else "."
-    return f"{document.place(path)}: {prepend_key(path, message)}{end}"
+    return f"{document.describe_place(path)}: {prepend_key(path, message)}{end}"
 
 
-def _without_unused_tests(config: Config) -> Config:
-    """Ask for no test trajectories by default where a recording is the test set."""
+def _drop_unused_tests(config: Config) -> Config:
+    """Return the config without test trajectories by default if a recording is the test set."""
     defaults = {"test_count": 0, "test_point_to_point_count": 0}
     update = {k: n for k, n in defaults.items() if k not in config.trajectories.model_fields_set}
     if config.sampling.test_file is None or not update:
@@ -377,8 +394,8 @@ def _without_unused_tests(config: Config) -> Config:
     return config.model_copy(update={"trajectories": trajectories})
 
 
-def _with_paths(config: Config, folder: Path) -> Config:
-    """Resolve files named in the config against the folder it stands in."""
+def _resolve_paths(config: Config, folder: Path) -> Config:
+    """Return the config with file names resolved against the folder of the config."""
 
     def resolved(section: Any, *names: str) -> Any:
         found = {name: getattr(section, name) for name in names}

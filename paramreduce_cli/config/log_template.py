@@ -1,4 +1,4 @@
-"""The part of a config that is for logs."""
+"""Template of the section for logs."""
 
 import json
 from collections.abc import Iterable
@@ -24,12 +24,12 @@ selected:
 """
 
 
-def log_text(files: Iterable[Path], columns: dict[str, str | list[str]]) -> str:
-    """The section ``sampling`` of a config for logs.
+def format_log_section(files: Iterable[Path], columns: dict[str, str | list[str]]) -> str:
+    """Return the section ``sampling`` of a config for logs.
 
     Args:
-        files: As the config names them.
-        columns: What is where in them.
+        files: Log files, as the config names them.
+        columns: Names of columns by quantity.
     """
     listed = ", ".join(json.dumps(str(path)) for path in files)
     shown = "".join(f"      {key}: {json.dumps(value)}\n" for key, value in columns.items())

@@ -1,4 +1,4 @@
-"""What a config says of the logs of a machine."""
+"""Settings for logs of the machine."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ TIMES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
 
 
 class ColumnsSection(Section):
-    """Names of columns, datasets or topics in a log, `{}` standing for the joint's number, or one name for each joint."""
+    """The names of columns, datasets or topics in a log, with `{}` for the joint's number, or one name for each joint."""
 
     time: str = "t"
     """Time."""
@@ -47,7 +47,7 @@ class ColumnsSection(Section):
 
 
 class UnitsSection(Section):
-    """Units of the columns of a log."""
+    """The units of the columns of a log."""
 
     time: Literal["s", "ms", "us", "ns"] = "s"
     """Of time."""
@@ -62,7 +62,7 @@ class UnitsSection(Section):
 
 
 class SignsSection(Section):
-    """Signs of joints (or motors) whose motion and torque were counted apart."""
+    """The signs of joints (or motors) whose motion and torque count differently."""
 
     motion: PerJoint = [1.0]
     """1, or -1 for motions that were counted the other way."""
@@ -71,7 +71,10 @@ class SignsSection(Section):
 
 
 class LogSection(Section):
-    """Logs of the machine itself, as they were recorded: they are made ready and split into a part to learn from and a part held out."""
+    """The logs of the machine as they were recorded.
+
+    They are processed and split into a training part and a held-out part.
+    """
 
     files: Files
     """CSV (also .gz), HDF5, NPZ, or ROS 2 bags; relative to this file. Where held_out names files all of these are learned from."""
@@ -112,7 +115,8 @@ class LogSection(Section):
     """Parts in time of what is learned from, one of which at a time is left out in cross-validation."""
 
     @model_validator(mode="after")
-    def _signs(self) -> LogSection:
+    def _check_signs(self) -> LogSection:
+        """Raise ValueError if a sign is not 1 or -1, or a torque constant is 0."""
         if any(abs(value) != 1 for value in (*self.apart.motion, *self.apart.torque)):
             raise ValueError("signs are 1 or -1")
         if self.torque_constants is not None and 0 in self.torque_constants:
@@ -138,8 +142,8 @@ class LogSection(Section):
         """Files that are held out; none where it is a share of each."""
         return self.held_out if isinstance(self.held_out, list) else []
 
-    def motor_per_joint(self, n_dof: int) -> FloatArray | None:
-        """Motor positions per joint position, (n_dof, n_dof); None where joints were recorded.
+    def compute_motor_matrix(self, n_dof: int) -> FloatArray | None:
+        """Return the motor positions per joint position, (n_dof, n_dof), or None if joints were recorded.
 
         Raises:
             ValueError: Its shape does not fit, or it has no inverse.

@@ -1,4 +1,4 @@
-"""Sizes, masses and speeds that no robot is likely to have, which other units than SI would explain."""
+"""Sizes, masses and speeds that hardly any robot has, but that units other than SI would explain."""
 
 from collections.abc import Iterator
 
@@ -26,7 +26,7 @@ _MOST = 6
 
 def find_implausible_bodies(config: Config) -> Iterator[str]:
     """Yield a sentence for each kind of body whose mass does not go with its size, or its size with the robot's."""
-    extent = _extent(config)
+    extent = _estimate_size(config)
     # Of a single joint nothing else tells a size.
     size = max(_SMALLEST, extent) if extent > 0 else np.inf
     found: dict[str, list[tuple[float, str]]] = {}
@@ -76,7 +76,7 @@ def _check_body(body: BodyParameters, size: float) -> Iterator[tuple[str, float]
         yield _DENSE, mass / (_SPHERE * gyration**3 * _DENSEST)
 
 
-def _extent(config: Config) -> float:
+def _estimate_size(config: Config) -> float:
     """Estimate the length of the robot, m: the largest sum of distances between joints from the base to a body."""
     bodies = config.description.bodies
     rigid = bodies.build_bodies()

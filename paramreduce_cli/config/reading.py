@@ -1,4 +1,4 @@
-"""YAML with the line of every key, so that errors can point at them."""
+"""YAML with the line of every key, so that errors can name the line."""
 
 from dataclasses import dataclass, field
 from typing import Any
@@ -24,7 +24,7 @@ _UNREADABLE = (ValueError, LookupError, AttributeError, TypeError, OverflowError
 
 @dataclass
 class Document:
-    """Plain data with where each part of it stands."""
+    """A YAML file as plain data, with the line of each part."""
 
     source: str
     data: Any
@@ -36,8 +36,8 @@ class Document:
     overrides: dict[Key, str] = field(default_factory=dict)
     """Keys set on the command line, with the text given there."""
 
-    def place(self, path: Key) -> str:
-        """Where a key stands, or its nearest ancestor that is written down."""
+    def describe_place(self, path: Key) -> str:
+        """Return file and line of a key, or of its nearest ancestor in the file."""
         for end in range(len(path), -1, -1):
             if path[:end] in self.overrides:
                 return f"--set {self.overrides[path[:end]]}"
@@ -69,11 +69,11 @@ def read_yaml(text: str, source: str) -> Document:
         node = loader.get_single_node()
         document = Document(source, None)
         if node is not None:
-            if _count(node, {}, 0) > _MOST_VALUES:
+            if _count_values(node, {}, 0) > _MOST_VALUES:
                 raise yaml.YAMLError(
                     f"it holds more than {_MOST_VALUES} values, aliases written out"
                 )
-            document.data = _build(loader, node, (), document)
+            document.data = _build_data(loader, node, (), document)
         return document
     except RecursionError as error:
         raise yaml.YAMLError(_TOO_DEEP) from error
@@ -96,19 +96,20 @@ def _check_depth(text: str) -> None:
             raise yaml.YAMLError(_TOO_DEEP)
 
 
-def _count(node: yaml.Node, known: dict[int, int], depth: int) -> int:
-    """Values in a node, as often as aliases repeat them; each node is looked at once."""
+def _count_values(node: yaml.Node, known: dict[int, int], depth: int) -> int:
+    """Return the number of values in a node, counting aliases as often as they repeat; each node is visited once."""
     if depth > _DEEPEST:
         raise yaml.YAMLError(_TOO_DEEP)
     if id(node) not in known:
         inner = node.value if isinstance(node, yaml.CollectionNode) else []
         if isinstance(node, yaml.MappingNode):
             inner = [part for pair in node.value for part in pair]
-        known[id(node)] = 1 + sum(_count(part, known, depth + 1) for part in inner)
+        known[id(node)] = 1 + sum(_count_values(part, known, depth + 1) for part in inner)
     return known[id(node)]
 
 
-def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Document) -> Any:
+def _build_data(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Document) -> Any:
+    """Return the plain data of a node, and note the lines of its keys in the document."""
     document.lines.setdefault(path, node.start_mark.line + 1)
     if isinstance(node, yaml.MappingNode):
         own = {id(key) for key, _ in node.value}
@@ -125,10 +126,12 @@ def _build(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Docume
             if id(key_node) in own:
                 met.add(key)
             document.lines[(*path, key)] = line
-            result[key] = _build(loader, value_node, (*path, key), document)
+            result[key] = _build_data(loader, value_node, (*path, key), document)
         return result
     if isinstance(node, yaml.SequenceNode):
-        return [_build(loader, item, (*path, k), document) for k, item in enumerate(node.value)]
+        return [
+            _build_data(loader, item, (*path, k), document) for k, item in enumerate(node.value)
+        ]
     line = node.start_mark.line + 1
     shown = repr(node.value if len(node.value) <= _SHOWN else f"{node.value[:_SHOWN]}...")
     try:

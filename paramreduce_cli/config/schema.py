@@ -1,4 +1,4 @@
-"""What a robot's YAML may say, with units and defaults; nothing here reads files."""
+"""Schema of a robot's YAML file, with units and defaults; nothing here reads files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ ParameterKind = Literal["m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz"
 
 
 class ModelSection(Section):
-    """How base parameters are found and chosen."""
+    """The settings for finding and choosing base parameters."""
 
     base_columns: list[str] | None = None
     """Names of the independent parameters; if left out they are taken in the order Izz Ixx Ixy Ixz Iyz mx my Iyy mz m."""
@@ -59,7 +59,7 @@ class ModelSection(Section):
 
 
 class TrajectoriesSection(Section):
-    """How exciting trajectories are made."""
+    """The settings for exciting trajectories."""
 
     count: Count = 10
     """Trajectories of the estimation set."""
@@ -112,8 +112,8 @@ class TrajectoriesSection(Section):
     file: Path | None = None
     """Fourier coefficients to use instead of optimising: a trajectories.h5, or a summary.json; relative to this file."""
 
-    def limits(self, n_dof: int) -> JointLimits:
-        """The limits of every joint."""
+    def build_limits(self, n_dof: int) -> JointLimits:
+        """Return the limits of every joint."""
         pairs = np.broadcast_to(np.array(self.position_limits, dtype=float), (n_dof, 2))
         return JointLimits(
             lower=pairs[:, 0],
@@ -124,11 +124,11 @@ class TrajectoriesSection(Section):
             power=expand_per_joint(self.power_limits or [np.inf], n_dof),
         )
 
-    def bounded(self, mechanism: Mechanism) -> tuple[Constraint, ...]:
-        """What is bounded besides the coordinates: constraints, then clearances."""
-        given = [entry.constraint(mechanism) for entry in self.constraints]
+    def build_constraints(self, mechanism: Mechanism) -> tuple[Constraint, ...]:
+        """Return constraints and clearances as records."""
+        given = [entry.build_constraint(mechanism) for entry in self.constraints]
         if self.clearance is not None:
-            given += self.clearance.constraints(mechanism)
+            given += self.clearance.build_constraints(mechanism)
         return tuple(given)
 
 
@@ -147,14 +147,17 @@ class InputSection(Section):
     """Where the feedback leads, rad (m)."""
 
     @model_validator(mode="after")
-    def _moves(self) -> InputSection:
+    def _check_amplitude(self) -> InputSection:
         if bool(self.amplitude) != bool(self.frequencies):
             raise ValueError("amplitude and frequencies belong together; one of them does nothing")
         return self
 
 
 class SimulationSection(Section):
-    """Samples of simulated motions under inputs, for mechanisms that cannot follow any trajectory; coordinates without an input have no torque."""
+    """The settings for samples of simulated motions under inputs, for mechanisms that cannot follow every trajectory.
+
+    Coordinates without an input have no torque.
+    """
 
     inputs: Annotated[dict[str, InputSection], Field(min_length=1)]
     """By independent coordinate."""
@@ -196,8 +199,8 @@ class SamplingSection(Section):
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
     """Characteristic accelerations, one for all joints or a list, rad/s^2 (m/s^2 if prismatic); or their standard deviation over the estimation set."""
 
-    def files(self) -> dict[str, Path | None]:
-        """Recorded states by the set that they are."""
+    def list_recordings(self) -> dict[str, Path | None]:
+        """Return the files of recorded states by set; None where there is none."""
         return {name: getattr(self, f"{name}_file") for name in SETS}
 
     @property
@@ -208,7 +211,7 @@ class SamplingSection(Section):
 
 
 class GroupSection(Section):
-    """Parameters that play the same role on several bodies: selected or dropped together."""
+    """A rule that groups parameters of the same role on several bodies: they are selected or dropped together."""
 
     name: Name
     """Of the group; with bodies the groups are called KIND_NAME."""
@@ -222,13 +225,13 @@ class GroupSection(Section):
     """Whether they share one value, which then counts as one parameter; otherwise each has its own."""
 
     @model_validator(mode="after")
-    def _one_way_only(self) -> GroupSection:
+    def _check_one_way(self) -> GroupSection:
         if (self.bodies is None) == (self.parameters is None):
             raise ValueError("give bodies or parameters, one of them")
         return self
 
-    def groups(self) -> dict[str, list[str]]:
-        """Names of the parameters of every group, by its name."""
+    def list_groups(self) -> dict[str, list[str]]:
+        """Return the names of the parameters of every group, by the group's name."""
         if self.parameters is not None:
             return {self.name: list(self.parameters)}
         return {
@@ -240,7 +243,7 @@ class GroupSection(Section):
 
 
 class Stop(Section):
-    """Where a heuristic stops; if both are left out it orders all parameters."""
+    """The size or error at which a heuristic stops; without both it orders all parameters."""
 
     torque_error: Positive | None = None
     """Smallest subset whose torque error is at most this, a share."""
@@ -267,7 +270,7 @@ class OperationsCriterion(Section):
 
 
 class ReductionSection(Section):
-    """How parameters are selected."""
+    """The settings for selecting parameters."""
 
     heuristics: Annotated[list[Method], Field(min_length=1)] = [
         "qr",
@@ -311,21 +314,22 @@ class SelectedSection(Section):
     """Whether the size is chosen by leaving out one part of the estimation set at a time: the smallest model whose error is within one standard error of the best; the validation set is not looked at."""
 
     @model_validator(mode="after")
-    def _one(self) -> SelectedSection:
-        if self.cross_validation and (self.n is not None or self.tolerances()):
+    def _check_one_rule(self) -> SelectedSection:
+        """Raise ValueError if several rules for the number of parameters are given."""
+        if self.cross_validation and (self.n is not None or self.get_tolerances()):
             raise ValueError("cross_validation chooses n itself; leave out n and tolerances")
-        if self.n is not None and self.tolerances():
-            raise ValueError(f"give n or {', '.join(self.tolerances())}, not both")
+        if self.n is not None and self.get_tolerances():
+            raise ValueError(f"give n or {', '.join(self.get_tolerances())}, not both")
         return self
 
-    def tolerances(self) -> dict[str, float]:
-        """The tolerances given, by key."""
+    def get_tolerances(self) -> dict[str, float]:
+        """Return the given tolerances by key."""
         keys = ("torque_error", "acceleration_error", "operations")
         return {key: value for key in keys if (value := getattr(self, key)) is not None}
 
 
 class Acceptance(Section):
-    """Largest values at which the selected model is accepted; what is left out is not judged."""
+    """The largest values at which the selected model is accepted; missing limits are not checked."""
 
     torque_error_estimation: Positive | None = None
     """Of the torques on the estimation set, a share (0.01 is 1 %)."""
@@ -350,7 +354,7 @@ class Acceptance(Section):
 
 
 class ValidationSection(Section):
-    """When the selected model is accepted, and what of it is measured."""
+    """The settings for accepting the selected model, and for measuring its stability."""
 
     accept: Acceptance = Acceptance()
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
@@ -361,7 +365,7 @@ class ValidationSection(Section):
 
 
 class TrackingSection(Section):
-    """Computed-torque control with the full and with the selected model, in simulation."""
+    """The settings for computed-torque control with the full and with the selected model, in simulation."""
 
     bandwidth: Positive = 20.0
     """Of the feedback, critically damped, rad/s."""
@@ -370,7 +374,7 @@ class TrackingSection(Section):
 
 
 class ReportSection(Section):
-    """What the report looks like."""
+    """The settings of the report."""
 
     title: str | None = None
     """Heading; the robot's name if left out."""
@@ -415,7 +419,7 @@ class SourceSection(Section):
 
 
 class Settings(Section):
-    """What may be asked of samples without any robot."""
+    """The settings for samples without any robot."""
 
     reduction: ReductionSection = ReductionSection()
     """Selection of parameters."""

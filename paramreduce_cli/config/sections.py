@@ -1,4 +1,4 @@
-"""The sections of a config by their types, so that a stage's signature can name them.
+"""Sections of a config by their types, so that a stage's signature can name them.
 
 A section is a part of the schema with a type of its own: ``validation`` is the
 ``ValidationSection``, ``validation.operations`` the ``CountedDynamics``; ``Robot`` is all that
@@ -21,7 +21,7 @@ from paramreduce_cli.robots import Robot
 
 
 @cache
-def _keys() -> dict[type, Key]:
+def _list_keys() -> dict[type, Key]:
     return dict(_walk(Config, ()))
 
 
@@ -36,30 +36,30 @@ def _walk(model: type[BaseModel], path: Key) -> Iterator[tuple[type, Key]]:
                 yield from _walk(kind, (*path, name))
 
 
-def keys_named(name: str) -> list[str]:
-    """Keys of sections at the top that are called like that."""
+def find_keys(name: str) -> list[str]:
+    """Return the keys of sections at the top that have a name."""
     return [
         f"{path[0]}.{name}"
-        for kind, path in _keys().items()
+        for kind, path in _list_keys().items()
         if len(path) == 1 and issubclass(kind, BaseModel) and name in kind.model_fields
     ]
 
 
 def is_section(kind: type) -> bool:
-    """Whether a type is a section of a config."""
-    return kind is Robot or kind in _keys()
+    """Return whether a type is a section of a config."""
+    return kind is Robot or kind in _list_keys()
 
 
 def has_default(kind: type) -> bool:
-    """Whether a section may be left out, so that no config is needed for it."""
-    return kind is not Robot and not Config.model_fields[str(_keys()[kind][0])].is_required()
+    """Return whether a section may be left out, so that no config is needed for it."""
+    return kind is not Robot and not Config.model_fields[str(_list_keys()[kind][0])].is_required()
 
 
-def section(config: Config | Settings | None, kind: type) -> Any:
-    """A section of a config, or of settings; its default where there is none."""
+def get_section(config: Config | Settings | None, kind: type) -> Any:
+    """Return a section of a config or of settings, or its default if there are neither."""
     if kind is Robot:
         return config
-    path = _keys()[kind]
+    path = _list_keys()[kind]
     value: Any = config
     if not hasattr(config, str(path[0])):
         value, path = Config.model_fields[str(path[0])].default, path[1:]
@@ -68,18 +68,20 @@ def section(config: Config | Settings | None, kind: type) -> Any:
     return value
 
 
-def digests(config: Config, kind: type) -> dict[str, str]:
-    """Of a section, by its key; ``Robot`` is one for each key it has.
+def digest_sections(config: Config, kind: type) -> dict[str, str]:
+    """Return the digests of a section by key; ``Robot`` has one for each of its keys.
 
-    Constants do not count: their values stand wherever they are used.
+    Constants do not count, as their values are in the keys that use them.
     """
     robot = [(name,) for name in Robot.model_fields if name != "constants"]
-    keys = robot if kind is Robot else [_keys()[kind]]
-    return {".".join(map(str, key)): section_digest(config, key) for key in keys}
+    keys = robot if kind is Robot else [_list_keys()[kind]]
+    return {".".join(map(str, key)): digest_section(config, key) for key in keys}
 
 
-def section_digest(config: Config, key: Key) -> str:
-    """Of a part of a config, to tell whether it changed; empty if there is no such part."""
+def digest_section(config: Config, key: Key) -> str:
+    """Return the digest of a part of a config, which shows whether the part has changed; empty if there is no such
+    part.
+    """
     value: Any = config.model_dump(mode="json")
     for name in key:
         if not isinstance(value, dict) or name not in value:

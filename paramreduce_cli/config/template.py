@@ -1,4 +1,4 @@
-"""A commented config for a new arm that validates as it is."""
+"""Commented configs for new robots that are valid as they are."""
 
 _HEAD = """\
 # {name}: fill in what is marked TODO. Units are SI; numbers may be written as 1e-3 or pi/2.
@@ -88,12 +88,12 @@ validation:
 """What is selected, and when it is accepted."""
 
 
-def dh_template(name: str, joints: int) -> str:
-    """Text of a config for an arm of some revolute joints.
+def format_dh_template(name: str, joints: int) -> str:
+    """Return the text of a config for an arm of revolute joints.
 
     Args:
-        name: Of the robot.
-        joints: How many.
+        name: Name of the robot.
+        joints: Number of joints.
     """
     rows = "".join(
         f"      - {{a: {0.3 if k in (2, 3) else 0}, alpha: {'pi/2' if k % 2 else 0}, d: 0, theta: 0}}\n"
@@ -128,23 +128,23 @@ drives:
 """
 
 
-def recorded_template(name: str, joints: int) -> str:
-    """Text of a config for an arm whose motion was recorded.
+def format_recorded_template(name: str, joints: int) -> str:
+    """Return the text of a config for an arm whose motion was recorded.
 
     Args:
-        name: Of the robot.
-        joints: How many.
+        name: Name of the robot.
+        joints: Number of joints.
     """
-    before, _, after = dh_template(name, joints).partition("\nselected:")
+    before, _, after = format_dh_template(name, joints).partition("\nselected:")
     after = after.replace("torque_error_test", "torque_error_validation")
     return before + _RECORDED.format(name=name) + "\nselected:" + after
 
 
-def tree_template(name: str) -> str:
-    """Text of a config for a tree of bodies in frames of one's own choice."""
+def format_tree_template(name: str) -> str:
+    """Return the text of a config for a tree of bodies in frames of the user's choice."""
     return (_HEAD + _TREE).format(name=name) + _TAIL + "\n" + JUDGEMENT
 
 
-def loop_template(name: str) -> str:
-    """Text of a config for a mechanism with a closed loop."""
+def format_loop_template(name: str) -> str:
+    """Return the text of a config for a mechanism with a closed loop."""
     return (_HEAD + _LOOP).format(name=name) + _TAIL + "\n" + JUDGEMENT

@@ -1,4 +1,4 @@
-"""What a config says of leaving terms out."""
+"""Settings for removing negligible terms."""
 
 from typing import Annotated, Literal
 
@@ -9,7 +9,7 @@ from paramreduce_cli.fields.section import Section
 
 
 class TermsSection(Section):
-    """How far functions are simplified by leaving out terms, besides parameters."""
+    """The settings for removing negligible terms of functions, besides parameters."""
 
     functions: Annotated[list[Literal["inverse", "direct"]], Field(min_length=1)] = [
         "inverse",

@@ -138,13 +138,13 @@ def about(model: ExportedModel, first: int = 0) -> list[str]:
         lines += ["", "Dependent coordinates, in the order of the rows of R and b:"]
         lines += _listed(model, model.dependent, first)
     kind = "constants of the code" if model.constant else "in this order"
-    name_key = any(p.expression for p in model.parameters)
+    explained = any(p.expression for p in model.parameters)
     lines += [
         "",
         "First moments and inertias are about the origin of their body's frame, in its axes. Frames:",
         *(plain(line) for line in model.frames),
         "",
-        *(line.format(kind) for line in (_MADE_OF if name_key else _FITTED)),
+        *(line.format(kind) for line in (_MADE_OF if explained else _FITTED)),
     ]
     for k, p in enumerate(model.parameters, first):
         made_of = f", {plain(p.expression)}" if p.expression else ""

@@ -7,8 +7,8 @@ import numpy as np
 from paramreduce_cli.config.schema import Config, SourceSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.importing.formats import formats
-from paramreduce_cli.importing.imported import Inertial, matrix
-from paramreduce_cli.importing.reading import imported, kind_of
+from paramreduce_cli.importing.imported import Inertial, to_transform
+from paramreduce_cli.importing.reading import detect_format, read_robot
 from paramreduce_cli.importing.robot_format import RobotFormat
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, Kind, Mechanism, Model
@@ -38,9 +38,9 @@ def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) ->
             remedy="`paramreduce init ROBOT.urdf` writes a config that has one.",
         )
     file = config.source.file
-    if kind_of(file) != kind:
+    if detect_format(file) != kind:
         raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
-    robot = imported(config.source)
+    robot = read_robot(config.source)
     form = formats[kind]()
     _check_same(config, config.source, robot, gravity=form.holds_gravity)
     bodies = _bodies(model.mechanism, standard)
@@ -62,7 +62,7 @@ def _check_same(
     own = [] if tree is None else list(tree.bodies)
     same = len(own) == len(robot.bodies) and all(
         (a.name, a.parent, a.joint) == (b.name, b.parent, b.joint)
-        and np.allclose(compose_steps(a.at), matrix(b.at), rtol=0, atol=_SAME)
+        and np.allclose(compose_steps(a.at), to_transform(b.at), rtol=0, atol=_SAME)
         and (b.axis is None or np.allclose(a.list_motions()[-1][1], b.axis, rtol=0, atol=_SAME))
         for a, b in zip(own, robot.bodies, strict=True)
     )

@@ -113,7 +113,7 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
         if values is not None:
             values *= sign
     try:
-        gears = wanted.motor_per_joint(n_dof)
+        gears = wanted.compute_motor_matrix(n_dof)
     except ValueError as error:
         raise ConfigError(str(error), ("sampling", "log", "transmission")) from error
     if gears is not None:

@@ -1,4 +1,4 @@
-"""Angles that files round, taken for what they were."""
+"""Angles that robot files round, restored to exact multiples."""
 
 import math
 from decimal import Decimal
@@ -33,7 +33,7 @@ def unround_angle(text: str) -> float:
     value = float(text)
     if abs(value) < _NOTHING or not math.isfinite(value):
         return 0.0 if math.isfinite(value) else value
-    digits, nice = _nearest(text)
+    digits, nice = _find_nearest(text)
     if nice is None:
         return value
     unit = 10.0**-digits
@@ -42,16 +42,16 @@ def unround_angle(text: str) -> float:
     return nice if rounded or cut_off else value
 
 
-def near_angle(text: str) -> float | None:
-    """Return the angle that a number almost stands for, None where it stands for it or for none near by."""
+def find_near_angle(text: str) -> float | None:
+    """Return the multiple that a number almost is, rad; None if it is exact or no multiple is near."""
     if not math.isfinite(float(text)):
         return None
-    digits, nice = _nearest(text)
+    digits, nice = _find_nearest(text)
     off = nice is not None and unround_angle(text) != nice
     return nice if off and abs(float(text) - (nice or 0.0)) <= _NEAR * 10.0**-digits else None
 
 
-def _nearest(text: str) -> tuple[int, float | None]:
+def _find_nearest(text: str) -> tuple[int, float | None]:
     """Return the digits of a number after the point, and the nearest angle that so many digits can stand for."""
     digits = -int(Decimal(text.strip()).as_tuple().exponent)
     parts = next((n for least, n in ((4, 12), (3, 4), (2, 2)) if digits >= least), None)
@@ -59,24 +59,24 @@ def _nearest(text: str) -> tuple[int, float | None]:
     return digits, whole * math.pi / parts if parts is not None and whole else None
 
 
-def without_dust(value: float) -> float:
-    """A number, zero where it is but round-off of zero."""
+def clear_rounding(value: float) -> float:
+    """Return a number, with mere round-off of zero made zero."""
     return 0.0 if abs(value) < _NOTHING else value
 
 
-def angle_text(angle: float) -> str:
-    """An angle as a config writes it, multiples of 15 degrees with pi."""
+def format_angle(angle: float) -> str:
+    """Return an angle as a config writes it, with pi for multiples of 15 degrees."""
     twelfths = round(angle / (math.pi / 12))
     if not twelfths or abs(angle - twelfths * math.pi / 12) > 1e-14 * abs(twelfths):
-        return number_text(angle)
+        return format_number(angle)
     part = Fraction(twelfths, 12)
     over = f"/{part.denominator}" if part.denominator > 1 else ""
     times = {1: "", -1: "-"}.get(part.numerator, f"{part.numerator}*")
     return f"{times}pi{over}"
 
 
-def number_text(value: float) -> str:
-    """A number with fourteen digits, as a config writes it."""
+def format_number(value: float) -> str:
+    """Return a number with fourteen digits, as a config writes it."""
     text = f"{value + 0.0:.14g}"
     return (
         text if any(mark in text for mark in ".en") or text.lstrip("-").isdigit() else f"{text}.0"

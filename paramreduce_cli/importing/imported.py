@@ -1,4 +1,4 @@
-"""A robot as a file of another kind describes it: links, and joints between them."""
+"""A robot as a file describes it: links, and joints between them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from paramreduce_cli.importing.angles import without_dust
+from paramreduce_cli.importing.angles import clear_rounding
 from paramreduce_cli.records import ClosureKind, FloatArray
 from paramreduce_cli.robots.placement import Step, compose_steps
 
@@ -22,55 +22,58 @@ _NO_TURN = 1e-9
 """Angles and entries of rotations below are round-off, rad."""
 
 
-def steps_of(frame: FloatArray) -> Steps:
-    """A homogeneous transform, (4, 4), as steps: a shift, then yaw, pitch and roll."""
+def decompose_transform(frame: FloatArray) -> Steps:
+    """Return a homogeneous transform, (4, 4), as steps: a shift, then yaw, pitch and roll."""
     R = frame[:3, :3]
     flat = float(np.hypot(R[0, 0], R[1, 0]))
     pitch = np.arctan2(-R[2, 0], flat)
     yaw, roll = np.arctan2(R[1, 0], R[0, 0]), np.arctan2(R[2, 1], R[2, 2])
     if flat < _NO_TURN:  # the roll turns about the same axis
         yaw, roll = np.arctan2(-R[0, 1], R[1, 1]), 0.0
-    shift = tuple(without_dust(float(x)) for x in frame[:3, 3])
-    turns = [(key, _whole(float(a))) for key, a in (("rz", yaw), ("ry", pitch), ("rx", roll))]
+    shift = tuple(clear_rounding(float(x)) for x in frame[:3, 3])
+    turns = [
+        (key, _round_to_15_degrees(float(a)))
+        for key, a in (("rz", yaw), ("ry", pitch), ("rx", roll))
+    ]
     moved: Steps = (("xyz", shift),) if any(shift) else ()
     return (*moved, *((key, angle) for key, angle in turns if angle))
 
 
-def _whole(angle: float) -> float:
-    """An angle without the round-off of a multiple of 15 degrees."""
+def _round_to_15_degrees(angle: float) -> float:
+    """Return an angle without the round-off of a multiple of 15 degrees."""
     nice = round(angle / (np.pi / 12)) * np.pi / 12
     return nice if abs(angle - nice) < _NO_TURN else angle
 
 
-def matrix(steps: Steps) -> FloatArray:
-    """Steps as a homogeneous transform, (4, 4), m."""
+def to_transform(steps: Steps) -> FloatArray:
+    """Return the homogeneous transform, (4, 4), m, of steps."""
     return compose_steps([Step.model_validate({key: value}) for key, value in steps])
 
 
 @dataclass(frozen=True)
 class Inertial:
-    """Mass, kg, centre of mass, (3,), m, and inertia about it, (3, 3), kg m^2, in some frame."""
+    """A mass, kg, its centre, (3,), m, and the inertia about the centre, (3, 3), kg m^2, in some frame."""
 
     mass: float = 0.0
     com: FloatArray = field(default_factory=lambda: np.zeros(3))
     tensor: FloatArray = field(default_factory=lambda: np.zeros((3, 3)))
 
-    def seen(self, frame: FloatArray) -> Inertial:
-        """The same in another frame.
+    def transform(self, frame: FloatArray) -> Inertial:
+        """Return the inertia in another frame.
 
         Args:
-            frame: Of the present frame in the other, (4, 4).
+            frame: Pose of the present frame in the other frame, (4, 4).
         """
         R = frame[:3, :3]
         return Inertial(self.mass, R @ self.com + frame[:3, 3], R @ self.tensor @ R.T)
 
-    def negative(self) -> Inertial:
-        """What takes it off another body, to be added to that."""
+    def negate(self) -> Inertial:
+        """Return the inertia that removes this one when it is added to a body."""
         return Inertial(-self.mass, self.com, -self.tensor)
 
 
-def together(parts: Sequence[Inertial]) -> Inertial:
-    """Bodies that are one, in one frame."""
+def merge_inertias(parts: Sequence[Inertial]) -> Inertial:
+    """Return the inertia of bodies that move as one, all in the same frame."""
     mass = sum(part.mass for part in parts)
     moment = sum((part.mass * part.com for part in parts), np.zeros(3))
     com = moment / mass if mass else np.zeros(3)
@@ -92,7 +95,7 @@ class Mimic:
 
 @dataclass(frozen=True)
 class ImportedJoint:
-    """What a file says of a joint."""
+    """A joint as a file describes it."""
 
     name: str
     kind: JointKind
@@ -121,8 +124,8 @@ class ImportedJoint:
             self.kind != "continuous" and lower is not None and upper is not None and lower < upper
         )
 
-    def allows(self, coordinate: float) -> bool:
-        """Whether a coordinate, rad or m, lies between the limits of the file."""
+    def is_within_limits(self, coordinate: float) -> bool:
+        """Return whether a coordinate, rad or m, lies between the limits of the file."""
         lower, upper = self.lower, self.upper
         return (lower is None or lower <= coordinate) and (upper is None or coordinate <= upper)
 
@@ -137,7 +140,7 @@ CLOSED_KINDS: Mapping[str, ClosureKind] = {
 
 @dataclass(frozen=True)
 class ImportedClosure:
-    """What holds two links together besides the joints of the tree."""
+    """A closure that holds two links together besides the joints of the tree."""
 
     name: str
     kind: ClosureKind
@@ -148,7 +151,7 @@ class ImportedClosure:
 
 @dataclass(frozen=True)
 class ImportedRobot:
-    """Links and joints as a file gives them, in its order."""
+    """A robot of links and joints as a file gives them, in the order of the file."""
 
     name: str
     source: str

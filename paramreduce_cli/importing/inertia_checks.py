@@ -1,4 +1,4 @@
-"""What may be wrong with the inertias of a file, link by link."""
+"""Checks of the inertias in a robot file, link by link."""
 
 from collections.abc import Iterator, Mapping
 
@@ -16,7 +16,7 @@ _MOST = 8
 
 
 def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]:
-    """Sentences about masses and inertias that no body can have, or that look misplaced."""
+    """Yield sentences on masses and inertias that no body can have, or that look misplaced."""
     given = {name: inertial for name, inertial in links.items() if inertial is not None}
     heavy = {name: one for name, one in given.items() if one.mass > 0}
     sentences = {
@@ -25,10 +25,10 @@ def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]
             name for name, one in given.items() if not one.mass and one.tensor.any()
         ],
         "an inertia that no distribution of mass has": [
-            name for name, one in heavy.items() if not possible(one.tensor)
+            name for name, one in heavy.items() if not is_physical(one.tensor)
         ],
         "an inertia that may be about the link's origin instead of its centre of mass": [
-            name for name, one in heavy.items() if _about_origin(one)
+            name for name, one in heavy.items() if _is_about_origin(one)
         ],
     }
     for what, names in sentences.items():
@@ -37,18 +37,17 @@ def find_inertia_warnings(links: Mapping[str, Inertial | None]) -> Iterator[str]
             yield f"{', '.join(names[:_MOST])}{more}: {what}"
 
 
-def possible(tensor: FloatArray) -> bool:
-    """Whether second moments of mass with this tensor are positive."""
+def is_physical(tensor: FloatArray) -> bool:
+    """Return whether a tensor has positive second moments of mass."""
     return is_positive_semidefinite(np.trace(tensor) / 2 * np.eye(3) - tensor)
 
 
-def _about_origin(inertial: Inertial) -> bool:
-    """Whether a tensor stays possible, but much smaller, if it is taken to be about the origin.
-
-    That of a body that reaches from the origin to well beyond its centre of mass is not: a rod has a
-    twelfth of m l^2 about its middle, which is a quarter of m l^2 away.
+def _is_about_origin(inertial: Inertial) -> bool:
+    """Return whether a tensor was probably given about the origin: it stays physical when shifted to the centre of
+    mass, but becomes much smaller. A body that reaches from the origin far beyond its centre of mass is no such case: a
+    rod has m l^2 / 12 about its middle, and m l^2 / 4 less than about its end.
     """
     c, m = inertial.com, inertial.mass
     gyration = np.trace(inertial.tensor) / 2 / m
     left = inertial.tensor - m * (c @ c * np.eye(3) - np.outer(c, c))
-    return possible(inertial.tensor) and possible(left) and bool(c @ c > _FAR * gyration)
+    return is_physical(inertial.tensor) and is_physical(left) and bool(c @ c > _FAR * gyration)

@@ -1,4 +1,4 @@
-"""Parameters written back into the MJCF file that a robot came from; everything else stays."""
+"""Parameters written back into the MJCF file of a robot; everything else in the file stays."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.imported import Inertial
-from paramreduce_cli.importing.inertia_checks import possible
-from paramreduce_cli.importing.mjcf import compiled
+from paramreduce_cli.importing.inertia_checks import is_physical
+from paramreduce_cli.importing.mjcf import compile_mjcf
 from paramreduce_cli.importing.simplified import SimplifiedRobot
 from paramreduce_cli.records import FloatArray
 
@@ -24,20 +24,20 @@ _DRIVE = {
 """Attributes of joints and the keys of drives in configs."""
 
 
-def with_parameters(
+def write_mjcf(
     path: Path,
     robot: SimplifiedRobot,
     inertials: Mapping[str, Inertial | None],
     drives: Mapping[str, Mapping[str, float]],
 ) -> bytes:
-    """An MJCF file with other parameters; everything else stays.
+    """Return an MJCF file with other parameters; everything else stays.
 
-    Bodies that move with another one keep their inertia, which is taken off that one.
+    Bodies that move with another keep their inertia, which is subtracted from that other body.
 
     Args:
-        path: The file, which was read before.
-        robot: What was made of it.
-        inertials: Of the bodies by name, in their frames; None for none.
+        path: File, which was read before.
+        robot: Robot that was made of the file.
+        inertials: Inertias of the bodies by name, in their frames; None for none.
         drives: Values by the keys of a drive in a config, by body.
 
     Raises:
@@ -47,7 +47,7 @@ def with_parameters(
     import mujoco
     from lxml import etree
 
-    reader = compiled(path)
+    reader = compile_mjcf(path)
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
     root = etree.fromstring(path.read_bytes(), parser)
     radian = any(c.get("angle") == "radian" for c in root.findall("compiler"))
@@ -67,26 +67,27 @@ def with_parameters(
 
     for body in robot.bodies:
         if body.link is not None and not body.massless:
-            own = reader.alone(body, robot, inertials[body.name])
-            if own.mass <= 0 or not possible(own.tensor):
+            own = reader.separate_inertia(body, robot, inertials[body.name])
+            if own.mass <= 0 or not is_physical(own.tensor):
                 raise ConfigError(
                     f"{path}: MuJoCo takes physical bodies alone, and without the links that move with "
                     f"it {body.link} would have {own.mass:.3g} kg, or an inertia that no body has."
                 )
-            _write_inertial(mujoco, element("body", body.link), own)
+            _write_inertia(mujoco, element("body", body.link), own)
         if body.limits is not None:
             drive = drives.get(body.name, {})
             joint = element("joint", body.limits.name)
             for name, key in _DRIVE.items():
                 joint.set(name, repr(drive.get(key, 0.0)))
             if "stiffness" in drive:
-                slack = drive["rest"] + reader.reference(body.limits.name)
+                slack = drive["rest"] + reader.get_reference(body.limits.name)
                 turns = body.joint == "revolute" and not radian
                 joint.set("springref", repr(float(np.degrees(slack) if turns else slack)))
     return bytes(etree.tostring(root.getroottree(), encoding="UTF-8")) + b"\n"
 
 
-def _write_inertial(mujoco: Any, body: Any, inertial: Inertial) -> None:
+def _write_inertia(mujoco: Any, body: Any, inertial: Inertial) -> None:
+    """Replace the inertia of a body."""
     sizes, axes = np.linalg.eigh(inertial.tensor)
     if np.linalg.det(axes) < 0:
         axes[:, 0] = -axes[:, 0]
@@ -96,11 +97,13 @@ def _write_inertial(mujoco: Any, body: Any, inertial: Inertial) -> None:
     if old is not None:
         body.remove(old)
     values = {"pos": inertial.com, "quat": quaternion, "diaginertia": sizes}
-    new = body.makeelement("inertial", {key: _numbers(value) for key, value in values.items()})
+    new = body.makeelement(
+        "inertial", {key: _format_numbers(value) for key, value in values.items()}
+    )
     new.set("mass", repr(float(inertial.mass)))
     new.tail = body.text
     body.insert(0, new)
 
 
-def _numbers(values: FloatArray) -> str:
+def _format_numbers(values: FloatArray) -> str:
     return " ".join(repr(float(value)) for value in values)

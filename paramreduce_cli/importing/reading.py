@@ -1,4 +1,4 @@
-"""A robot of a file, as the config's source section asks for it."""
+"""Reading of a robot's file as the config's source section asks."""
 
 import pkgutil
 from pathlib import Path
@@ -8,20 +8,20 @@ from lxml import etree
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.formats import formats
-from paramreduce_cli.importing.simplified import SimplifiedRobot, simplified
+from paramreduce_cli.importing.simplified import SimplifiedRobot, simplify_robot
 
 
-def imported(source: SourceSection) -> SimplifiedRobot:
+def read_robot(source: SourceSection) -> SimplifiedRobot:
     """Read a robot's file, and merge what does not move.
 
     Raises:
         ConfigError: The file cannot be read, or does not hold what is asked for.
     """
-    return simplified(formats[kind_of(source.file)]().read(source.file), source)
+    return simplify_robot(formats[detect_format(source.file)]().read(source.file), source)
 
 
-def described(name: str) -> Path | None:
-    """The file of a robot that the package robot_descriptions knows by name, such as ur5_description.
+def find_described_robot(name: str) -> Path | None:
+    """Return the file of a robot that the package robot_descriptions knows by name, such as ur5_description, or None.
 
     The package fetches it on first use. None where there is no such package or name.
 
@@ -40,14 +40,16 @@ def described(name: str) -> Path | None:
     return None
 
 
-def kind_of(path: Path) -> str:
-    """Return the name of the format whose outermost element a file has; ``urdf``, which refuses others, for none."""
-    tag = _outermost(path)
+def detect_format(path: Path) -> str:
+    """Return the name of the format whose outermost element a file has; ``urdf``, which refuses other files, if no
+    format fits.
+    """
+    tag = _read_root_tag(path)
     return next((name for name, found in formats.items() if found().tag == tag), "urdf")
 
 
-def _outermost(path: Path) -> str | None:
-    """Tag of a file's outermost element; None where there is none."""
+def _read_root_tag(path: Path) -> str | None:
+    """Return the tag of a file's outermost element, or None if there is none."""
     if not path.is_file():
         return None
     try:

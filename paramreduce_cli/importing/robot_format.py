@@ -1,4 +1,4 @@
-"""What a kind of robot file is."""
+"""Base class of the kinds of robot files."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ Writer = Callable[
 
 @dataclass(frozen=True)
 class RobotFormat:
-    """How one kind of robot file is read and written back."""
+    """A kind of robot file: how it is read and written back."""
 
     tag: str
     """Tag of the outermost element."""

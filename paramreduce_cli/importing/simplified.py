@@ -1,4 +1,4 @@
-"""An imported robot as the bodies of a config: what cannot move is one body with what carries it."""
+"""An imported robot as the bodies of a config: links that cannot move against each other are one body."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ from paramreduce_cli.importing.imported import (
     ImportedRobot,
     Inertial,
     Steps,
-    matrix,
-    steps_of,
-    together,
+    decompose_transform,
+    merge_inertias,
+    to_transform,
 )
 from paramreduce_cli.importing.inertia_checks import find_inertia_warnings
 from paramreduce_cli.records import JOINT_COORDINATES, ClosureKind, FloatArray
@@ -56,12 +56,12 @@ class ImportedBody:
 
     @property
     def limits(self) -> ImportedJoint | None:
-        """The joint of the file where its limits are those of the one coordinate."""
+        """Joint of the file whose limits are those of the body's one coordinate; None if there is no such joint."""
         single = self.source is not None and self.source.kind in _SINGLE
         return self.source if single else None
 
-    def coordinates(self) -> list[str]:
-        """Names of its joint's coordinates, as configs make them where none is given."""
+    def list_coordinates(self) -> list[str]:
+        """Return the names of the joint's coordinates, as configs make them if none is given."""
         if self.coordinate is not None:
             return [self.coordinate]
         return [f"q_{self.name}_{k + 1}" for k in range(JOINT_COORDINATES[self.joint])]
@@ -79,7 +79,7 @@ class Coupling:
 
 @dataclass(frozen=True)
 class Closure:
-    """What holds two bodies together besides their joints."""
+    """A closure that holds two bodies together besides their joints."""
 
     name: str
     kind: ClosureKind
@@ -89,7 +89,7 @@ class Closure:
 
 @dataclass(frozen=True)
 class SimplifiedRobot:
-    """Bodies, parents above their children, and what people should know of them."""
+    """A robot of bodies in order, each after the body that carries it, with warnings for people."""
 
     name: str
     source: str
@@ -108,8 +108,8 @@ class SimplifiedRobot:
     guess: Mapping[str, float] = field(default_factory=dict)
     """Coordinates with which loops are closed, rad or m; those that are not zero."""
 
-    def dependent_limits(self) -> dict[str, ImportedJoint]:
-        """Joints of the file that limit coordinates which the loops make dependent, by coordinate."""
+    def find_dependent_limits(self) -> dict[str, ImportedJoint]:
+        """Return the joints of the file that limit dependent coordinates of loops, by coordinate."""
         followers = {coupling.follower.coordinate for coupling in self.couplings}
         return {
             body.coordinate: body.limits
@@ -119,35 +119,38 @@ class SimplifiedRobot:
         }
 
 
-def simplified(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
+def simplify_robot(robot: ImportedRobot, choice: SourceSection) -> SimplifiedRobot:
     """Merge what does not move, and name everything as configs allow.
 
     Raises:
         ConfigError: A name that is asked for is not there, or nothing moves.
     """
-    return _Simplification(robot, choice).result()
+    return _Simplification(robot, choice).simplify()
 
 
 class _Simplification:
+    """A simplification of one robot as a source section asks."""
+
     def __init__(self, robot: ImportedRobot, choice: SourceSection) -> None:
         self._robot, self._choice = robot, choice
-        self._asked_closures = tuple(_asked_closure(text) for text in choice.closed)
+        self._asked_closures = tuple(_parse_closure(text) for text in choice.closed)
         self._warnings = [*robot.warnings, *find_inertia_warnings(robot.links)]
         self._children: dict[str, list[ImportedJoint]] = {}
         for joint in robot.joints:
             self._children.setdefault(joint.parent, []).append(joint)
-        self._check()
-        self._root = self._found_root()
+        self._check_names()
+        self._root = self._find_root()
         self._locked = dict(choice.locked or {})
         if choice.tip is not None:
-            self._lock_beside(choice.tip)
+            self._lock_other_branches(choice.tip)
         self._joints = {joint.name: joint for joint in robot.joints}
         self._lock_followers()
         self._names = _Names(self._warnings)
         self._carried: dict[str, str] = {}
         self._frames: dict[str, FloatArray] = {}
 
-    def _check(self) -> None:
+    def _check_names(self) -> None:
+        """Raise ConfigError if the call names a link or joint that does not exist."""
         choice = self._choice
         links, joints = list(self._robot.links), [joint.name for joint in self._robot.joints]
         asked = [("--root", choice.root, links), ("--tip", choice.tip, links)]
@@ -160,7 +163,8 @@ class _Simplification:
                 kind = "joint" if option in ("--lock", "--independent") else "link"
                 raise ConfigError(f"{option} {name}: {UnknownNameError(kind, name, known)}")
 
-    def _found_root(self) -> str:
+    def _find_root(self) -> str:
+        """Return the link that no joint carries, or the link that the call names."""
         if self._choice.root is not None:
             return self._choice.root
         carried = {joint.child for joint in self._robot.joints}
@@ -172,7 +176,8 @@ class _Simplification:
             )
         return roots[0]
 
-    def _lock_beside(self, tip: str) -> None:
+    def _lock_other_branches(self, tip: str) -> None:
+        """Lock the joints that are not on the path from the root to the tip."""
         above = {joint.child: joint for joint in self._robot.joints}
         chain, link = set(), tip
         while link != self._root:
@@ -186,11 +191,12 @@ class _Simplification:
         if beside:
             self._warnings.append(f"not on the way to {tip}, so locked at 0: {', '.join(beside)}")
 
-    def result(self) -> SimplifiedRobot:
+    def simplify(self) -> SimplifiedRobot:
+        """Return the robot with fixed links merged, names made valid, and closures and couplings taken over."""
         bodies: list[ImportedBody] = []
         inertials: dict[str, list[Inertial]] = {}
         if self._choice.floating:
-            name = self._names.body(self._root)
+            name = self._names.name_body(self._root)
             bodies.append(ImportedBody(name, BASE, "free", link=self._root))
             waiting: list[tuple[str, str, Steps]] = [(self._root, name, ())]
         else:
@@ -199,27 +205,31 @@ class _Simplification:
             link, carrier, steps = waiting.pop()
             inertial = self._robot.links[link]
             self._carried[link] = carrier
-            self._frames[link] = matrix(steps)
+            self._frames[link] = to_transform(steps)
             if inertial is not None:
-                inertials.setdefault(carrier, []).append(inertial.seen(matrix(steps)))
+                inertials.setdefault(carrier, []).append(inertial.transform(to_transform(steps)))
             for joint in reversed(self._children.get(link, [])):
                 if joint.child in self._choice.ignored:
                     continue
                 at = (*steps, *joint.origin)
                 if joint.kind == "fixed" or joint.name in self._locked:
-                    still = _motion(joint, self._locked.get(joint.name, 0.0))
+                    still = _to_steps(joint, self._locked.get(joint.name, 0.0))
                     waiting.append((joint.child, carrier, (*at, *still)))
                 else:
-                    waiting.append((joint.child, self._moving(joint, carrier, at, bodies), ()))
+                    waiting.append(
+                        (joint.child, self._append_joint(joint, carrier, at, bodies), ())
+                    )
         if not bodies:
             raise ConfigError(
                 f"{self._robot.source}: no joint is left that moves; give --floating if "
                 "the root moves freely.",
                 options=("--floating",),
             )
-        filled = [self._filled(body, inertials.get(body.name, [])) for body in _in_order(bodies)]
-        couplings = () if self._choice.uncoupled else self._couplings(filled)
-        closures = self._closures()
+        filled = [
+            self._fill_body(body, inertials.get(body.name, [])) for body in _order_bodies(bodies)
+        ]
+        couplings = () if self._choice.uncoupled else self._list_couplings(filled)
+        closures = self._list_closures()
         own = {body.link for body in bodies}
         merged = {link: body for link, body in self._carried.items() if link not in own}
         name = self._names.clean(self._robot.name) or "robot"
@@ -229,14 +239,15 @@ class _Simplification:
             tuple(filled),
             couplings,
             closures,
-            self._independent(filled, couplings, closures),
+            self._choose_independent(filled, couplings, closures),
             self._robot.gravity,
             merged,
             self._frames,
             tuple(self._warnings),
         )
 
-    def _closures(self) -> tuple[Closure, ...]:
+    def _list_closures(self) -> tuple[Closure, ...]:
+        """Return the closures of the file and of the call, without those of links that are left out."""
         found = []
         for closure in (*self._robot.closures, *self._asked_closures):
             left_out = [link for link in closure.links if link not in self._carried]
@@ -254,19 +265,20 @@ class _Simplification:
                 self._warnings.append(f"{closure.name} holds {one} to itself, so it is left out")
                 continue
             first, second = (
-                steps_of(self._frames[link] @ frame)
+                decompose_transform(self._frames[link] @ frame)
                 for link, frame in zip(closure.links, closure.frames, strict=True)
             )
-            name = self._names.closure(closure.name)
+            name = self._names.name_closure(closure.name)
             found.append(Closure(name, closure.kind, (one, other), (first, second)))
         return tuple(found)
 
-    def _independent(
+    def _choose_independent(
         self,
         bodies: list[ImportedBody],
         couplings: tuple[Coupling, ...],
         closures: tuple[Closure, ...],
     ) -> tuple[str, ...]:
+        """Return the independent coordinates: those asked for, else those that the file leaves free."""
         choice = self._choice
         moved = {body.source.name: body for body in bodies if body.source is not None}
         if choice.independent or (self._asked_closures and not self._robot.closures):
@@ -274,7 +286,7 @@ class _Simplification:
             if still:
                 raise ConfigError(f"--independent {still[0]}: does not move.")
             return tuple(
-                name for joint in choice.independent for name in moved[joint].coordinates()
+                name for joint in choice.independent for name in moved[joint].list_coordinates()
             )
         if closures:
             options = (choice.root, choice.tip, choice.locked, choice.ignored)
@@ -284,19 +296,19 @@ class _Simplification:
                     "change; import it whole and change the config."
                 )
             return tuple(
-                moved[joint].coordinates()[k]
+                moved[joint].list_coordinates()[k]
                 for joint, k in self._robot.independent
                 if joint in moved
             )
         followers = {coupling.follower.name for coupling in couplings}
-        return tuple(n for b in bodies if b.name not in followers for n in b.coordinates())
+        return tuple(n for b in bodies if b.name not in followers for n in b.list_coordinates())
 
-    def _moving(
+    def _append_joint(
         self, joint: ImportedJoint, carrier: str, at: Steps, bodies: list[ImportedBody]
     ) -> str:
-        """Append the bodies of a joint; the name of the last of them, which is the link."""
-        name = self._names.body(joint.child)
-        coordinate = self._names.coordinate(joint.name)
+        """Append the bodies of a joint, and return the name of the last body, which is the link."""
+        name = self._names.name_body(joint.child)
+        coordinate = self._names.name_coordinate(joint.name)
         own: dict[str, Any] = {
             "link": joint.child,
             "source": joint,
@@ -307,7 +319,7 @@ class _Simplification:
         elif joint.kind == "planar":
             turn = rotate_z_to(np.array(joint.axis))
             for k, letter in enumerate("xy"):
-                slide, axis = self._names.body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
+                slide, axis = self._names.name_body(f"{name}_{letter}"), tuple(turn[:, k].tolist())
                 sliding = f"{coordinate}_{letter}"
                 bodies.append(
                     ImportedBody(slide, carrier, "prismatic", at, axis, sliding, massless=True)
@@ -321,8 +333,9 @@ class _Simplification:
             bodies.append(ImportedBody(name, carrier, kind, at, joint.axis, coordinate, **own))
         return name
 
-    def _filled(self, body: ImportedBody, parts: list[Inertial]) -> ImportedBody:
-        inertial = together(parts)
+    def _fill_body(self, body: ImportedBody, parts: list[Inertial]) -> ImportedBody:
+        """Return a body with the merged inertia of its links, or massless if it has none."""
+        inertial = merge_inertias(parts)
         if body.massless or inertial.mass:
             return replace(body, inertial=inertial)
         if self._robot.closures or self._asked_closures:
@@ -334,8 +347,8 @@ class _Simplification:
             self._warnings.append(f"{body.name} has no mass in the file: TODO")
         return replace(body, inertial=inertial)
 
-    def _led(self, joint: ImportedJoint) -> tuple[ImportedJoint, float, float]:
-        """The joint at the end of those that it follows, and how it does."""
+    def _resolve_leader(self, joint: ImportedJoint) -> tuple[ImportedJoint, float, float]:
+        """Return the joint at the end of a chain of followers, with ratio and offset to it."""
         ratio, offset = 1.0, 0.0
         while joint.mimic is not None:
             offset += ratio * joint.mimic.offset
@@ -344,9 +357,9 @@ class _Simplification:
         return joint, ratio, offset
 
     def _lock_followers(self) -> None:
-        """What follows a joint that does not move does not move either."""
+        """Lock the joints that follow a joint that does not move."""
         for joint in self._robot.joints if not self._choice.uncoupled else ():
-            leader, ratio, offset = self._led(joint)
+            leader, ratio, offset = self._resolve_leader(joint)
             if leader.kind == "fixed" or leader.name in self._locked or not ratio:
                 value = ratio * self._locked.get(leader.name, 0.0) + offset
                 if joint is not leader and leader.kind == "fixed":
@@ -356,11 +369,12 @@ class _Simplification:
                 if joint is not leader:
                     self._locked.setdefault(joint.name, value)
 
-    def _couplings(self, bodies: list[ImportedBody]) -> tuple[Coupling, ...]:
+    def _list_couplings(self, bodies: list[ImportedBody]) -> tuple[Coupling, ...]:
+        """Return the couplings between moving bodies."""
         moved = {body.limits.name: body for body in bodies if body.limits is not None}
         result = []
         for name, follower in moved.items():
-            leader, ratio, offset = self._led(self._joints[name])
+            leader, ratio, offset = self._resolve_leader(self._joints[name])
             if leader.name == name:
                 continue
             if leader.name in moved:
@@ -374,8 +388,8 @@ class _Simplification:
         return tuple(result)
 
 
-def _asked_closure(text: str) -> ImportedClosure:
-    """The closure of a text such as ``A=B`` or ``A=B:revolute``."""
+def _parse_closure(text: str) -> ImportedClosure:
+    """Return the closure that a text such as ``A=B`` or ``A=B:revolute`` asks for."""
     pair, _, kind = text.partition(":")
     one, _, other = (part.strip() for part in pair.partition("="))
     return ImportedClosure(
@@ -383,8 +397,8 @@ def _asked_closure(text: str) -> ImportedClosure:
     )
 
 
-def _in_order(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:
-    """Each branch after the body that carries it, in the file's order."""
+def _order_bodies(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:
+    """Return the bodies in the file's order, each after the body that carries it."""
     left = list(bodies)
     by_parent: dict[str, list[ImportedBody]] = {}
     for body in left:
@@ -398,8 +412,8 @@ def _in_order(bodies: Iterable[ImportedBody]) -> list[ImportedBody]:
     return result
 
 
-def _motion(joint: ImportedJoint, value: float) -> Steps:
-    """Steps of a joint that stays at one coordinate."""
+def _to_steps(joint: ImportedJoint, value: float) -> Steps:
+    """Return the steps of a joint that stays at one coordinate."""
     if joint.kind in ("fixed", "floating", "planar") or value == 0:
         return ()
     if joint.kind == "prismatic":
@@ -411,11 +425,11 @@ def _motion(joint: ImportedJoint, value: float) -> Steps:
     turn = rotate_z_to(axis)
     frame = np.eye(4)
     frame[:3, :3] = turn
-    return (*steps_of(frame), ("rz", value), *steps_of(frame.T))
+    return (*decompose_transform(frame), ("rz", value), *decompose_transform(frame.T))
 
 
 class _Names:
-    """Names that configs allow, each once."""
+    """The names of links, joints and closures, made valid for configs and unique."""
 
     def __init__(self, warnings: list[str]) -> None:
         self._warnings = warnings
@@ -423,16 +437,17 @@ class _Names:
         self._coordinates: dict[str, str] = {}
         self._closures: dict[str, str] = {}
 
-    def body(self, link: str) -> str:
-        return self._own(link, self._bodies, "link")
+    def name_body(self, link: str) -> str:
+        return self._make_unique(link, self._bodies, "link")
 
-    def closure(self, name: str) -> str:
-        return self._own(name, self._closures, "closure")
+    def name_closure(self, name: str) -> str:
+        return self._make_unique(name, self._closures, "closure")
 
-    def coordinate(self, joint: str) -> str:
-        return self._own(joint, self._coordinates, "joint")
+    def name_coordinate(self, joint: str) -> str:
+        return self._make_unique(joint, self._coordinates, "joint")
 
-    def _own(self, name: str, taken: dict[str, str], kind: str) -> str:
+    def _make_unique(self, name: str, taken: dict[str, str], kind: str) -> str:
+        """Return a valid, unique name, and note a warning if it differs from the given name."""
         own = self.clean(name) or kind
         while own in taken:
             own += "_"
@@ -442,5 +457,5 @@ class _Names:
         return own
 
     def clean(self, name: str) -> str:
-        """A name with nothing but what configs allow."""
+        """Return a name with only those characters that configs allow."""
         return re.sub(r"^[_.-]+", "", re.sub(r"[^A-Za-z0-9_.-]", "_", name))

@@ -1,4 +1,4 @@
-"""Parameters written back into the URDF file that a robot came from; everything else stays."""
+"""Parameters written back into the URDF file of a robot; everything else in the file stays."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -13,21 +13,20 @@ from paramreduce_cli.importing.simplified import BASE, SimplifiedRobot
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
-def with_parameters(
+def write_urdf(
     path: Path,
     robot: SimplifiedRobot,
     inertials: Mapping[str, Inertial | None],
     drives: Mapping[str, Mapping[str, float]],
 ) -> bytes:
-    """A URDF file with other parameters.
+    """Return a URDF file with other parameters.
 
-    Links that move with another one lose their inertia to it, as in the config; those that do not
-    move keep it.
+    Links that move with another lose their inertia to that link, as in the config; links that do not move keep it.
 
     Args:
-        path: The file, which was read before.
-        robot: What was made of it.
-        inertials: Of the bodies by name, in their frames; None for none.
+        path: File, which was read before.
+        robot: Robot that was made of the file.
+        inertials: Inertias of the bodies by name, in their frames; None for none.
         drives: Values by the keys of a drive in a config, by body.
     """
     parser = etree.XMLParser(resolve_entities=False, no_network=True)
@@ -37,44 +36,45 @@ def with_parameters(
     joints = {element.get("name"): element for element in root.findall("joint")}
     for link, carrier in robot.merged.items():
         if carrier != BASE:
-            _write_inertial(links[link], None)
+            _write_inertia(links[link], None)
     for body in robot.bodies:
         if body.link is not None and not body.massless:
-            _write_inertial(links[body.link], inertials[body.name])
+            _write_inertia(links[body.link], inertials[body.name])
         drive = drives.get(body.name, {})
         if body.limits is None:
             continue
         joint = joints[body.limits.name]
         if drive or joint.find("dynamics") is not None:
-            dynamics = _child(joint, "dynamics")
+            dynamics = _find_or_add_child(joint, "dynamics")
             for name, key in (("damping", "viscous"), ("friction", "coulomb")):
-                dynamics.set(name, _text(drive.get(key, 0.0)))
+                dynamics.set(name, _format_number(drive.get(key, 0.0)))
     tree = root.getroottree()
     encoding = tree.docinfo.encoding or "UTF-8"
     declared = content.lstrip().startswith(b"<?xml")
     return bytes(etree.tostring(tree, encoding=encoding, xml_declaration=declared)) + b"\n"
 
 
-def _write_inertial(link: Any, inertial: Inertial | None) -> None:
+def _write_inertia(link: Any, inertial: Inertial | None) -> None:
+    """Replace or remove the inertia of a link."""
     old = link.find("inertial")
     if inertial is None:
         if old is not None:
             link.remove(old)
         return
-    element = _child(link, "inertial")
-    origin = _child(element, "origin")
-    origin.set("xyz", " ".join(map(_text, inertial.com)))
+    element = _find_or_add_child(link, "inertial")
+    origin = _find_or_add_child(element, "origin")
+    origin.set("xyz", " ".join(map(_format_number, inertial.com)))
     origin.set("rpy", "0 0 0")
-    _child(element, "mass").set("value", _text(inertial.mass))
-    tensor = _child(element, "inertia")
+    _find_or_add_child(element, "mass").set("value", _format_number(inertial.mass))
+    tensor = _find_or_add_child(element, "inertia")
     for key, value in zip(_TENSOR, inertial.tensor[np.triu_indices(3)], strict=True):
-        tensor.set(key, _text(value))
+        tensor.set(key, _format_number(value))
 
 
-def _child(element: Any, tag: str) -> Any:
+def _find_or_add_child(element: Any, tag: str) -> Any:
     found = element.find(tag)
     return etree.SubElement(element, tag) if found is None else found
 
 
-def _text(value: float) -> str:
+def _format_number(value: float) -> str:
     return repr(float(value))

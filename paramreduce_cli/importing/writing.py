@@ -1,4 +1,4 @@
-"""A simplified robot as the text of a config that is valid as it is."""
+"""Text of a valid config for a simplified robot."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from paramreduce_cli.config.log_template import LOG_DRIVES, LOG_JUDGEMENT
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.config.template import JUDGEMENT
-from paramreduce_cli.importing.angles import angle_text, number_text
+from paramreduce_cli.importing.angles import format_angle, format_number
 from paramreduce_cli.importing.imported import ImportedJoint, Inertial, Steps
 from paramreduce_cli.importing.simplified import Closure, Coupling, ImportedBody, SimplifiedRobot
 
@@ -31,23 +31,29 @@ _RANGE = {
 """Where it has none of the position, rad or m."""
 
 
-def config_text(robot: SimplifiedRobot, source: SourceSection, log: str = "") -> str:
-    """The config of a robot.
+def format_config(robot: SimplifiedRobot, source: SourceSection, log: str = "") -> str:
+    """Return the text of a robot's config.
 
     Args:
-        robot: With names that configs allow.
-        source: Where it comes from, the file relative to the folder that the config is for.
-        log: Its section for logs of the machine, which tell friction and rotors.
+        robot: Robot, with names that configs allow.
+        source: Source of the robot; the path of its file is relative to the folder of the config.
+        log: Section for logs of the machine, from which friction and rotors can be identified.
     """
-    parts = [_head(robot), _source(source), _description(robot), _parameters(robot)]
+    parts = [
+        _format_head(robot),
+        _format_source(source),
+        _format_description(robot),
+        _format_parameters(robot),
+    ]
     if log:
-        parts += [LOG_DRIVES, _limits(robot), log, LOG_JUDGEMENT]
+        parts += [LOG_DRIVES, _format_limits(robot), log, LOG_JUDGEMENT]
     else:
-        parts += [_drives(robot), _limits(robot), JUDGEMENT]
+        parts += [_format_drives(robot), _format_limits(robot), JUDGEMENT]
     return "\n".join(parts)
 
 
-def _head(robot: SimplifiedRobot) -> str:
+def _format_head(robot: SimplifiedRobot) -> str:
+    """Return the comment at the top, with the import's warnings, and the robot's name."""
     lines = [
         f"{robot.name}: from {robot.source} by `paramreduce init`; this file is the robot from now on.",
         "Units are SI; numbers may be written as 1e-3 or pi/2. `paramreduce schema` lists every key.",
@@ -55,12 +61,12 @@ def _head(robot: SimplifiedRobot) -> str:
     if robot.warnings:
         lines += ["", "What was done, or is left to do:"]
         lines += [f"- {warning}." for warning in robot.warnings]
-    text = "".join(_comment(line) for line in lines)
-    return f"{text}robot: {_name(robot.name)}\n"
+    text = "".join(_format_comment(line) for line in lines)
+    return f"{text}robot: {_quote_name(robot.name)}\n"
 
 
-def _source(source: SourceSection) -> str:
-    """What is needed to write the robot back; strings as JSON has them are YAML too."""
+def _format_source(source: SourceSection) -> str:
+    """Return the section ``source``, which is needed to write the robot back; JSON strings are valid YAML."""
     given = source.model_dump(mode="json", exclude_defaults=True)
     lines = [f"  {key}: {json.dumps(value)}" for key, value in given.items()]
     return "\n".join(
@@ -72,7 +78,8 @@ def _source(source: SourceSection) -> str:
     )
 
 
-def _comment(line: str) -> str:
+def _format_comment(line: str) -> str:
+    """Return a line as a wrapped comment."""
     printable = "".join(c if c.isprintable() else " " for c in line)
     indent = "  " if line.startswith("- ") else ""
     return "".join(
@@ -81,83 +88,92 @@ def _comment(line: str) -> str:
     )
 
 
-def _description(robot: SimplifiedRobot) -> str:
+def _format_description(robot: SimplifiedRobot) -> str:
+    """Return the section ``description``."""
     lines = [
         "description:",
-        f"  gravity: {_listed(robot.gravity)}        # acceleration of gravity in the base frame, m/s^2",
+        f"  gravity: {_format_list(robot.gravity)}        # acceleration of gravity in the base frame, m/s^2",
         "  tree:",
         "    # A body's frame is its joint's; `at` is where that is in the parent's frame, step by step.",
         "    bodies:",
     ]
-    lines += [f"      - {_body(body)}" for body in robot.bodies]
+    lines += [f"      - {_format_body(body)}" for body in robot.bodies]
     if robot.couplings or robot.closures:
-        lines += ["    closures:", *(f"      - {_coupling(one)}" for one in robot.couplings)]
-        lines += [f"      - {_closure(one)}" for one in robot.closures]
-        lines.append(f"    independent: [{', '.join(map(_name, robot.independent))}]")
+        lines += ["    closures:", *(f"      - {_format_coupling(one)}" for one in robot.couplings)]
+        lines += [f"      - {_format_closure(one)}" for one in robot.closures]
+        lines.append(f"    independent: [{', '.join(map(_quote_name, robot.independent))}]")
         if robot.guess:
-            values = (f"{_name(name)}: {value:.6g}" for name, value in robot.guess.items())
+            values = (f"{_quote_name(name)}: {value:.6g}" for name, value in robot.guess.items())
             lines.append(f"    guess: {{{', '.join(values)}}}")
     return "\n".join(lines) + "\n"
 
 
-def _body(body: ImportedBody) -> str:
-    items = [f"name: {_name(body.name)}"]
+def _format_body(body: ImportedBody) -> str:
+    """Return a body as flow-style YAML."""
+    items = [f"name: {_quote_name(body.name)}"]
     if body.parent != "base":
-        items.append(f"parent: {_name(body.parent)}")
+        items.append(f"parent: {_quote_name(body.parent)}")
     items.append(f"joint: {body.joint}")
     if body.axis is not None:
-        items.append(f"axes: {_axis(body.axis)}")
+        items.append(f"axes: {_format_axis(body.axis)}")
     if body.at:
-        items.append(f"at: {_steps(body.at)}")
+        items.append(f"at: {_format_steps(body.at)}")
     if body.coordinate is not None:
-        items.append(f"coordinates: {_name(body.coordinate)}")
+        items.append(f"coordinates: {_quote_name(body.coordinate)}")
     if body.massless:
         items.append("massless: true")
     return f"{{{', '.join(items)}}}"
 
 
-def _coupling(coupling: Coupling) -> str:
-    """Of the joints of two bodies."""
-    bodies = f"[{_name(coupling.leader.name)}, {_name(coupling.follower.name)}]"
-    offset = f", offset: {number_text(coupling.offset)}" if coupling.offset else ""
-    return f"{{type: coupling, bodies: {bodies}, ratio: {number_text(coupling.ratio)}{offset}}}"
+def _format_coupling(coupling: Coupling) -> str:
+    """Return a coupling of the joints of two bodies as flow-style YAML."""
+    bodies = f"[{_quote_name(coupling.leader.name)}, {_quote_name(coupling.follower.name)}]"
+    offset = f", offset: {format_number(coupling.offset)}" if coupling.offset else ""
+    return f"{{type: coupling, bodies: {bodies}, ratio: {format_number(coupling.ratio)}{offset}}}"
 
 
-def _closure(closure: Closure) -> str:
-    bodies = f"[{', '.join(map(_name, closure.bodies))}]"
-    at = ", ".join(map(_steps, closure.at))
-    return f"{{name: {_name(closure.name)}, type: {closure.kind}, bodies: {bodies}, at: [{at}]}}"
+def _format_closure(closure: Closure) -> str:
+    """Return a closure as flow-style YAML."""
+    bodies = f"[{', '.join(map(_quote_name, closure.bodies))}]"
+    at = ", ".join(map(_format_steps, closure.at))
+    return (
+        f"{{name: {_quote_name(closure.name)}, type: {closure.kind}, bodies: {bodies}, at: [{at}]}}"
+    )
 
 
-def _axis(axis: Sequence[float]) -> str:
+def _format_axis(axis: Sequence[float]) -> str:
+    """Return an axis as a letter with a sign, or as a list of numbers."""
     for direction, letter in _DIRECTIONS.items():
         if tuple(axis) == direction:
             return letter
         if tuple(-x for x in axis) == direction:
             return f"-{letter}"
-    return _listed(axis)
+    return _format_list(axis)
 
 
-def _steps(steps: Steps) -> str:
+def _format_steps(steps: Steps) -> str:
+    """Return steps as flow-style YAML."""
     shown = [
-        f"{{xyz: {_listed(value)}}}"
+        f"{{xyz: {_format_list(value)}}}"
         if isinstance(value, tuple)
-        else f"{{{key}: {angle_text(value)}}}"
+        else f"{{{key}: {format_angle(value)}}}"
         for key, value in steps
     ]
     return f"[{', '.join(shown)}]"
 
 
-def _listed(values: Sequence[float] | np.ndarray) -> str:
-    return f"[{', '.join(number_text(float(value)) for value in values)}]"
+def _format_list(values: Sequence[float] | np.ndarray) -> str:
+    return f"[{', '.join(format_number(float(value)) for value in values)}]"
 
 
-def _name(name: str) -> str:
+def _quote_name(name: str) -> str:
+    """Return a name, quoted if YAML would read it as something else."""
     plain = re.fullmatch(r"[A-Za-z][A-Za-z0-9_-]*", name) and name.lower() not in _NOT_PLAIN
     return name if plain else f'"{name}"'
 
 
-def _parameters(robot: SimplifiedRobot) -> str:
+def _format_parameters(robot: SimplifiedRobot) -> str:
+    """Return the section ``parameter_sets``."""
     lines = [
         "parameter_sets:",
         "  # Mass (kg), centre of mass in the body's frame (m), and inertia about the centre of mass",
@@ -165,23 +181,26 @@ def _parameters(robot: SimplifiedRobot) -> str:
         "  file:",
     ]
     lines += [
-        f"    {_name(b.name)}: {_inertial(b.inertial)}" for b in robot.bodies if not b.massless
+        f"    {_quote_name(b.name)}: {_format_inertia(b.inertial)}"
+        for b in robot.bodies
+        if not b.massless
     ]
     return "\n".join(lines) + "\n"
 
 
-def _inertial(inertial: Inertial) -> str:
+def _format_inertia(inertial: Inertial) -> str:
+    """Return an inertia as flow-style YAML."""
     tensor = inertial.tensor[np.triu_indices(3)]
     if not inertial.mass and not tensor.any():
         return "{m: 0}        # TODO"
     return (
-        f"{{m: {number_text(inertial.mass)}, com: {_listed(inertial.com)}, "
-        f"inertia_com: {_listed(tensor)}}}"
+        f"{{m: {format_number(inertial.mass)}, com: {_format_list(inertial.com)}, "
+        f"inertia_com: {_format_list(tensor)}}}"
     )
 
 
-def _drives(robot: SimplifiedRobot) -> str:
-    """Friction, rotors and springs as the file gives them; how to add them otherwise."""
+def _format_drives(robot: SimplifiedRobot) -> str:
+    """Return the section ``drives`` with the friction, rotors and springs of the file, or a comment on how to add them."""
     given = {
         body.coordinate: body.limits.drive
         for body in robot.bodies
@@ -190,24 +209,24 @@ def _drives(robot: SimplifiedRobot) -> str:
     if not given:
         return _NO_DRIVES
     lines = [
-        f"  {_name(name)}: {{{', '.join(f'{k}: {number_text(v)}' for k, v in values.items())}}}"
+        f"  {_quote_name(name)}: {{{', '.join(f'{k}: {format_number(v)}' for k, v in values.items())}}}"
         for name, values in given.items()
     ]
     return "\n".join([_DRIVES, *lines]) + "\n"
 
 
-def _limits(robot: SimplifiedRobot) -> str:
-    """Nominal torques and the limits of trajectories, coordinate by coordinate."""
+def _format_limits(robot: SimplifiedRobot) -> str:
+    """Return nominal torques and the limits of trajectories, coordinate by coordinate."""
     coordinates: list[tuple[str, str, ImportedJoint | None]] = [
         (name, body.joint, body.limits)
         for body in robot.bodies
-        for name in body.coordinates()
+        for name in body.list_coordinates()
         if name in robot.independent
     ]
     efforts = [limits.effort if limits else None for _, _, limits in coordinates]
     known = all(effort is not None and effort > 0 for effort in efforts)
     nominal = (
-        f"nominal_torque: {_listed([e for e in efforts if e is not None])}        # the file's, N m (N)\n"
+        f"nominal_torque: {_format_list([e for e in efforts if e is not None])}        # the file's, N m (N)\n"
         if known
         else "nominal_torque: standard-deviation   # the file does not give all; or one per joint, N m (N)\n"
     )
@@ -223,19 +242,19 @@ def _limits(robot: SimplifiedRobot) -> str:
         )
 
     return (
-        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_position, _is_limited)}"
-        f"  velocity_limits:              # rad/s or m/s\n{rows(_velocity, _fast)}"
-        f"{_dependent_limits(robot)}"
+        f"{nominal}\n{_TRAJECTORIES}  position_limits:              # rad or m\n{rows(_format_position_limits, _is_limited)}"
+        f"  velocity_limits:              # rad/s or m/s\n{rows(_format_velocity_limit, _has_speed_limit)}"
+        f"{_format_dependent_limits(robot)}"
     )
 
 
-def _dependent_limits(robot: SimplifiedRobot) -> str:
+def _format_dependent_limits(robot: SimplifiedRobot) -> str:
     """Write the position limits of joints that depend on others as constraints; empty where there are none."""
     rows = [
         f"    - {{name: {name}, quantity: coordinate, coordinate: {name}, "
         f"min: {limits.lower:.6g}, max: {limits.upper:.6g}}}\n"
-        for name, limits in robot.dependent_limits().items()
-        if limits.allows(robot.guess.get(name, 0.0))
+        for name, limits in robot.find_dependent_limits().items()
+        if limits.is_within_limits(robot.guess.get(name, 0.0))
     ]
     return f"{_CONSTRAINTS}{''.join(rows)}" if rows else ""
 
@@ -244,17 +263,17 @@ def _is_limited(limits: ImportedJoint) -> bool:
     return limits.is_limited
 
 
-def _fast(limits: ImportedJoint) -> bool:
+def _has_speed_limit(limits: ImportedJoint) -> bool:
     return bool(limits.velocity) and math.isfinite(limits.velocity or 0.0)
 
 
-def _position(kind: str, limits: ImportedJoint | None) -> str:
+def _format_position_limits(kind: str, limits: ImportedJoint | None) -> str:
     if limits is None or not limits.is_limited:
         return _RANGE[kind]
     return f"[{limits.lower:.6g}, {limits.upper:.6g}]"
 
 
-def _velocity(kind: str, limits: ImportedJoint | None) -> str:
+def _format_velocity_limit(kind: str, limits: ImportedJoint | None) -> str:
     if limits is None or not limits.velocity or not math.isfinite(limits.velocity):
         return f"{_SPEED[kind]:g}"
     return f"{abs(limits.velocity):.6g}"

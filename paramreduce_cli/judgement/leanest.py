@@ -33,7 +33,7 @@ def leanest(
     Returns:
         None if there is none.
     """
-    tolerances = _tolerances(function, wanted.tolerances())
+    tolerances = _tolerances(function, wanted.get_tolerances())
     looked_at: tuple[str, ...] = _BOTH
     if not tolerances and terms is not None:
         budget = {

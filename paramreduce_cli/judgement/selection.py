@@ -58,7 +58,7 @@ def select(
         heuristic, row = _of_size(wanted.n, results)
         reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
     else:
-        tolerances = wanted.tolerances() or SelectedSection.USUAL
+        tolerances = wanted.get_tolerances() or SelectedSection.USUAL
         choice = smallest_within(results, tolerances)
         heuristic, row = choice if choice is not None else nearest_to(results, tolerances)
         n = int(results[heuristic].n[row])

@@ -18,7 +18,7 @@ def selection_columns(wanted: ReductionSection, samples: Samples) -> GroupedColu
     groups = [
         Group(name, tuple(members), section.tied)
         for section in wanted.groups
-        for name, members in section.groups().items()
+        for name, members in section.list_groups().items()
     ]
     return grouped_columns(samples.names, samples.preference, groups)
 

@@ -18,7 +18,7 @@ from paramreduce_cli.report.explorer import explorer
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.methods import methods
 from paramreduce_cli.report.sections import PageSection, place_of
-from paramreduce_cli.report.symbols import name_key
+from paramreduce_cli.report.symbols import explain_symbols
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
@@ -141,7 +141,7 @@ def _items(
         make = tables[name]
         place = place_of(make)
         caption = (make.__doc__ or name).strip()
-        symbols = name_key(name, table.header)
+        symbols = explain_symbols(name, table.header)
         item = _Item(name, caption, table=table, tall=place.tall, symbols=symbols)
         found.append((place, item))
     found.sort(key=lambda entry: entry[0].order)

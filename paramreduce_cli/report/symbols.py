@@ -76,7 +76,7 @@ _OF_TABLES: Mapping[str, Mapping[str, str]] = {
 }
 
 
-def name_key(table: str, header: tuple[str, ...]) -> list[tuple[str, str]]:
+def explain_symbols(table: str, header: tuple[str, ...]) -> list[tuple[str, str]]:
     """Headings of a table that need it, each once, with what they mean.
 
     Args:

@@ -5,7 +5,7 @@ from typing import Any
 
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
-from paramreduce_cli.config.sections import is_section, section
+from paramreduce_cli.config.sections import get_section, is_section
 from paramreduce_cli.records import Items, Run, Tell
 from paramreduce_cli.running.pipeline import Stage, maker_of
 from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, called
@@ -31,7 +31,7 @@ def made_in_memory(
     arguments: dict[str, Any] = {}
     for entry in stage.inputs:
         if is_section(entry.type):
-            arguments[entry.name] = section(config, entry.type)
+            arguments[entry.name] = get_section(config, entry.type)
         elif entry.type in OUTSIDE:
             arguments[entry.name] = OUTSIDE[entry.type](inputs)
         elif lent.get(entry.type) is not None or entry.optional:

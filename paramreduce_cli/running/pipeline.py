@@ -152,7 +152,7 @@ def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
     if config is not None and kind is Coefficients:
         files = {"coefficients": config.trajectories.file}
     elif config is not None and kind is Recordings:
-        files = config.sampling.files()
+        files = config.sampling.list_recordings()
     elif config is not None and kind is RawLogs and config.sampling.log is not None:
         log = config.sampling.log
         files = {f"training {k}": path for k, path in enumerate(log.files)}

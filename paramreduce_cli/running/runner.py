@@ -22,7 +22,7 @@ from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.checks import find_warnings
 from paramreduce_cli.config.schema import Settings
-from paramreduce_cli.config.sections import digests, is_section, section, section_digest
+from paramreduce_cli.config.sections import digest_section, digest_sections, get_section, is_section
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import (
     WHOLE,
@@ -246,7 +246,7 @@ class Runner:
         return [
             name
             for name, digest in stamp.sections.items()
-            if section_digest(self.config, tuple(name.split("."))) != digest
+            if digest_section(self.config, tuple(name.split("."))) != digest
         ]
 
     def _unchanged(self, stage: Stage, inputs: Inputs) -> frozenset[str]:
@@ -271,7 +271,7 @@ class Runner:
 
     def _argument(self, entry: StageInput, inputs: Inputs) -> Any:
         if is_section(entry.type):
-            return section(self.config or self.settings, entry.type)
+            return get_section(self.config or self.settings, entry.type)
         if entry.type is Provenance:
             return self._provenance()
         if entry.type in OUTSIDE:
@@ -365,8 +365,8 @@ class Runner:
         seeds = []
         if self.config is not None:
             for entry in stage.sections:
-                sections |= digests(self.config, entry.type)
-                seeds += [getattr(section(self.config, entry.type), "seed", None)]
+                sections |= digest_sections(self.config, entry.type)
+                seeds += [getattr(get_section(self.config, entry.type), "seed", None)]
         return Stamp(
             schema=SCHEMA,
             robot=self._robot,

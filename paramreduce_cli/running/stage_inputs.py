@@ -10,7 +10,7 @@ from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.artifacts.store import file_digest
 from paramreduce_cli.config import Config
-from paramreduce_cli.config.error_keys import name_key
+from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import NumericalError, ParamreduceWarning
 from paramreduce_cli.records import (
     SETS,
@@ -57,7 +57,7 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
     try:
         return stage.call(arguments)
     except NumericalError as error:
-        raise name_key(error) from error
+        raise locate_error(error) from error
 
 
 @contextmanager

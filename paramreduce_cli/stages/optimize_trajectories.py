@@ -74,7 +74,7 @@ def excitation_task(
         base_values=model.base_values,
         torque_scale=_torque_scale(wanted, model.nominal_torque),
         criterion=wanted.criterion,
-        constraints=wanted.bounded(model.mechanism),
+        constraints=wanted.build_constraints(model.mechanism),
         settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
@@ -96,7 +96,7 @@ def _settings(
         period=period,
         harmonics=harmonics,
         points=max(wanted.points, 2 * harmonics + 1),
-        limits=wanted.limits(model.mechanism.n_dof),
+        limits=wanted.build_limits(model.mechanism.n_dof),
         mapping="gauge" if wanted.use_full_range else "ball",
         rest_to_rest=wanted.rest_to_rest,
         start_pose=(

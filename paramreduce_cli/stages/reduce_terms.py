@@ -121,7 +121,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
     mechanism = model.mechanism
     judge = Judge(
         model, samples, reduction.nominal_torque,
-        trajectories.limits(mechanism.n_dof), trajectories.bounded(mechanism),
+        trajectories.build_limits(mechanism.n_dof), trajectories.build_constraints(mechanism),
         direct=direct, projected=projected, measured=sampling.measured,
     )  # fmt: skip
 

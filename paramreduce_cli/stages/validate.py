@@ -104,7 +104,7 @@ def validate(
         measured = _measured(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
     costs = None if model is None else OperationCounts(model, counted, reduction, run)
-    if costs is not None and (costs.are_few or "operations" in wanted.tolerances()):
+    if costs is not None and (costs.are_few or "operations" in wanted.get_tolerances()):
         heuristics = costs.count(heuristics, every_model(heuristics))
     crossed = None
     if wanted.cross_validation:

@@ -60,7 +60,7 @@ class Linear:
     metric: FloatArray | None
     """Where accelerations matter, (n_dof, n_dof, n_samples)."""
 
-    def name_key(self, changes: FloatArray) -> FloatArray:
+    def explained(self, changes: FloatArray) -> FloatArray:
         """Squares of what the parameters make up for, (k,), of changes (k, n_rows)."""
         return np.sum(self._coordinates(changes) ** 2, axis=1)
 
@@ -76,9 +76,9 @@ class Linear:
         size = np.einsum("cr,cr->c", changes, changes)
         along = changes @ self.residual
         C = self._coordinates(changes)
-        name_key = np.einsum("cn,cn->c", C, C)
+        explained = np.einsum("cn,cn->c", C, C)
         plain = size + 2 * along
-        again, sure = plain - name_key, plain.copy()
+        again, sure = plain - explained, plain.copy()
         (one,) = np.nonzero(combinations.any(axis=1))
         # With a the combination, columns become W - d a': the residual is least, over the multiple s of
         # what a' beta was, at r + s d's part out of reach, and e (1 - s) + s C along the direction of a.
@@ -86,9 +86,9 @@ class Linear:
         lengths = np.linalg.norm(directions, axis=1)
         e = combinations[one] @ beta / lengths
         t = e - np.einsum("cn,cn->c", C[one], directions) / lengths
-        pruning = t**2 + np.maximum(size[one] - name_key[one], 0.0)
-        gone = pruning <= _NOTHING * (e**2 + size[one])
-        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, pruning)
+        left = t**2 + np.maximum(size[one] - explained[one], 0.0)
+        gone = left <= _NOTHING * (e**2 + size[one])
+        regained = (e * t - along[one]) ** 2 / np.where(gone, 1.0, left)
         again[one] = sure[one] = e**2 - np.where(gone, 0.0, regained)
         return Costs(again, plain, sure)
 

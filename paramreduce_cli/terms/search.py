@@ -214,6 +214,6 @@ class TermSearch:
         dearer = self.tape.counts(fit.pruning, terms) - self.tape.count(fit.pruning)
         G = self._fitting.effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
-        gain += fit.linear.name_key(G)
+        gain += fit.linear.explained(G)
         worth = gain / np.maximum(dearer, 0.5)
         return int(numbers[np.argmax(worth)]) if np.any(gain > 0) else None

@@ -86,8 +86,8 @@ def scip(fit, n):
     triangle = np.linalg.qr(np.column_stack([fit.X, fit.y]), mode="r")
     rest = [model.addVar(lb=None) for _ in triangle]
     for left, row in zip(rest, triangle, strict=True):
-        name_key = pyscipopt.quicksum(float(w) * one for w, one in zip(row, b, strict=False))
-        model.addCons(left == float(row[-1]) - name_key)
+        explained = pyscipopt.quicksum(float(w) * one for w, one in zip(row, b, strict=False))
+        model.addCons(left == float(row[-1]) - explained)
     square = model.addVar(lb=0)
     model.addCons(pyscipopt.quicksum(one * one for one in rest) <= square)
     model.setObjective(square)

@@ -10,10 +10,10 @@ from conftest import CONFIGS, config_of
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from paramreduce_cli.config import config_schema, load_config
+from paramreduce_cli.config import get_schema, load_config
 from paramreduce_cli.config.former_keys import FORMER_KEYS
 from paramreduce_cli.config.reading import read_yaml
-from paramreduce_cli.config.template import dh_template
+from paramreduce_cli.config.template import format_dh_template
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 
 pytestmark = pytest.mark.filterwarnings("ignore::paramreduce_cli.errors.ParamreduceWarning")
@@ -28,7 +28,7 @@ def errors_of(path, *overrides):
 @pytest.mark.parametrize("path", sorted(CONFIGS.glob("*.yaml")), ids=lambda p: p.stem)
 def test_configs_that_ship_are_valid_and_satisfy_the_json_schema(path):
     config = load_config(path)
-    jsonschema.validate(read_yaml(path.read_text(), str(path)).data, config_schema())
+    jsonschema.validate(read_yaml(path.read_text(), str(path)).data, get_schema())
     assert config.robot == path.stem
     for name in config.parameter_sets:
         load_config(path, [f"parameters={name}"])
@@ -178,7 +178,7 @@ def test_bodies_that_cannot_exist_are_remarked_on_and_go_on(write_config, old, n
 
 
 def test_every_key_of_the_schema_is_documented():
-    schema = config_schema()
+    schema = get_schema()
     for model in (schema, *schema["$defs"].values()):
         for key, entry in model.get("properties", {}).items():
             assert entry.get("description"), (model["title"], key)
@@ -199,7 +199,7 @@ def test_numbers_that_no_machine_has_are_refused(write_config, override):
 @pytest.mark.parametrize("joints", [1, 2, 6, 9])
 def test_the_template_is_valid_and_physical(tmp_path, joints):
     path = tmp_path / "arm.yaml"
-    path.write_text(dh_template("arm", joints))
+    path.write_text(format_dh_template("arm", joints))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert load_config(path).n_dof == joints

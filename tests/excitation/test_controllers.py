@@ -12,7 +12,7 @@ from conftest import ROOT, config_and_model, config_of, slope
 from oracles import capsules, pinocchio_model
 
 from paramreduce_cli.config.clearance import ClearanceSection
-from paramreduce_cli.config.error_keys import name_key
+from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import ConfigError, DataError, NumericalError
 from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
@@ -142,7 +142,7 @@ def test_limits_that_no_motion_keeps_are_said():
     excitation = excitation_of(task)
     with pytest.raises(NumericalError, match="leave no motion") as error:
         optimise_trajectory(excitation, task.settings, [0])
-    assert name_key(error.value).key == ("trajectories", "torque_limits")
+    assert locate_error(error.value).key == ("trajectories", "torque_limits")
 
 
 @pytest.fixture(scope="module")
@@ -156,7 +156,7 @@ def test_distances_are_never_overestimated(ur10):
     section = ClearanceSection(
         radius=0.05, gap=0.01, planes=[{"name": "floor", "point": [0, 0, -0.4]}]
     )
-    constraints = tuple(section.constraints(mechanism))
+    constraints = tuple(section.build_constraints(mechanism))
     quantities = Quantities(mechanism, constraints)
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (60, 6))
@@ -185,18 +185,18 @@ def test_distances_are_never_overestimated(ur10):
 def test_bodies_that_are_near_anyway_or_ignored_are_not_looked_at(ur10):
     mechanism = ur10
     names = [body.name for body in mechanism.bodies]
-    found = {c.name for c in ClearanceSection().constraints(mechanism)}
+    found = {c.name for c in ClearanceSection().build_constraints(mechanism)}
     assert f"{names[0]}-{names[1]}" not in found
     assert f"base-{names[5]}" in found
     less = ClearanceSection(ignore=[["base", names[5]]], capsules={names[4]: []})
-    left = {c.name for c in less.constraints(mechanism)}
+    left = {c.name for c in less.build_constraints(mechanism)}
     assert f"base-{names[5]}" not in left
     assert not any(names[4] in name for name in left)
 
 
 def test_bodies_of_a_clearance_must_be_there(ur10):
     with pytest.raises(ConfigError, match="names the body hand; there is"):
-        list(ClearanceSection(ignore=[["base", "hand"]]).constraints(ur10))
+        list(ClearanceSection(ignore=[["base", "hand"]]).build_constraints(ur10))
 
 
 @pytest.fixture(scope="module")
@@ -277,9 +277,9 @@ def test_a_way_around_what_is_in_the_way(ur10):
     section = ClearanceSection(radius=0.05, planes=[{"name": "table"}, ceiling])
     config = config_of("ur10")
     model = types.SimpleNamespace(mechanism=ur10, values=config.get_values())
-    constraints = tuple(section.constraints(model.mechanism))
+    constraints = tuple(section.build_constraints(model.mechanism))
     trajectories = types.SimpleNamespace(
-        limits=config.trajectories.limits(6), constraints=constraints, period=1.0
+        limits=config.trajectories.build_limits(6), constraints=constraints, period=1.0
     )
     start, end = np.array([0, -0.6, 0.5, 0, 0, 0.0]), np.array([0, -np.pi + 0.6, -0.5, 0, 0, 0.0])
     pairs = [c.bodies for c in constraints if c.kind == "clearance"]

@@ -47,10 +47,10 @@ def test_a_motion_is_that_of_least_jerk(start, end, duration):
 def found(robot, count=5, seed=0, **limits):
     config, model = config_of(robot), model_of(robot)
     wanted = config.trajectories
-    own = replace(wanted.limits(model.mechanism.n_dof), **limits)
+    own = replace(wanted.build_limits(model.mechanism.n_dof), **limits)
     rng = np.random.default_rng(seed)
     positions = rng.uniform(0.5 * own.lower + 0.5 * own.middle, 0.5 * own.upper + 0.5 * own.middle, (40, own.lower.size))  # fmt: skip
-    constraints = wanted.bounded(model.mechanism)
+    constraints = wanted.build_constraints(model.mechanism)
     motions = find_point_to_point(model, own, constraints, 2 * np.pi, positions, count, 200, rng)
     return model, own, constraints, positions, motions
 
@@ -93,8 +93,8 @@ def test_motions_take_no_more_torque_or_power_than_there_is():
 
 def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
     config, model = config_of("five_bar"), model_of("five_bar")
-    limits = config.trajectories.limits(model.mechanism.n_dof)
-    constraints = config.trajectories.bounded(model.mechanism)
+    limits = config.trajectories.build_limits(model.mechanism.n_dof)
+    constraints = config.trajectories.build_constraints(model.mechanism)
     home = model.mechanism.loops.assembly[list(model.mechanism.independent)]
     rng = np.random.default_rng(1)
     positions = np.clip(home + rng.uniform(-0.6, 0.6, (30, home.size)), limits.lower, limits.upper)
@@ -113,12 +113,12 @@ def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
 def test_fewer_motions_are_found_where_straight_lines_are_not_free():
     model = model_of("five_bar")
     config = config_of("five_bar")
-    limits = config.trajectories.limits(model.mechanism.n_dof)
+    limits = config.trajectories.build_limits(model.mechanism.n_dof)
     far = np.array([limits.lower, limits.upper, [limits.lower[0], limits.upper[1]]]) * 3
     motions = find_point_to_point(
         model,
         limits,
-        config.trajectories.bounded(model.mechanism),
+        config.trajectories.build_constraints(model.mechanism),
         6.0,
         far,
         3,

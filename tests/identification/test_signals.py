@@ -10,7 +10,7 @@ from simulated_logs import two_link_log, write_log
 
 from paramreduce_cli.artifacts import log_files
 from paramreduce_cli.artifacts.log_files import load_log
-from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
+from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
 from paramreduce_cli.identification.signals import evened, signals
@@ -316,7 +316,7 @@ def test_torques_that_are_not_measured_need_no_column(torque, change):
     ],
 )  # fmt: skip
 def test_joints_are_read_from_columns_of_their_names(names, joints):
-    assert joints_by_name(names) == joints
+    assert list_named_joints(names) == joints
 
 
 def test_a_log_with_more_joints_than_the_robot_is_refused():

@@ -7,7 +7,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paramreduce_cli.fields.numbers import parse_number
-from paramreduce_cli.importing.angles import angle_text, near_angle, number_text, unround_angle
+from paramreduce_cli.importing.angles import (
+    find_near_angle,
+    format_angle,
+    format_number,
+    unround_angle,
+)
 
 
 @pytest.mark.parametrize(
@@ -30,7 +35,7 @@ def test_what_an_angle_was_rounded_from(text, angle):
      ("0.3", None), ("1.6", None)],
 )  # fmt: skip
 def test_angles_that_are_almost_rounded_ones_are_hinted_at(text, near):
-    assert near_angle(text) == near
+    assert find_near_angle(text) == near
 
 
 @given(st.integers(-24, 24), st.integers(4, 15))
@@ -41,7 +46,7 @@ def test_multiples_of_15_degrees_survive_rounding(twelfths, digits):
 
 @given(st.floats(-7, 7))
 def test_angles_are_written_as_a_config_reads_them(angle):
-    assert parse_number(angle_text(angle)) == pytest.approx(angle, rel=1e-11, abs=1e-30)
+    assert parse_number(format_angle(angle)) == pytest.approx(angle, rel=1e-11, abs=1e-30)
 
 
 @pytest.mark.parametrize(
@@ -49,9 +54,9 @@ def test_angles_are_written_as_a_config_reads_them(angle):
     [(math.pi, "pi"), (-math.pi / 2, "-pi/2"), (5 * math.pi / 6, "5*pi/6"), (0.0, "0"), (1.0, "1")],
 )
 def test_texts_of_angles(angle, text):
-    assert angle_text(angle) == text
+    assert format_angle(angle) == text
 
 
 @given(st.floats(-1e6, 1e6))
 def test_numbers_keep_twelve_digits(value):
-    assert float(number_text(value)) == pytest.approx(value, rel=1e-11, abs=1e-300)
+    assert float(format_number(value)) == pytest.approx(value, rel=1e-11, abs=1e-300)

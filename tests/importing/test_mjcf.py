@@ -10,8 +10,8 @@ import pytest
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.reading import imported
-from paramreduce_cli.importing.writing import config_text
+from paramreduce_cli.importing.reading import read_robot
+from paramreduce_cli.importing.writing import format_config
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -88,7 +88,7 @@ def written(tmp_path, text):
 def loaded(path, tmp_path, **choice):
     source = SourceSection(file=path, **choice)
     config = tmp_path / "config.yaml"
-    config.write_text(config_text(imported(source), source))
+    config.write_text(format_config(read_robot(source), source))
     return load_config(config)
 
 
@@ -125,11 +125,11 @@ def test_limits_and_drives_are_taken_over(tmp_path):
     config = loaded(path, tmp_path)
     assert config.robot == "an_arm"
     assert config.description.bodies.list_coordinates() == ["shoulder", "lift", "elbow"]
-    limits = config.trajectories.limits(3)
+    limits = config.trajectories.build_limits(3)
     assert np.degrees([limits.lower[0], limits.upper[0]]) == pytest.approx([-110, 40], abs=1e-3)
     effects = {kind.symbol: value for kind, value in config.drives["elbow"].get_values().items()}
     assert effects == pytest.approx({"Ia": 0.02, "fv": 0.3, "fc": 0.4})
-    warnings = " ".join(imported(SourceSection(file=path)).warnings)
+    warnings = " ".join(read_robot(SourceSection(file=path)).warnings)
     assert "shoulder counts from the pose of the file" in warnings
     assert config.nominal_torque == "standard-deviation"  # the lift has no actuator
 
@@ -348,8 +348,8 @@ def test_bodies_without_a_name_get_one_that_is_free(tmp_path):
 def test_choices_that_would_change_loops_are_refused(tmp_path):
     path = written(tmp_path, FIVE_BAR)
     with pytest.raises(ConfigError, match="import it whole"):
-        imported(SourceSection(file=path, locked={"left": 0.1}))
-    opened = imported(SourceSection(file=path, ignored=["right"], uncoupled=True))
+        read_robot(SourceSection(file=path, locked={"left": 0.1}))
+    opened = read_robot(SourceSection(file=path, ignored=["right"], uncoupled=True))
     assert len(opened.independent) == len(opened.bodies)
 
 
@@ -357,7 +357,7 @@ def test_a_model_without_a_name_is_called_after_its_file(tmp_path):
     text = ARM.replace(' model="an arm"', "").replace(
         'gravity="0.3 -0.2 -9"/>', 'gravity="0 0 -1"><flag gravity="disable"/></option>'
     )
-    robot = imported(SourceSection(file=written(tmp_path, text)))
+    robot = read_robot(SourceSection(file=written(tmp_path, text)))
     assert robot.name == "arm"
     assert robot.gravity == (0, 0, 0)
 
@@ -368,7 +368,7 @@ def test_what_mujoco_warns_of_is_told_and_written_nowhere(tmp_path, invoke, monk
     path, output = written(tmp_path, text), tmp_path / "arm.yaml"
     mujoco.set_mju_user_warning(None)
     try:
-        warnings = imported(SourceSection(file=path)).warnings
+        warnings = read_robot(SourceSection(file=path)).warnings
         invoke("init", path, "--output", output)
         given = (output, "--results", tmp_path / "r")
         invoke("build-model", *given)

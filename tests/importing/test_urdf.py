@@ -15,9 +15,9 @@ from robot_files import ARM
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.schema import SourceSection
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.reading import imported
+from paramreduce_cli.importing.reading import read_robot
 from paramreduce_cli.importing.urdf import read_urdf
-from paramreduce_cli.importing.writing import config_text
+from paramreduce_cli.importing.writing import format_config
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.assembly import assembled
@@ -40,7 +40,7 @@ def written(tmp_path, text):
 def loaded(path, tmp_path, **choice):
     config = tmp_path / "config.yaml"
     source = SourceSection(file=path, **choice)
-    config.write_text(config_text(imported(source), source))
+    config.write_text(format_config(read_robot(source), source))
     return load_config(config)
 
 
@@ -95,12 +95,12 @@ def test_names_limits_and_torques_are_taken_over(tmp_path):
     config = loaded(path, tmp_path)
     assert config.robot == "an_arm"
     assert config.description.bodies.list_coordinates() == ["shoulder", "j_lift", "grip"]
-    limits = config.trajectories.limits(3)
+    limits = config.trajectories.build_limits(3)
     assert limits.lower == pytest.approx([-2, 0, -np.pi])
     assert limits.upper == pytest.approx([1.5, 0.3, np.pi])
     assert limits.velocity == pytest.approx([3, 0.5, 1.5])
     assert config.nominal_torque == "standard-deviation"  # grip has no effort
-    warnings = " ".join(imported(SourceSection(file=path)).warnings)
+    warnings = " ".join(read_robot(SourceSection(file=path)).warnings)
     assert "the joint 'j\"lift' is called j_lift here" in warnings
 
 
@@ -145,7 +145,7 @@ def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
 
 
 def test_a_joint_that_follows_none_moves_on_its_own(tmp_path):
-    robot = imported(SourceSection(file=written(tmp_path, following('<mimic joint="lost"/>'))))
+    robot = read_robot(SourceSection(file=written(tmp_path, following('<mimic joint="lost"/>'))))
     assert not robot.couplings
     assert "j\"lift follows 'lost', which is no joint: it moves on its own" in robot.warnings
 
@@ -157,12 +157,12 @@ def test_joints_that_follow_one_that_follows_or_does_not_move(tmp_path):
     )
     slide = '<mimic joint="shoulder" multiplier="2" offset="0.1"/>'
     path = written(tmp_path, following(slide, grip))
-    robot = imported(SourceSection(file=path))
+    robot = read_robot(SourceSection(file=path))
     assert [(c.leader.name, c.ratio, c.offset) for c in robot.couplings] == [
         ("upper", 2.0, 0.1), ("upper", 6.0, pytest.approx(0.3)),
     ]  # fmt: skip
     with pytest.raises(ConfigError, match="no joint is left that moves"):
-        imported(SourceSection(file=path, locked={"shoulder": 0.3}))
+        read_robot(SourceSection(file=path, locked={"shoulder": 0.3}))
     assert loaded(path, tmp_path, uncoupled=True).n_dof == 3
 
 
@@ -177,9 +177,9 @@ def test_planar_and_floating_joints(tmp_path):
 
 def test_rounded_angles_are_listed(tmp_path):
     path = written(tmp_path, ARM.replace('rpy="0 1.2 0"', 'rpy="0 1.5708 3.14159"'))
-    robot = imported(SourceSection(file=path))
+    robot = read_robot(SourceSection(file=path))
     assert [r for r in robot.warnings if "1.5708" in r or "3.14159" in r]
-    assert "{rz: pi}, {ry: pi/2}" in config_text(robot, SourceSection(file=path))
+    assert "{rz: pi}, {ry: pi/2}" in format_config(robot, SourceSection(file=path))
 
 
 @needs_robots
@@ -415,6 +415,6 @@ def test_followers_of_a_fixed_joint_and_negative_speeds_are_said(tmp_path):
         + joint.format("m", "revolute", "b", "d", limit.format(1) + "<mimic joint='f' multiplier='2' offset='0.1'/>")
         + "</robot>"
     )  # fmt: skip
-    found = imported(SourceSection(file=file))
+    found = read_robot(SourceSection(file=file))
     assert "m follows f, which is fixed, and so is locked at 0.1" in found.warnings
     assert any("velocity=-1 is taken for 1" in warning for warning in found.warnings)

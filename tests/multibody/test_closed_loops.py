@@ -269,7 +269,7 @@ def test_follower_finds_what_a_fresh_start_finds():
 
 def test_constraints_of_the_six_legged_robot_at_home():
     mechanism = closed("hexaglide")
-    constraints = config_of("hexaglide").trajectories.bounded(mechanism)
+    constraints = config_of("hexaglide").trajectories.build_constraints(mechanism)
     values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
     assert values[0] == pytest.approx(0, abs=1e-9)
     assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)

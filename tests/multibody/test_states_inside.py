@@ -63,12 +63,12 @@ def test_states_of_loops_are_assembled_inside_limits_and_constraints(robot):
     wanted = assembly[independent] + rng.uniform(-0.1, 0.1, (20, len(independent)))
     reached, way = coordinates.follow(wanted, assembly)
     known = np.vstack([assembly, reached[way == 1]])
-    limits = config.trajectories.limits(mechanism.n_dof)
+    limits = config.trajectories.build_limits(mechanism.n_dof)
     upper = np.array([np.full(mechanism.n_q, size) for size in (np.inf, 2.0, 5.0)])
     lower = -upper
     lower[0, independent], upper[0, independent] = limits.lower, limits.upper
     lower[1, independent], upper[1, independent] = -limits.velocity, limits.velocity
-    constraints = config.trajectories.bounded(mechanism)
+    constraints = config.trajectories.build_constraints(mechanism)
     _, (q, dq, ddq) = drawn(robot, (lower, upper), constraints, known, 60)
     for values, low, high in zip((q, dq, ddq), lower, upper, strict=True):
         assert 30 <= len(values) <= 60

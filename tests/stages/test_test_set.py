@@ -142,7 +142,7 @@ def test_brought_coefficients_with_and_without_one(two_link_results, tmp_path):
 
 def test_motions_of_the_test_set_keep_to_the_limits(two_link_results):
     config, _ = config_and_model("two_link")
-    limits = config.trajectories.limits(2)
+    limits = config.trajectories.build_limits(2)
     with h5py.File(two_link_results / "samples.h5") as file:
         z, dz = file["test/z"][:], file["test/dz"][:]
     assert np.all(z >= limits.lower - 1e-9)

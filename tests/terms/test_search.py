@@ -84,8 +84,8 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
         )
         flat = rows.reshape(found.beta.size, -1).T
         best = np.linalg.lstsq(flat, (samples.tau / weights).ravel(), rcond=None)[0]
-        pruning = np.linalg.norm(flat @ best - (samples.tau / weights).ravel())
-        assert error == pytest.approx(pruning / np.linalg.norm(samples.tau / weights), rel=1e-6)
+        left = np.linalg.norm(flat @ best - (samples.tau / weights).ravel())
+        assert error == pytest.approx(left / np.linalg.norm(samples.tau / weights), rel=1e-6)
         return
     accelerations = np.linalg.solve(
         np.moveaxis(M, 2, 0), np.moveaxis(samples.tau - tau, 1, 0)[..., None]

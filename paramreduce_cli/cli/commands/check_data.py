@@ -9,8 +9,8 @@ import rich.table
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import SET, FilePath
 from paramreduce_cli.cli.terminal import LOG, say, say_table, warn_user
-from paramreduce_cli.config import load_config, placed_errors
-from paramreduce_cli.config.column_matching import guess_columns, joints_by_name
+from paramreduce_cli.config import load_config, locate_errors
+from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
 from paramreduce_cli.config.logs import ColumnsSection, LogSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.texts import format_percent
@@ -57,7 +57,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         section = LogSection(files=[file], columns=columns)
     usual = LogSection.model_fields["held_out"].default
     section = section.model_copy(update={"held_out": usual} if section.held_out_files else {})
-    with placed_errors(config, overrides):
+    with locate_errors(config, overrides):
         unmeasured = [] if loaded is None else loaded.unmeasured
         log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
         found = None
@@ -105,6 +105,6 @@ def _joints(names: list[str]) -> list[str]:
         except ConfigError:
             continue
         return joints
-    joints = joints_by_name(names) or ["q1"]
+    joints = list_named_joints(names) or ["q1"]
     guess_columns(names, joints)  # says what is missing
     return joints

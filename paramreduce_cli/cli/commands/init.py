@@ -14,22 +14,22 @@ import click
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
 from paramreduce_cli.config.column_matching import guess_columns
-from paramreduce_cli.config.examples import copy_example, exists_already
+from paramreduce_cli.config.examples import copy_example, make_exists_error
 from paramreduce_cli.config.loading import load_config
-from paramreduce_cli.config.log_template import log_text
+from paramreduce_cli.config.log_template import format_log_section
 from paramreduce_cli.config.schema import CLOSED, Config, SourceSection
 from paramreduce_cli.config.template import (
-    dh_template,
-    loop_template,
-    recorded_template,
-    tree_template,
+    format_dh_template,
+    format_loop_template,
+    format_recorded_template,
+    format_tree_template,
 )
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.fields.numbers import parse_number
 from paramreduce_cli.fields.section import NAME
-from paramreduce_cli.importing.reading import described, imported
+from paramreduce_cli.importing.reading import find_described_robot, read_robot
 from paramreduce_cli.importing.simplified import SimplifiedRobot
-from paramreduce_cli.importing.writing import config_text
+from paramreduce_cli.importing.writing import format_config
 
 _BASE = 6
 """Coordinates of a base that floats, which come first."""
@@ -95,7 +95,7 @@ def init(
         say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {quote(str(copied[0]))}")
         return
     choice = SourceSection(
-        file=(described(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
+        file=(find_described_robot(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
         ignored=list(ignored), floating=floating, uncoupled=uncouple, closed=list(map(_check_closure, closed)),
         independent=list(independent),
     )  # fmt: skip
@@ -105,7 +105,7 @@ def init(
         path = output or Path("configs") / f"{source}.yaml"
         text = _described(source, kind, joints)
     else:
-        robot = imported(choice)
+        robot = read_robot(choice)
         path = output or Path("configs") / f"{robot.name}.yaml"
         if re.fullmatch(NAME, path.stem, re.ASCII):  # results go to a folder of the robot's name
             robot = replace(robot, name=path.stem)
@@ -117,11 +117,13 @@ def init(
             robot = _closed(robot, choice)
         base = robot.independent[:_BASE] if floating else ()
         log = _log(path, logs, robot.independent, base) if logs else ""
-        text = config_text(robot, choice.model_copy(update={"file": _from(path, choice.file)}), log)
+        text = format_config(
+            robot, choice.model_copy(update={"file": _from(path, choice.file)}), log
+        )
         for warning in robot.warnings:
             say(f"- {warning}.")
     if path.exists():
-        raise exists_already(path)
+        raise make_exists_error(path)
     _check(text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -167,7 +169,7 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
     for key, value in columns.items():
         shown = value if isinstance(value, str) else ", ".join(value)
         say(f"- {key}: {shown}.")
-    return log_text([_from(config, path) for path in logs], columns)
+    return format_log_section([_from(config, path) for path in logs], columns)
 
 
 def _from(config: Path, file: Path) -> Path:
@@ -183,10 +185,10 @@ def _described(name: str, kind: str, joints: int) -> str:
             f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
         )
     if kind == "dh":
-        return dh_template(name, joints)
+        return format_dh_template(name, joints)
     if kind == "recorded":
-        return recorded_template(name, joints)
-    return tree_template(name) if kind == "tree" else loop_template(name)
+        return format_recorded_template(name, joints)
+    return format_tree_template(name) if kind == "tree" else format_loop_template(name)
 
 
 def _lock(text: str) -> tuple[str, float]:
@@ -214,8 +216,8 @@ def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
     # Late: CasADi.
     from paramreduce_cli.multibody.loops.imported import close_loops
 
-    every = tuple(name for body in robot.bodies for name in body.coordinates())
-    text = config_text(replace(robot, independent=robot.independent or every), choice)
+    every = tuple(name for body in robot.bodies for name in body.list_coordinates())
+    text = format_config(replace(robot, independent=robot.independent or every), choice)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)  # they come with the final text
         mechanism = _check(text).build_mechanism()

@@ -33,7 +33,7 @@ from paramreduce_cli.cli.terminal import (
     show_progress,
     warn_user,
 )
-from paramreduce_cli.config import load_config, placed_errors
+from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.records import Report
 from paramreduce_cli.running.pipeline import absent_files, stages_to_run
 from paramreduce_cli.running.runner import Runner, asked
@@ -79,7 +79,7 @@ def run(
             path,
             remedy=f"It is named under {key} in {config}, whose comments may say where it is from.",
         )
-    with placed_errors(config, overrides), store.locked():
+    with locate_errors(config, overrides), store.locked():
         words = asked(config, results, overrides)
         _say_what_is_replaced(
             Runner(loaded, store, asked=words), changed=bool(overrides) and results is None

@@ -1,7 +1,7 @@
 """MJCF, MuJoCo's own files."""
 
 from paramreduce_cli.importing.mjcf import read_mjcf
-from paramreduce_cli.importing.mjcf_writing import with_parameters
+from paramreduce_cli.importing.mjcf_writing import write_mjcf
 from paramreduce_cli.importing.robot_format import RobotFormat
 from paramreduce_cli.records import Kind
 
@@ -9,4 +9,4 @@ from paramreduce_cli.records import Kind
 def mjcf() -> RobotFormat:
     """Return how MJCF is read and written."""
     held = (Kind.VISCOUS, Kind.COULOMB, Kind.ROTOR, Kind.STIFFNESS)
-    return RobotFormat("mujoco", read_mjcf, with_parameters, held, True, True)
+    return RobotFormat("mujoco", read_mjcf, write_mjcf, held, True, True)

@@ -65,8 +65,8 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     closed = replace(robot, independent=own, guess=guess)
     outside = [
         f"{name} ({joint.lower:.4g} to {joint.upper:.4g})"
-        for name, joint in closed.dependent_limits().items()
-        if not joint.allows(guess.get(name, 0.0))
+        for name, joint in closed.find_dependent_limits().items()
+        if not joint.is_within_limits(guess.get(name, 0.0))
     ]
     if outside:
         warnings = (
@@ -83,5 +83,5 @@ def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
         names.index(name)
         for body in robot.bodies
         if body.limits is not None and body.limits.effort
-        for name in body.coordinates()
+        for name in body.list_coordinates()
     ]

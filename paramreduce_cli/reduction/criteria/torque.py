@@ -58,8 +58,8 @@ class TorqueObjective(Objective):
                 result[unit] = gains[own[0]]
             elif own.size:
                 X = rest.X[:, own]
-                name_key = X @ np.linalg.lstsq(X, rest.y, rcond=DEPENDENT)[0]
-                result[unit] = name_key @ name_key / width
+                explained = X @ np.linalg.lstsq(X, rest.y, rcond=DEPENDENT)[0]
+                result[unit] = explained @ explained / width
         return result
 
     def losses(self, kept: Units) -> FloatArray:
