@@ -18,7 +18,7 @@ import yaml
 
 from paramreduce_cli import api
 from paramreduce_cli.cli import cli
-from paramreduce_cli.config.loading import config_schema
+from paramreduce_cli.config.loading import get_schema
 
 CONFIGS = Path(__file__).resolve().parents[1] / "configs"
 KEYS = Path(__file__).resolve().parent / "keys"
@@ -32,7 +32,7 @@ Schema = Mapping[str, Any]
 
 def config_page() -> str:
     """Every key of a config: kind, default, what it is, and where a config that comes along uses it."""
-    schema = config_schema()
+    schema = get_schema()
     lines = [
         "# Keys of a config",
         "",
@@ -61,7 +61,7 @@ def keys() -> list[str]:
     """Every key with its place, such as ``trajectories.count``."""
     return [
         f"{path}.{key}" if path else key
-        for path, section, _ in _sections(config_schema())
+        for path, section, _ in _sections(get_schema())
         for key in section.get("properties", {})
     ]
 

@@ -40,9 +40,9 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
 from paramreduce_cli.report.data_frames import frame
-from paramreduce_cli.running.in_memory import made_in_memory
-from paramreduce_cli.running.pipeline import maker_of, stages_to_run
-from paramreduce_cli.running.runner import Callbacks, Runner, asked, provenance
+from paramreduce_cli.running.in_memory import run_in_memory
+from paramreduce_cli.running.pipeline import find_maker, list_stages_to_run
+from paramreduce_cli.running.runner import Callbacks, Runner, format_arguments, make_provenance
 
 __all__ = [
     "Config",
@@ -204,7 +204,14 @@ def make_report(
     """
     wanted = config or Settings()
     robot = "" if model is None else model.mechanism.robot
-    records = samples, reduction, validation, model, *more, provenance(wanted, robot, {}, {}, "")
+    records = (
+        samples,
+        reduction,
+        validation,
+        model,
+        *more,
+        make_provenance(wanted, robot, {}, {}, ""),
+    )
     return _made(Report, wanted, *records)
 
 
@@ -321,9 +328,9 @@ def run(
     """
     loaded = load_config(config, overrides)
     store = Store(Path(results) if results is not None else Path("results") / loaded.robot)
-    words = asked(Path(config), None if results is None else Path(results), overrides)
-    with store.locked():
-        for stage in stages_to_run(loaded):
+    words = format_arguments(Path(config), None if results is None else Path(results), overrides)
+    with store.lock():
+        for stage in list_stages_to_run(loaded):
             Runner(loaded, store, jobs, Callbacks(progress), asked=words).run(stage)
     return Results(store.folder)
 
@@ -380,14 +387,14 @@ class Results:
         return self._record(TermReduction)
 
     def _record(self, kind: type) -> Any:
-        return load_file(Store(self.folder).path(kind), kind, None, maker_of(kind).name)[0]
+        return load_file(Store(self.folder).get_path(kind), kind, None, find_maker(kind).name)[0]
 
 
 def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
-    stage = maker_of(kind)
+    stage = find_maker(kind)
     if not isinstance(config, Config | Settings):
         raise TypeError(
             f"{stage.function.__name__} takes a config, not {config!r:.80}; load_config(path) reads one"
         )
     given = {type(record): record for record in records if record is not None}
-    return made_in_memory(stage, config, given, Run(jobs))
+    return run_in_memory(stage, config, given, Run(jobs))

@@ -134,7 +134,7 @@ class NumericalError(ParamreduceError):
 
     Args:
         message: What failed, with a remedy if the remedy needs no key.
-        concern: What stands in the way.
+        cause: What stands in the way.
     """
 
     def __init__(self, message: str, cause: Cause) -> None:

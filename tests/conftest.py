@@ -22,7 +22,7 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.lean import formulations as formulations_module
 from paramreduce_cli.records import ReducedModel, Run
 from paramreduce_cli.robots import Robot
-from paramreduce_cli.running.pipeline import stages_to_run
+from paramreduce_cli.running.pipeline import list_stages_to_run
 from paramreduce_cli.running.runner import Runner
 from paramreduce_cli.stages.build_model import build_model
 
@@ -163,7 +163,7 @@ def run_stages(folder, *overrides):
     """Run the small case; returns which stages had nothing to do."""
     config = config_of("two_link", ONE_FORMAT, *overrides)
     runner = Runner(config, Store(folder))
-    return {stage.name: runner.run(stage).current for stage in stages_to_run(config)}
+    return {stage.name: runner.run(stage).current for stage in list_stages_to_run(config)}
 
 
 def slope(function, arguments, direction, which=0, step=1e-6):
@@ -258,7 +258,7 @@ def measured_results(made_once):
     def make(folder):
         write_log(folder / "log.csv", two_link_log())
         config = load_config(log_config(folder), [ONE_FORMAT, *ROUGH_TERMS])
-        for stage in stages_to_run(config):
+        for stage in list_stages_to_run(config):
             Runner(config, Store(folder / "results")).run(stage)
 
     with drawn_figures():

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.excitation.fourier import fourier_basis
+from paramreduce_cli.excitation.fourier import evaluate_basis
 from paramreduce_cli.multibody.base_parameters import base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.random_states import random_states
@@ -53,10 +53,10 @@ def simulated(seed):
     rng = np.random.default_rng(seed)
     harmonics = 5
     time = np.arange(0, SECONDS, 1 / RATE)
-    basis = fourier_basis(SECONDS / 2, harmonics, time)
+    basis = evaluate_basis(SECONDS / 2, harmonics, time)
     series = rng.normal(size=(mechanism.n_dof, 1 + 2 * harmonics))
     series[:, 0] *= 0.3
-    z, dz, ddz = basis.states(series * 0.6)
+    z, dz, ddz = basis.evaluate(series * 0.6)
     K = dynamics.regressor(z, dz, ddz)
     others = np.setdiff1d(np.arange(values.size), base.columns)
     return Simulated(
@@ -108,7 +108,7 @@ def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0):
     rng = np.random.default_rng(seed)
     time = np.arange(0, seconds, 1 / rate)
     series = np.array([[0.0, 1.0, 0.6, -1.1, 0.4, 0.7, 0.9], [0.2, -0.8, 0.9, 1.2, -0.5, 0.9, 0.7]])
-    z, dz, ddz = fourier_basis(seconds / 2, 3, time).states(1.2 * series)
+    z, dz, ddz = evaluate_basis(seconds / 2, 3, time).evaluate(1.2 * series)
     tau = Dynamics(mechanism, once=True).regressor(z, dz, ddz) @ values
     for j, (viscous, coulomb, offset) in enumerate(FRICTION.values()):
         tau[:, j] += viscous * dz[:, j] + coulomb * np.sign(dz[:, j]) + offset

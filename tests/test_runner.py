@@ -6,18 +6,18 @@ import h5py
 import pytest
 from conftest import config_of, run_stages
 
-from paramreduce_cli.artifacts.store import Store, file_of, load_file
+from paramreduce_cli.artifacts.store import Store, get_file, load_file
 from paramreduce_cli.cli.terminal import Interruption
 from paramreduce_cli.errors import ArtifactError, ParamreduceWarning
 from paramreduce_cli.records import Part, Reduction
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.pipeline import list_stages, list_stages_to_run
 from paramreduce_cli.running.runner import Callbacks, Runner
 
 ORDER = [
     "build-model", "optimize-trajectories", "process-log", "sample", "reduce", "reduce-terms", "validate", "identify", "report",
 ]  # fmt: skip
-STAGES = {stage.name: stage for stage in pipeline()}
+STAGES = {stage.name: stage for stage in list_stages()}
 
 
 def test_order_follows_from_the_signatures():
@@ -51,7 +51,7 @@ def test_a_change_redoes_what_depends_on_it(two_link_copy, override, redone):
 
 def test_a_search_for_proofs_that_ctrl_c_ended_is_gone_on_with(two_link_copy, monkeypatch):
     path = two_link_copy / "reduction.h5"
-    digest = Store(two_link_copy).stamp(Reduction).digest
+    digest = Store(two_link_copy).read_stamp(Reduction).digest
     path.unlink()
 
     def ended(*_):
@@ -62,11 +62,11 @@ def test_a_search_for_proofs_that_ctrl_c_ended_is_gone_on_with(two_link_copy, mo
         with pytest.warns(ParamreduceWarning, match="are proven"):
             current = run_stages(two_link_copy)
     assert not current["reduce"]
-    stamp = Store(two_link_copy).stamp(Reduction)
+    stamp = Store(two_link_copy).read_stamp(Reduction)
     assert stamp.cut_short
     assert stamp.digest != digest
     assert not run_stages(two_link_copy)["reduce"]
-    assert Store(two_link_copy).stamp(Reduction).digest == digest
+    assert Store(two_link_copy).read_stamp(Reduction).digest == digest
     assert all(run_stages(two_link_copy).values())
 
 
@@ -169,7 +169,7 @@ def test_another_version_or_schema_is_made_again_by_run(two_link_copy, attribute
 
 
 def test_a_stage_that_fails_leaves_everything_as_it_was(two_link_copy):
-    paths = [two_link_copy / file_of(s.output) for s in stages_to_run(config_of("two_link"))]
+    paths = [two_link_copy / get_file(s.output) for s in list_stages_to_run(config_of("two_link"))]
     before = [path.read_bytes() for path in paths]
     config = config_of("two_link", "selected.n=20")
     with pytest.raises(Exception, match=r"selected\.n is 20"):
@@ -207,7 +207,7 @@ def test_new_limits_are_judged_without_measuring_again(two_link_copy, monkeypatc
 
     monkeypatch.setattr("paramreduce_cli.stages.validate.acceleration_errors", measured_again)
     stage, store = STAGES["validate"], Store(two_link_copy)
-    before, _ = load_file(store.path(stage.output), stage.output, None, "")
+    before, _ = load_file(store.get_path(stage.output), stage.output, None, "")
     config = config_of("two_link", "validation.accept.torque_error_validation=1e-6")
     judged = Runner(config, store).run(stage).record
     assert judged.accepted is False

@@ -11,11 +11,11 @@ from simulated_logs import log_config
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.records import Part
 from paramreduce_cli.running import workflow
-from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.pipeline import list_stages
 from paramreduce_cli.running.sweep import Sweep, load_sweep
-from paramreduce_cli.running.workflow import slurm_script
+from paramreduce_cli.running.workflow import format_slurm_script
 
-STAGES = {stage.name: stage for stage in pipeline()}
+STAGES = {stage.name: stage for stage in list_stages()}
 
 
 def listed(folder, text):
@@ -44,9 +44,9 @@ def test_every_robot_with_every_seed_and_every_variant(tmp_path):
     assert run.config.trajectories.points == 200
     assert run.folder == tmp_path / "here" / "two_link-5-long"
     assert (run.seed, run.variant) == (5, "long")
-    assert sweep.parts_of(STAGES["reduce"], run) == [Part(1, 3), Part(2, 3), Part(3, 3)]
-    assert sweep.parts_of(STAGES["sample"], run) == []
-    assert sweep.parts_of(STAGES["validate"], run) == []
+    assert sweep.list_parts(STAGES["reduce"], run) == [Part(1, 3), Part(2, 3), Part(3, 3)]
+    assert sweep.list_parts(STAGES["sample"], run) == []
+    assert sweep.list_parts(STAGES["validate"], run) == []
 
 
 def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
@@ -56,32 +56,34 @@ def test_what_a_run_has_nothing_of_to_do_in_parts_is_one_job(tmp_path):
     )
     sweep = load_sweep(listed(tmp_path, text))
     proven, swapped = sweep.runs.values()
-    assert len(sweep.parts_of(STAGES["reduce"], proven)) == 2
-    assert sweep.parts_of(STAGES["reduce"], swapped) == []
+    assert len(sweep.list_parts(STAGES["reduce"], proven)) == 2
+    assert sweep.list_parts(STAGES["reduce"], swapped) == []
     assert (
         sum(
-            " reduce " in line and "--part" in line for lines in sweep.phases("1") for line in lines
+            " reduce " in line and "--part" in line
+            for lines in sweep.list_phases("1")
+            for line in lines
         )
         == 2
     )
     log_config(tmp_path)
     logged = load_sweep(listed(tmp_path, "robots: [arm.yaml]\nparts: {sample: 2}\n"))
-    assert logged.parts_of(STAGES["sample"], logged.runs["arm"]) == []
+    assert logged.list_parts(STAGES["sample"], logged.runs["arm"]) == []
 
 
 def test_commands_are_those_of_the_shell(tmp_path):
     config = CONFIGS / "two_link.yaml"
     sweep = load_sweep(listed(tmp_path, f"robots: [{config}]\nresults: r\n"))
     (run,) = sweep.runs.values()
-    text = run.command(STAGES["reduce"], Part(2, 3), jobs="4")
+    text = run.format_command(STAGES["reduce"], Part(2, 3), jobs="4")
     words = shlex.split(text)
     assert words[2:4] == ["paramreduce_cli", "reduce"]
     assert words[-4:] == ["--quiet", "--wait", "--jobs", "4"]
     assert words[-6:-4] == ["--part", "2/3"]
-    assert run.command(STAGES["validate"]).endswith("|| [ $? -eq 1 ]")
+    assert run.format_command(STAGES["validate"]).endswith("|| [ $? -eq 1 ]")
     for stage in run.stages:
-        assert Path(run.needs(stage)[0]).resolve() == config
-    needed = [name.rpartition("/")[2] for name in run.needs(STAGES["report"])]
+        assert Path(run.list_needed_files(stage)[0]).resolve() == config
+    needed = [name.rpartition("/")[2] for name in run.list_needed_files(STAGES["report"])]
     assert needed == ["two_link.yaml", "model.h5", "trajectories.h5", "samples.h5", "reduction.h5",
                       "validation.h5"]  # fmt: skip
 
@@ -112,7 +114,7 @@ def test_lists_that_cannot_be(tmp_path, text, says):
 
 def test_a_script_for_slurm_submits_phases_that_wait_for_each_other(tmp_path):
     path = listed(tmp_path, f"robots: [{TWO_LINK}]\nresults: r\nparts: {{sample: 2, reduce: 3}}\n")
-    calls = scheduled(tmp_path, slurm_script(load_sweep(path)), run=False)
+    calls = scheduled(tmp_path, format_slurm_script(load_sweep(path)), run=False)
     assert ["--dependency=afterany:" in call for call in calls] == [
         False,
         True,
@@ -135,7 +137,7 @@ def test_more_commands_than_an_array_may_have_tasks_are_dealt_to_them(tmp_path, 
     )
     monkeypatch.chdir(tmp_path)
     path = listed(tmp_path, f"robots: [{TWO_LINK}]\nresults: r s\n")
-    calls = scheduled(tmp_path, slurm_script(load_sweep(path)))
+    calls = scheduled(tmp_path, format_slurm_script(load_sweep(path)))
     assert ["--array=1-2" in call for call in calls] == [True]
     assert (tmp_path / "done").read_text().split() == ["0", "2", "4", "3"]
 
@@ -148,6 +150,6 @@ def test_a_thousand_parts_take_few_calls(tmp_path):
             "parts: {optimize-trajectories: 250, sample: 250, reduce: 250}\n",
         )
     )  # fmt: skip
-    text = slurm_script(sweep)
+    text = format_slurm_script(sweep)
     assert text.count("\nsubmit ") == 8
-    assert [len(phase) for phase in sweep.phases("1")] == [4, 1000, 4, 1000, 4, 1000, 4, 1]
+    assert [len(phase) for phase in sweep.list_phases("1")] == [4, 1000, 4, 1000, 4, 1000, 4, 1]

@@ -5,15 +5,15 @@ import sys
 import pytest
 from conftest import ROOT, TWO_LINK
 
-from paramreduce_cli.running.workflow import make_rules, outline
+from paramreduce_cli.running.workflow import format_make_rules, format_outline
 
 
 def test_committed_rules_are_those_of_the_declared_stages():
-    assert (ROOT / "pipelines" / "stages.mk").read_text() == make_rules()
+    assert (ROOT / "pipelines" / "stages.mk").read_text() == format_make_rules()
 
 
 def test_outline_names_every_stage():
-    lines = outline().splitlines()
+    lines = format_outline().splitlines()
     assert lines[0] == "build-model: the config -> model.h5"
     assert len(lines) == 9
 
@@ -24,7 +24,7 @@ def make(tmp_path):
         pytest.skip("make is not installed")
     (tmp_path / "configs").mkdir()
     shutil.copy(TWO_LINK, tmp_path / "configs" / "arm.yaml")
-    (tmp_path / "stages.mk").write_text(make_rules())
+    (tmp_path / "stages.mk").write_text(format_make_rules())
     program = (
         tmp_path / "program"
     )  # which says what it is asked to do, and knows which files a run makes

@@ -17,8 +17,8 @@ from paramreduce_cli.errors import ArtifactError
 
 
 @contextlib.contextmanager
-def atomically(path: Path) -> Iterator[Path]:
-    """A temporary path beside ``path`` that takes its place when the block ends well.
+def replace_atomically(path: Path) -> Iterator[Path]:
+    """Yield a temporary path beside ``path`` that replaces it when the block ends without an error.
 
     Raises:
         ArtifactError: The disk is full, the folder is not writable, or the like.
@@ -38,7 +38,7 @@ def atomically(path: Path) -> Iterator[Path]:
             if _LEFT.fullmatch(left.name) and not _may_be_written(left):
                 left.unlink(missing_ok=True)
     except (OSError, RuntimeError) as error:
-        raise ArtifactError(f"{path}: cannot be written: {_reason(error)}") from error
+        raise ArtifactError(f"{path}: cannot be written: {_explain_failure(error)}") from error
     finally:
         if temporary is not None:
             temporary.unlink(missing_ok=True)
@@ -54,8 +54,8 @@ def check_is_file(path: Path) -> None:
         raise ArtifactError(f"{path}: is no file.")
 
 
-def missing(path: Path, *, command: str = "", remedy: str = "") -> ArtifactError:
-    """Return the error that a file is not there, with its remedy, or with the file that is called nearly the same.
+def make_missing_error(path: Path, *, command: str = "", remedy: str = "") -> ArtifactError:
+    """Return the error that a file does not exist, with its remedy, or with a file of nearly the same name.
 
     Args:
         path: Path of the file.
@@ -88,13 +88,14 @@ def remove_leftovers(folder: Path) -> None:
 
 
 def _may_be_written(path: Path) -> bool:
-    """Whether another process could still be writing a temporary file."""
+    """Return whether another process could still be writing a temporary file."""
     with contextlib.suppress(FileNotFoundError):
         return time.time() - path.stat().st_mtime < _LONGEST_WRITING
     return False
 
 
-def _reason(error: Exception) -> str:
+def _explain_failure(error: Exception) -> str:
+    """Return a sentence on why writing failed, and what to do."""
     number = getattr(error, "errno", None)
     text = str(error)
     if number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) or "No space left" in text:
@@ -122,6 +123,7 @@ class PatientFile:
             raise self._error
 
     def write(self, data: Any) -> int:
+        """Write data unless an earlier write has failed, and return their size either way."""
         view = memoryview(data).cast("B")
         done = 0
         try:
@@ -132,6 +134,7 @@ class PatientFile:
         return len(view)
 
     def truncate(self, size: int) -> int:
+        """Set the size of the file unless an earlier write has failed."""
         try:
             if self._error is None:
                 self._file.truncate(size)
@@ -152,7 +155,7 @@ class PatientFile:
         return self._file.tell()
 
     def flush(self) -> None:
-        """Nothing is buffered."""
+        """Do nothing, as nothing is buffered."""
 
     def close(self) -> None:
         self._file.close()

@@ -1,4 +1,4 @@
-"""Files that users bring: Fourier coefficients, and recorded states and torques."""
+"""User-supplied files: Fourier coefficients, and recorded states and torques."""
 
 import json
 import math
@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import missing
+from paramreduce_cli.artifacts.atomic import make_missing_error
 from paramreduce_cli.artifacts.csv_files import read_csv
-from paramreduce_cli.artifacts.hdf5 import Reader, reading
+from paramreduce_cli.artifacts.hdf5 import Reader, open_reader
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import SETS, Coefficients, FloatArray, Recording
 
@@ -27,15 +27,15 @@ def load_coefficients(path: Path) -> Coefficients:
         ArtifactError: The file cannot be read.
     """
     if path.suffix in _HDF5:
-        with reading(path) as reader:
-            period = reader.attribute("period")
+        with open_reader(path) as reader:
+            period = reader.read_attribute("period")
             sets = {
-                name: reader.array(f"{name}/coefficients", 3)
+                name: reader.read_array(f"{name}/coefficients", 3)
                 for name in SETS
                 if f"{name}/coefficients" in reader or name != "test"
             }
     else:
-        period, sets = _coefficients_from_json(path)
+        period, sets = _read_json_coefficients(path)
     if not isinstance(period, int | float) or not 0 < period < math.inf:
         raise DataError(f"{path}: the period must be a positive number of seconds.")
     if "test" not in sets or not sets["test"].size:
@@ -56,7 +56,8 @@ def load_coefficients(path: Path) -> Coefficients:
     return Coefficients(str(path), float(period), **sets)
 
 
-def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
+def _read_json_coefficients(path: Path) -> tuple[Any, dict[str, FloatArray]]:
+    """Return the period and the coefficients by set in a JSON file."""
     try:
         data = json.loads(path.read_text(encoding="utf-8"))
         trajectories = data["trajectories"]
@@ -67,7 +68,7 @@ def _coefficients_from_json(path: Path) -> tuple[Any, dict[str, FloatArray]]:
         }
         return trajectories["period"], sets
     except FileNotFoundError as error:
-        raise missing(path) from error
+        raise make_missing_error(path) from error
     except (OSError, UnicodeDecodeError, ValueError, KeyError, TypeError) as error:
         raise DataError(
             f"{path}: holds no Fourier coefficients ({type(error).__name__}: {error}). Bring a "
@@ -88,10 +89,10 @@ def load_recording(path: Path, n_dof: int) -> Recording:
         ArtifactError: The file cannot be read.
     """
     if path.suffix in _HDF5:
-        with reading(path) as reader:
-            arrays = _arrays_from_hdf5(reader)
+        with open_reader(path) as reader:
+            arrays = _read_hdf5_arrays(reader)
     else:
-        arrays = _arrays_from_csv(path, n_dof)
+        arrays = _read_csv_arrays(path, n_dof)
     for key in ("z", "dz", "ddz"):
         if arrays.get(key) is None or arrays[key].ndim != 2:
             raise DataError(
@@ -135,12 +136,13 @@ def _check_time(path: Path, time: FloatArray) -> None:
         )
 
 
-def _arrays_from_hdf5(reader: Reader) -> dict[str, FloatArray]:
+def _read_hdf5_arrays(reader: Reader) -> dict[str, FloatArray]:
     names = ("z", "dz", "ddz", "tau", "time")
-    return {name: reader.array(name).astype(float) for name in names if name in reader}
+    return {name: reader.read_array(name).astype(float) for name in names if name in reader}
 
 
-def _arrays_from_csv(path: Path, n_dof: int) -> dict[str, FloatArray]:
+def _read_csv_arrays(path: Path, n_dof: int) -> dict[str, FloatArray]:
+    """Return the arrays of states and torques in a CSV file."""
     header, data, _ = read_csv(path)
     columns = {name: data[:, k] for k, name in enumerate(header)}
     arrays: dict[str, FloatArray] = {}

@@ -20,20 +20,20 @@ _NUMBERS = "fiub"
 
 
 class RowChecks:
-    """Checksums of rows that come one after the other.
+    """A collector of checksums of rows that are written one block after the other.
 
     Args:
-        row_bytes: Of one row.
+        row_bytes: Bytes of one row.
     """
 
     def __init__(self, row_bytes: int) -> None:
-        self._rows = _rows_of_block(row_bytes)
+        self._rows = _count_block_rows(row_bytes)
         self._hash = xxhash.xxh3_64()
         self._missing = self._rows
         self._values: list[int] = []
 
     def add(self, rows: np.ndarray) -> None:
-        """Note more rows."""
+        """Add rows to the checksums."""
         rows = np.ascontiguousarray(rows)
         while len(rows):
             some, rows = rows[: self._missing], rows[self._missing :]
@@ -49,6 +49,7 @@ class RowChecks:
         data.attrs[_ATTRIBUTE] = np.array(self._values, dtype=np.uint64)
 
     def _end_block(self) -> None:
+        """Note the checksum of a block, and begin the next."""
         self._values.append(self._hash.intdigest())
         self._hash.reset()
         self._missing = self._rows
@@ -56,7 +57,7 @@ class RowChecks:
 
 def write_checks(data: h5py.Dataset, array: np.ndarray) -> None:
     """Keep checksums of an array with the dataset that holds it."""
-    checks = RowChecks(_row_bytes(array))
+    checks = RowChecks(_count_row_bytes(array))
     checks.add(array)
     checks.write(data)
 
@@ -76,8 +77,8 @@ class CheckedRows:
         self.dtype = identifier.dtype
         self.ndim, self.size = len(self.shape), math.prod(self.shape)
         self.nbytes = self.size * self.dtype.itemsize
-        self._checks = _checks_of(identifier)
-        self._rows = _rows_of_block(_row_bytes(self)) if self.ndim else 0
+        self._checks = _read_checksums(identifier)
+        self._rows = _count_block_rows(_count_row_bytes(self)) if self.ndim else 0
         self._kept: tuple[int, np.ndarray] = (-1, np.zeros(0))
 
     @cached_property
@@ -98,7 +99,7 @@ class CheckedRows:
             parts.append(kept[start - first * self._rows : stop - first * self._rows].copy())
             first += 1
         if first < last:
-            fresh = self._read(first, last)
+            fresh = self._read_blocks(first, last)
             begin = first * self._rows
             parts.append(fresh[max(start - begin, 0) : stop - begin])
             size = min(self._rows, len(self) - (last - 1) * self._rows)
@@ -106,8 +107,8 @@ class CheckedRows:
         found = parts[0] if len(parts) == 1 else np.concatenate(parts)
         return found[::step]
 
-    def whole(self) -> Any:
-        """All of it.
+    def read_whole(self) -> Any:
+        """Return all rows.
 
         Raises:
             OSError: A checksum does not fit.
@@ -118,15 +119,17 @@ class CheckedRows:
         else:
             value = self._data[()]
         if self._checks is not None:
-            self._compare(np.ascontiguousarray(value), 0)
+            self._compare_checksums(np.ascontiguousarray(value), 0)
         return value
 
-    def _read(self, first: int, last: int) -> np.ndarray:
+    def _read_blocks(self, first: int, last: int) -> np.ndarray:
+        """Return the rows of some blocks, compared with their checksums."""
         values = np.asarray(self._data[first * self._rows : last * self._rows])
-        self._compare(values, first)
+        self._compare_checksums(values, first)
         return values
 
-    def _compare(self, values: np.ndarray, first: int) -> None:
+    def _compare_checksums(self, values: np.ndarray, first: int) -> None:
+        """Raise OSError if a checksum does not fit."""
         assert self._checks is not None
         for k, start in enumerate(range(0, len(values), self._rows), start=first):
             found = xxhash.xxh3_64_intdigest(values[start : start + self._rows].data)
@@ -134,8 +137,9 @@ class CheckedRows:
                 raise OSError(f"the checksum of {self._data.name} does not fit")
 
 
-def _checks_of(identifier: h5py.h5d.DatasetID) -> np.ndarray | None:
+def _read_checksums(identifier: h5py.h5d.DatasetID) -> np.ndarray | None:
     # By hand: h5py's own way to an attribute takes as long as reading a small dataset several times.
+    """Return the checksums of a dataset, or None if it has none."""
     name = _ATTRIBUTE.encode()
     if not h5py.h5a.exists(identifier, name):
         return None
@@ -145,9 +149,9 @@ def _checks_of(identifier: h5py.h5d.DatasetID) -> np.ndarray | None:
     return checks
 
 
-def _row_bytes(array: Any) -> int:
+def _count_row_bytes(array: Any) -> int:
     return math.prod(array.shape[1:]) * int(array.dtype.itemsize)
 
 
-def _rows_of_block(row_bytes: int) -> int:
+def _count_block_rows(row_bytes: int) -> int:
     return max(1, _BLOCK // max(1, row_bytes))

@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
-from paramreduce_cli.artifacts.atomic import check_is_file, missing
+from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.resources.scratch import LargeTable
@@ -51,7 +51,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
             encoding = "utf-16" if file.read(2) in _UTF_16 else "utf-8-sig"
         with opener(path, "rt", encoding=encoding, newline="") as file, LargeTable() as table:
             first = next(file, "")
-            delimiter = _delimiter(first)
+            delimiter = _find_delimiter(first)
             lines: Iterator[str] = itertools.chain([first.lstrip("# ")], file)
             if delimiter == " ":
                 lines = (line.strip() + "\n" for line in lines)
@@ -71,7 +71,7 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
                     raise DataError(f"{path}, line {blank}: is empty. Remove it.")
                 if leave_out_text and not table:
                     begun_empty = {k for k, cell in enumerate(row) if not cell.strip()}
-                    kept = [k for k, c in enumerate(row) if k in begun_empty or _looks_numeric(c)]
+                    kept = [k for k, c in enumerate(row) if k in begun_empty or _is_like_number(c)]
                     kept = [k for k in kept if header[k]]
                 if len(row) != len(header):
                     raise DataError(
@@ -88,13 +88,13 @@ def read_csv(path: Path, *, leave_out_text: bool = False) -> NumberTable:
             left_out = [name for k, name in enumerate(header) if name and k not in kept]
             return NumberTable([header[k] for k in kept], table.to_matrix(len(kept)), left_out)
     except FileNotFoundError as error:
-        raise missing(path) from error
+        raise make_missing_error(path) from error
     except (OSError, EOFError, zlib.error, UnicodeDecodeError, csv.Error) as error:
         raise ArtifactError(f"{path}: cannot be read as CSV ({error}).") from error
 
 
-def _delimiter(header: str) -> str:
-    """Tell what separates the headings."""
+def _find_delimiter(header: str) -> str:
+    """Return the character that separates the headings."""
     found = next((mark for mark in ",\t;" if mark in header), None)
     return found or (" " if len(header.split()) > 1 else ",")
 
@@ -114,6 +114,7 @@ def _check_header(path: Path, header: list[str]) -> None:
 
 
 def _is_number(cell: str) -> bool:
+    """Return whether a cell is a number."""
     try:
         float(cell)
     except ValueError:
@@ -121,8 +122,8 @@ def _is_number(cell: str) -> bool:
     return True
 
 
-def _looks_numeric(cell: str) -> bool:
-    """Whether a cell is a number, perhaps with a decimal comma."""
+def _is_like_number(cell: str) -> bool:
+    """Return whether a cell is a number, perhaps with a decimal comma."""
     return _is_number(cell.replace(",", "."))
 
 
@@ -134,9 +135,9 @@ def _number(path: Path, line: int, heading: str, cell: str, *, empty: bool, text
         if text or (empty and not cell.strip()):
             return math.nan
         raise DataError(
-            f"{path}, line {line}, column {heading}: {cell!r} is not a number.{_remedy(cell)}"
+            f"{path}, line {line}, column {heading}: {cell!r} is not a number.{_suggest_decimal_points(cell)}"
         ) from error
 
 
-def _remedy(cell: str) -> str:
-    return " Write decimal points." if _looks_numeric(cell) else ""
+def _suggest_decimal_points(cell: str) -> str:
+    return " Write decimal points." if _is_like_number(cell) else ""

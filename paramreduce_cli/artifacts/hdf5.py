@@ -1,4 +1,4 @@
-"""HDF5 files with where they came from: written whole, checked as they are read.
+"""HDF5 files with provenance: written whole, checked as they are read.
 
 Every byte that means something has a checksum that is compared whenever it is read: large arrays one for
 each block of rows, and what is small stands with names, shapes and attributes in headers,
@@ -19,7 +19,12 @@ from typing import Any
 import h5py
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import PatientFile, atomically, check_is_file, missing
+from paramreduce_cli.artifacts.atomic import (
+    PatientFile,
+    check_is_file,
+    make_missing_error,
+    replace_atomically,
+)
 from paramreduce_cli.artifacts.checked import CheckedRows, RowChecks, write_checks
 from paramreduce_cli.errors import ArtifactError
 
@@ -71,11 +76,11 @@ class Stamp:
 
 
 class Writer:
-    """Writes datasets and digests them as they pass.
+    """A writer of datasets that digests what it writes.
 
     Args:
-        group: Where to.
-        check: Raises an error that writing met so far.
+        group: Group to write to.
+        check: Raises an error that an earlier write has met.
     """
 
     def __init__(self, group: h5py.Group, check: Callable[[], None]) -> None:
@@ -86,35 +91,35 @@ class Writer:
 
     @property
     def digest(self) -> str:
-        """Of everything written so far."""
+        """Digest of everything written so far."""
         return self._hash.hexdigest()
 
-    def timing(self, name: str, value: Any) -> None:
-        """Write how long something took, which is no part of what the file holds."""
+    def write_timing(self, name: str, value: Any) -> None:
+        """Write how long something took, which is left out of the digest."""
         self._store(name, np.asarray(value))
 
-    def dataset(self, name: str, value: Any) -> None:
+    def write_dataset(self, name: str, value: Any) -> None:
         """Write an array, a number, a text or a list of texts."""
         array = np.asarray(value)
         if array.dtype.kind not in "US":
             if array.nbytes > _AT_ONCE and array.ndim:
                 self._store_in_parts(name, array)
                 return
-            self._note(name, np.ascontiguousarray(array).tobytes())
+            self._update_digest(name, np.ascontiguousarray(array).tobytes())
             self._store(name, array)
             return
         flat = [str(item).encode() for item in array.ravel()]
-        self._note(name, b"\0".join(flat))
+        self._update_digest(name, b"\0".join(flat))
         kind = h5py.string_dtype(length=max(1, *map(len, flat)) if flat else 1)
         self._store(name, np.array(flat, dtype=kind).reshape(array.shape))
 
-    def attribute(self, name: str, value: Any) -> None:
+    def write_attribute(self, name: str, value: Any) -> None:
         """Write a small attribute of the file."""
-        self._note(name, repr(value).encode())
+        self._update_digest(name, repr(value).encode())
         write_attribute(self._group, name, value)
 
     def _store_in_parts(self, name: str, array: np.ndarray) -> None:
-        """What may be larger than memory: some rows at a time."""
+        """Store an array that may be larger than memory, some rows at a time."""
         data = self._group.create_dataset(name, array.shape, array.dtype)
         checks = RowChecks(array.nbytes // max(1, len(array)))
         self._hash.update(name.encode())
@@ -128,6 +133,7 @@ class Writer:
         checks.write(data)
 
     def _store(self, name: str, array: np.ndarray) -> None:
+        """Store an array with checksums, or in the header if it is small."""
         if array.nbytes > _LARGEST_HEADER and array.shape == ():
             array = array[None]
         if array.nbytes > (_SMALL if array.shape else _LARGEST_HEADER):
@@ -146,12 +152,12 @@ class Writer:
         if array.size:
             h5py.Dataset(made)[...] = array
 
-    def rows(self, name: str, columns: int | None) -> Callable[[np.ndarray], None]:
-        """A dataset that grows by blocks of rows.
+    def start_rows(self, name: str, columns: int | None) -> Callable[[np.ndarray], None]:
+        """Return a function that appends blocks of rows to a new dataset.
 
         Args:
-            name: Of the dataset.
-            columns: Width of a row, None for a vector.
+            name: Name of the dataset.
+            columns: Width of a row; None for a vector.
 
         Returns:
             A function that appends a block.
@@ -183,7 +189,7 @@ class Writer:
             checks.write(data)
 
         def append(block: np.ndarray) -> None:
-            self._note(name, np.ascontiguousarray(block).tobytes())
+            self._update_digest(name, np.ascontiguousarray(block).tobytes())
             nonlocal count
             waiting.append(np.array(block, dtype=float))
             count += len(block)
@@ -199,7 +205,8 @@ class Writer:
             end()
         self._check()
 
-    def _note(self, name: str, content: bytes) -> None:
+    def _update_digest(self, name: str, content: bytes) -> None:
+        """Add content to the digest."""
         self._check()
         self._hash.update(name.encode())
         self._hash.update(content)
@@ -220,14 +227,14 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
         ArtifactError: It cannot be written.
     """
     started = time.perf_counter()
-    with atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
+    with replace_atomically(path) as temporary, contextlib.closing(PatientFile(temporary)) as disk:
         with h5py.File(disk, "w", libver=_FORMAT, rdcc_nbytes=_CHUNK_CACHE) as file:
             writer = Writer(file, disk.check)
             fill(writer)
             writer.finish()
             seconds = stamp.seconds + time.perf_counter() - started
             done = dataclasses.replace(stamp, digest=writer.digest, seconds=seconds)
-            for name, value in _attributes(done).items():
+            for name, value in _list_attributes(done).items():
                 write_attribute(file, name, value)
         disk.check()
     return done
@@ -243,7 +250,7 @@ def write_attribute(group: h5py.Group, name: str, value: Any) -> None:
 
 
 class Reader:
-    """Reads an artifact; whatever is missing or of the wrong form is one clear error."""
+    """A reader of an artifact; whatever is missing or wrong is one clear error."""
 
     def __init__(self, path: Path, file: h5py.File) -> None:
         self.path = path
@@ -255,9 +262,9 @@ class Reader:
     def __contains__(self, name: str) -> bool:
         return name in self.file
 
-    def array(self, name: str, dimensions: int | None = None) -> np.ndarray:
-        """A numeric dataset as a whole."""
-        value = np.asarray(self._dataset(name).whole())
+    def read_array(self, name: str, dimensions: int | None = None) -> np.ndarray:
+        """Return a numeric dataset as a whole."""
+        value = np.asarray(self._open_dataset(name).read_whole())
         if value.dtype.kind not in "fiub":
             raise ArtifactError(f"{self.path}: /{name} must hold numbers.")
         if dimensions is not None and value.ndim != dimensions:
@@ -266,27 +273,27 @@ class Reader:
             )
         return value
 
-    def texts(self, name: str) -> tuple[str, ...]:
-        """A dataset of texts."""
-        data = self._dataset(name)
+    def read_texts(self, name: str) -> tuple[str, ...]:
+        """Return a dataset of texts."""
+        data = self._open_dataset(name)
         if not h5py.check_string_dtype(data.dtype) and data.size:
             raise ArtifactError(f"{self.path}: /{name} must hold text.")
-        values = np.atleast_1d(data.whole())
+        values = np.atleast_1d(data.read_whole())
         return tuple(v.decode() if isinstance(v, bytes) else str(v) for v in values)
 
-    def text(self, name: str) -> str:
-        """One text."""
-        return self.texts(name)[0]
+    def read_text(self, name: str) -> str:
+        """Return a dataset with one text."""
+        return self.read_texts(name)[0]
 
-    def attribute(self, name: str, default: Any = None) -> Any:
-        """An attribute of the file."""
+    def read_attribute(self, name: str, default: Any = None) -> Any:
+        """Return an attribute of the file."""
         value = self._attributes.get(name, default)
         value = value.item() if isinstance(value, np.generic) else value
         return value.decode() if isinstance(value, bytes) else value
 
-    def rows(self, name: str) -> CheckedRows:
-        """A numeric dataset to be read in slices of rows."""
-        data = self._dataset(name)
+    def open_rows(self, name: str) -> CheckedRows:
+        """Return a numeric dataset that is read in slices of rows."""
+        data = self._open_dataset(name)
         if data.dtype.kind not in "fiu" or data.ndim == 0:
             raise ArtifactError(f"{self.path}: /{name} must hold an array of real numbers.")
         return data
@@ -298,22 +305,24 @@ class Reader:
             ArtifactError: Something is damaged.
         """
         for name in self._attributes:
-            self.attribute(name)
+            self.read_attribute(name)
         self.file.visititems(self._verify_item)
 
     def _verify_item(self, name: str, item: h5py.Group | h5py.Dataset) -> None:
+        """Read an item of the file to compare its checksums."""
         if not isinstance(item, h5py.Dataset):
             return
-        data = self._plausible(name, item.id)
+        data = self._check_dataset(name, item.id)
         if not data.ndim:
-            data.whole()
+            data.read_whole()
             return
         step = max(1, _AT_ONCE * len(data) // max(1, data.nbytes))
         for start in range(0, len(data), step):
             data[start : start + step]
 
-    def _dataset(self, name: str) -> CheckedRows:
+    def _open_dataset(self, name: str) -> CheckedRows:
         # Through HDF5's own functions: h5py's objects take longer than reading a small dataset.
+        """Return a dataset, or raise ArtifactError if there is none."""
         try:
             self._refuse_other_files(name)
             found = h5py.h5o.open(self.file.id, name.encode())
@@ -324,9 +333,10 @@ class Reader:
             raise ArtifactError(
                 f"{self.path}: /{name} is missing. See docs/artifacts.md for what it must hold."
             )
-        return self._plausible(name, found)
+        return self._check_dataset(name, found)
 
     def _refuse_other_files(self, name: str) -> None:
+        """Raise ArtifactError if a name leads into another file."""
         parts = name.split("/")
         for k in range(len(parts)):
             place = "/".join(parts[: k + 1])
@@ -338,8 +348,8 @@ class Reader:
                 )
             self._inside.add(place)
 
-    def _plausible(self, name: str, found: h5py.h5d.DatasetID) -> CheckedRows:
-        """A dataset, if it holds what it declares.
+    def _check_dataset(self, name: str, found: h5py.h5d.DatasetID) -> CheckedRows:
+        """Return a dataset if its numbers are in this file and complete.
 
         Raises:
             ArtifactError: Its numbers are in another file, or are not there.
@@ -367,7 +377,7 @@ class StoredRows:
     """
 
     def __init__(self, reader: Reader, name: str) -> None:
-        data = reader.rows(name)
+        data = reader.open_rows(name)
         self._path, self._name = reader.path, name
         self.shape, self.dtype, self.ndim, self.size = data.shape, data.dtype, data.ndim, data.size
         self._first = 0
@@ -385,19 +395,19 @@ class StoredRows:
         if not self._first <= start <= stop <= last:
             # Slices follow each other: the next ones are read with this one.
             size = max(1, _STRETCH * len(self) // (self.size * self.dtype.itemsize))
-            with reading(self._path) as reader:
-                self._stretch = reader.rows(self._name)[start : max(stop, start + size)]
+            with open_reader(self._path) as reader:
+                self._stretch = reader.open_rows(self._name)[start : max(stop, start + size)]
             self._first = start
         return self._stretch[start - self._first : stop - self._first : step]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        with reading(self._path) as reader:
-            return reader.array(self._name).astype(dtype or self.dtype, copy=False)
+        with open_reader(self._path) as reader:
+            return reader.read_array(self._name).astype(dtype or self.dtype, copy=False)
 
 
 @contextlib.contextmanager
-def reading(path: Path, *, command: str = "", remedy: str = "") -> Iterator[Reader]:
-    """Open an HDF5 file to read.
+def open_reader(path: Path, *, command: str = "", remedy: str = "") -> Iterator[Reader]:
+    """Open an HDF5 file for reading within the block.
 
     Args:
         path: The file.
@@ -408,7 +418,7 @@ def reading(path: Path, *, command: str = "", remedy: str = "") -> Iterator[Read
         ArtifactError: It is missing, truncated or no HDF5 file.
     """
     if not path.exists():
-        raise missing(path, command=command, remedy=remedy)
+        raise make_missing_error(path, command=command, remedy=remedy)
     check_is_file(path)
     try:
         file = h5py.File(path, "r", rdcc_nbytes=_CHUNK_CACHE)
@@ -426,7 +436,8 @@ def reading(path: Path, *, command: str = "", remedy: str = "") -> Iterator[Read
             ) from error
 
 
-def _attributes(stamp: Stamp) -> dict[str, Any]:
+def _list_attributes(stamp: Stamp) -> dict[str, Any]:
+    """Return the attributes of a file's stamp by name."""
     return {
         "schema": stamp.schema,
         "robot": stamp.robot,
@@ -447,29 +458,29 @@ def _attributes(stamp: Stamp) -> dict[str, Any]:
 
 
 def read_stamp(path: Path) -> Stamp | None:
-    """The provenance of a file, None if it is not an artifact of this project."""
-    with reading(path) as reader:
-        return stamp_of(reader)
+    """Return the stamp of a file, or None if the file is no artifact of this project."""
+    with open_reader(path) as reader:
+        return read_stamp_from(reader)
 
 
-def stamp_of(reader: Reader) -> Stamp | None:
-    """The provenance of an open file, None if it is not an artifact of this project."""
-    if reader.attribute("schema") is None or reader.attribute("stage") is None:
+def read_stamp_from(reader: Reader) -> Stamp | None:
+    """Return the stamp of an open file, or None if the file is no artifact of this project."""
+    if reader.read_attribute("schema") is None or reader.read_attribute("stage") is None:
         return None
     return Stamp(
-        schema=int(reader.attribute("schema")),
-        robot=str(reader.attribute("robot")),
-        stage=str(reader.attribute("stage")),
+        schema=int(reader.read_attribute("schema")),
+        robot=str(reader.read_attribute("robot")),
+        stage=str(reader.read_attribute("stage")),
         versions={
-            name: str(reader.attribute(f"{name}_version", "?"))
+            name: str(reader.read_attribute(f"{name}_version", "?"))
             for name in ("paramreduce", "numpy", "scipy", "casadi")
         },
-        sections=json.loads(reader.attribute("config_sections", "{}")),
-        inputs=json.loads(reader.attribute("inputs", "{}")),
-        seed=int(reader.attribute("seed", 0)),
-        seconds=float(reader.attribute("wall_seconds", 0.0)),
-        digest=str(reader.attribute("digest", "")),
-        cut_short=bool(reader.attribute("cut_short", False)),
-        config=str(reader.attribute("config", "")),
-        warnings=tuple(json.loads(reader.attribute("warnings", "[]"))),
+        sections=json.loads(reader.read_attribute("config_sections", "{}")),
+        inputs=json.loads(reader.read_attribute("inputs", "{}")),
+        seed=int(reader.read_attribute("seed", 0)),
+        seconds=float(reader.read_attribute("wall_seconds", 0.0)),
+        digest=str(reader.read_attribute("digest", "")),
+        cut_short=bool(reader.read_attribute("cut_short", False)),
+        config=str(reader.read_attribute("config", "")),
+        warnings=tuple(json.loads(reader.read_attribute("warnings", "[]"))),
     )

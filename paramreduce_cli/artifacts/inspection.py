@@ -1,15 +1,15 @@
-"""What is in an artifact and where it came from, as plain data."""
+"""Contents of an artifact and its provenance, as plain data."""
 
 from pathlib import Path
 
 import h5py
 import numpy as np
 
-from paramreduce_cli.artifacts.hdf5 import reading
+from paramreduce_cli.artifacts.hdf5 import open_reader
 
 
-def contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
-    """Attributes of a file, and (name, shape, type or value) of its datasets; all of it is checked.
+def list_contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
+    """Return the attributes of a file, and (name, shape, type or value) of its datasets; all of them are checked.
 
     Raises:
         ArtifactError: It cannot be read.
@@ -18,20 +18,21 @@ def contents(path: Path) -> tuple[dict[str, str], list[tuple[str, str, str]]]:
 
     def visit(name: str, item: object) -> None:
         if isinstance(item, h5py.Dataset):
-            datasets.append((f"/{name}", _shape(item), _content(item)))
+            datasets.append((f"/{name}", _format_shape(item), _format_content(item)))
 
-    with reading(path) as reader:
+    with open_reader(path) as reader:
         reader.verify()
-        attributes = {key: str(reader.attribute(key)) for key in reader.file.attrs}
+        attributes = {key: str(reader.read_attribute(key)) for key in reader.file.attrs}
         reader.file.visititems(visit)
     return attributes, datasets
 
 
-def _shape(dataset: h5py.Dataset) -> str:
+def _format_shape(dataset: h5py.Dataset) -> str:
     return " x ".join(str(length) for length in dataset.shape) or "scalar"
 
 
-def _content(dataset: h5py.Dataset) -> str:
+def _format_content(dataset: h5py.Dataset) -> str:
+    """Return the value of a scalar dataset, or the type of an array."""
     if dataset.shape == ():
         value = dataset[()]
         text = value.decode() if isinstance(value, bytes) else str(value)

@@ -1,4 +1,4 @@
-"""Logs as people have them: CSV, HDF5, NPZ and ROS 2 bags, all as columns by name."""
+"""Log files of users: CSV, HDF5, NPZ and ROS 2 bags, all read as columns by name."""
 
 import array
 import lzma
@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.artifacts.atomic import check_is_file, missing
+from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error
 from paramreduce_cli.artifacts.csv_files import read_csv
-from paramreduce_cli.artifacts.hdf5 import reading
+from paramreduce_cli.artifacts.hdf5 import open_reader
 from paramreduce_cli.errors import ArtifactError, DataError
 from paramreduce_cli.records import FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix
@@ -48,19 +48,19 @@ def load_log(path: Path) -> RawLog:
         ArtifactError: It cannot be read.
     """
     if path.is_dir() or path.suffix in _BAGS:
-        return _bag(path)
+        return _load_bag(path)
     if path.suffix in _HDF5:
-        with reading(path) as reader:
+        with open_reader(path) as reader:
             names: list[str] = []
             reader.file.visit(names.append)
-            kinds = {name: _kind(reader.file[name]) for name in names}
+            kinds = {name: _classify_dataset(reader.file[name]) for name in names}
             numeric = [name for name, kind in kinds.items() if kind == _NUMBERS]
             others = {name: kind for name, kind in kinds.items() if kind not in ("", _NUMBERS)}
-            return _from_arrays(
-                path, ((name, _columns(reader.rows(name))) for name in numeric), others
+            return _split_columns(
+                path, ((name, _read_columns(reader.open_rows(name))) for name in numeric), others
             )
     if path.suffix == ".npz":
-        return _npz(path)
+        return _load_npz(path)
     table = read_csv(path, leave_out_text=True)
     columns = dict(zip(table.header, table.numbers.T, strict=True))
     return RawLog(str(path), columns, first_line=2, others=dict.fromkeys(table.left_out, "text"))
@@ -71,16 +71,16 @@ _KINDS = {"c": "complex numbers", "b": "true and false", "S": "text", "U": "text
 """What arrays hold by NumPy's kind of their type, where it is no real number."""
 
 
-def _kind(item: Any) -> str:
-    """Tell what a dataset holds; empty for a group, and for what has no rows."""
+def _classify_dataset(item: Any) -> str:
+    """Return the kind of a dataset's entries; empty for a group, or a dataset without rows."""
     kind = getattr(getattr(item, "dtype", None), "kind", "")
     if kind == "" or item.ndim not in (1, 2):
         return ""
     return _NUMBERS if kind in "fiu" else _KINDS.get(kind, "no numbers")
 
 
-def _columns(rows: Any) -> FloatArray:
-    """Rows, (n_rows,) or (n_rows, n), as a matrix of columns; read some at a time."""
+def _read_columns(rows: Any) -> FloatArray:
+    """Return rows, (n_rows,) or (n_rows, n), as a matrix of columns, read some rows at a time."""
     result = allocate_matrix(rows.shape[0], rows.shape[1] if rows.ndim == 2 else 1)
     for start in range(0, len(result), _AT_ONCE):
         some = rows[start : start + _AT_ONCE]
@@ -88,20 +88,23 @@ def _columns(rows: Any) -> FloatArray:
     return result
 
 
-def _npz(path: Path) -> RawLog:
+def _load_npz(path: Path) -> RawLog:
+    """Return the arrays of an NPZ file as a log."""
     check_is_file(path)
     try:
         with zipfile.ZipFile(path) as archive:
             others: dict[str, str] = {}
-            return _from_arrays(path, _members(archive, others), others)
+            return _split_columns(path, _iterate_members(archive, others), others)
     except FileNotFoundError as error:
-        raise missing(path) from error
+        raise make_missing_error(path) from error
     except _UNREADABLE as error:
         raise ArtifactError(f"{path}: cannot be read as NPZ ({error}).") from error
 
 
-def _members(archive: zipfile.ZipFile, others: dict[str, str]) -> Iterator[tuple[str, FloatArray]]:
-    """Yield arrays of numbers; not by numpy.load, as one may be larger than memory.
+def _iterate_members(
+    archive: zipfile.ZipFile, others: dict[str, str]
+) -> Iterator[tuple[str, FloatArray]]:
+    """Yield the arrays of numbers in an archive; numpy.load would need memory for each of them.
 
     Args:
         archive: The file.
@@ -133,10 +136,10 @@ def _members(archive: zipfile.ZipFile, others: dict[str, str]) -> Iterator[tuple
             yield info.filename.removesuffix(".npy"), result
 
 
-def _from_arrays(
+def _split_columns(
     path: Path, matrices: Iterable[tuple[str, FloatArray]], others: Mapping[str, str] | None = None
 ) -> RawLog:
-    """Number the columns of matrices.
+    """Return a log whose columns are the numbered columns of matrices.
 
     Args:
         path: The file.
@@ -164,8 +167,10 @@ def _from_arrays(
     return RawLog(str(path), columns, first_line=None, others=others or {})
 
 
-def _bag(path: Path) -> RawLog:
-    """Fields of all messages as TOPIC/field, of joint states as TOPIC/position/JOINT; TOPIC/time."""
+def _load_bag(path: Path) -> RawLog:
+    """Return the fields of all messages of a bag as TOPIC/field, of joint states as TOPIC/position/JOINT, with
+    TOPIC/time.
+    """
     # Late: an extra, of use to those who have bags.
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError
@@ -176,7 +181,7 @@ def _bag(path: Path) -> RawLog:
             remedy="Install it with `pip install 'paramreduce[rosbag]'`.",
         ) from error
     if not path.exists():
-        raise missing(path)
+        raise make_missing_error(path)
     if not path.is_dir():
         check_is_file(path)
     found: dict[tuple[str, str], tuple[array.array, array.array]] = {}
@@ -184,8 +189,8 @@ def _bag(path: Path) -> RawLog:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
             for connection, stamp, raw in reader.messages():
                 message = reader.deserialize(raw, connection.msgtype)
-                time = _stamp(message, stamp)
-                for name, value in _fields(message):
+                time = _get_time(message, stamp)
+                for name, value in _iterate_fields(message):
                     column = found.setdefault(
                         (connection.topic, name), (array.array("d"), array.array("d"))
                     )
@@ -226,8 +231,8 @@ def _name_columns(
     return columns
 
 
-def _stamp(message: Any, received: int) -> float:
-    """Seconds: the message's own time, or that at which it was received."""
+def _get_time(message: Any, received: int) -> float:
+    """Return the time of a message, s: its own, or the time at which it was received."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     own = 0.0 if stamp is None else stamp.sec + 1e-9 * stamp.nanosec
     return own or 1e-9 * received
@@ -236,7 +241,8 @@ def _stamp(message: Any, received: int) -> float:
 _JOINT_STATE = ("position", "velocity", "effort")
 
 
-def _fields(message: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+def _iterate_fields(message: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
+    """Yield the numbers of a message with their names."""
     names = getattr(message, "name", None)
     if isinstance(names, list) and all(hasattr(message, key) for key in _JOINT_STATE):
         for key in _JOINT_STATE:
@@ -254,4 +260,4 @@ def _fields(message: Any, prefix: str = "") -> Iterator[tuple[str, float]]:
         elif isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "fiu":
             yield from ((f"{prefix}{key}/{k + 1}", float(v)) for k, v in enumerate(value))
         elif hasattr(value, "__dict__") or hasattr(value, "__msgtype__"):
-            yield from _fields(value, f"{prefix}{key}/")
+            yield from _iterate_fields(value, f"{prefix}{key}/")

@@ -1,4 +1,4 @@
-"""Records as plain data, such as JSON can hold, and back by their types."""
+"""Records as plain data, such as JSON can hold, and back."""
 
 import dataclasses
 import math
@@ -12,7 +12,7 @@ import numpy as np
 
 
 def to_plain(value: Any) -> Any:
-    """A record, or what one is made of, as lists, mappings, texts and numbers."""
+    """Return a record, or a part of it, as lists, mappings, texts and numbers."""
     if dataclasses.is_dataclass(value):
         return {f.name: to_plain(getattr(value, f.name)) for f in dataclasses.fields(value)}
     if isinstance(value, Enum):
@@ -29,7 +29,7 @@ def to_plain(value: Any) -> Any:
 
 
 def from_plain(hint: Any, data: Any) -> Any:
-    """The inverse of :func:`to_plain`.
+    """Return a record, or a part of it, from plain data; the inverse of :func:`to_plain`.
 
     Args:
         hint: Type of the record, or of a part of it.
@@ -46,7 +46,7 @@ def from_plain(hint: Any, data: Any) -> Any:
     if isinstance(hint, type) and issubclass(hint, Enum):
         return hint[data]
     if origin is np.ndarray:
-        return np.array(data, dtype=dtype_of(hint))
+        return np.array(data, dtype=get_dtype(hint))
     if origin in (typing.Union, types.UnionType):
         members = [a for a in arguments if a is not type(None)]
         return data if data is None or len(members) > 1 else from_plain(members[0], data)
@@ -58,7 +58,7 @@ def from_plain(hint: Any, data: Any) -> Any:
     return float(data) if hint is float else data
 
 
-def dtype_of(hint: Any) -> type:
-    """Type of the numbers in an array, from the hint of the array."""
+def get_dtype(hint: Any) -> type:
+    """Return the type of the numbers in an array, from the type hint of the array."""
     scalar: type = typing.get_args(typing.get_args(hint)[1])[0]
     return scalar

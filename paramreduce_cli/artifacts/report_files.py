@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.atomic import atomically, check_is_file, missing
+from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error, replace_atomically
 from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
@@ -19,26 +19,27 @@ _LISTING = ".exported.json"
 def save_report(folder: Path, report: Report, stamp: Stamp) -> Stamp:
     """Write a report's files, its summary last, and remove what a former report left."""
     for name, content in report.files.items():
-        with atomically(folder / name) as path:
+        with replace_atomically(folder / name) as path:
             path.write_bytes(content)
-    _remove_what_a_former_report_left(folder, set(report.files))
+    _remove_former_files(folder, set(report.files))
     files = {name: hashlib.sha256(report.files[name]).hexdigest() for name in sorted(report.files)}
     summary = {**report.summary, "files": files}
     summary["provenance"] = vars(stamp)
-    done = dataclasses.replace(stamp, digest=_digest(summary))
+    done = dataclasses.replace(stamp, digest=_digest_summary(summary))
     summary["provenance"] = vars(done)
-    with atomically(folder / Path(SUMMARY).name) as path:
+    with replace_atomically(folder / Path(SUMMARY).name) as path:
         path.write_text(json.dumps(summary, indent=1, allow_nan=False) + "\n", encoding="utf-8")
     return done
 
 
-def _digest(summary: Mapping[str, Any]) -> str:
-    """Of a summary but for the digest in it."""
+def _digest_summary(summary: Mapping[str, Any]) -> str:
+    """Return the digest of a summary without the digest in it."""
     content = {**summary, "provenance": {**summary["provenance"], "digest": ""}}
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _remove_what_a_former_report_left(folder: Path, files: set[str]) -> None:
+def _remove_former_files(folder: Path, files: set[str]) -> None:
+    """Remove files of the former report that the new one does not write."""
     try:
         former = set(map(str, load_json(folder / Path(SUMMARY).name).get("files", ())))
     except (ArtifactError, AttributeError, TypeError):
@@ -59,25 +60,26 @@ def save_files(folder: Path, files: Mapping[str, bytes]) -> None:
     except (ArtifactError, TypeError):
         former = set()
     for name, content in files.items():
-        with atomically(folder / name) as path:
+        with replace_atomically(folder / name) as path:
             path.write_bytes(content)
     for name in former - set(files):
         if Path(str(name)).name == name:
             (folder / name).unlink(missing_ok=True)
-    with atomically(listing) as path:
+    with replace_atomically(listing) as path:
         path.write_text(json.dumps(sorted(files)), encoding="utf-8")
 
 
-def summary_stamp(path: Path) -> Stamp | None:
-    """Provenance of a summary; None if there is none.
+def read_summary_stamp(path: Path) -> Stamp | None:
+    """Return the stamp of a summary, or None if it has none.
 
     Raises:
         ArtifactError: It is missing, damaged, or no summary.
     """
-    return _stamp(load_summary(path))
+    return _get_stamp(load_summary(path))
 
 
-def _stamp(summary: Any) -> Stamp | None:
+def _get_stamp(summary: Any) -> Stamp | None:
+    """Return the stamp in a summary, or None."""
     try:
         return Stamp(**summary["provenance"])
     except (KeyError, TypeError):
@@ -106,13 +108,13 @@ def load_summary(path: Path) -> dict[str, Any]:
     return summary
 
 
-def newer_than_report(results: Path) -> list[str]:
-    """Artifacts of a results folder that have changed since its report was made.
+def list_newer_artifacts(results: Path) -> list[str]:
+    """Return the artifacts of a results folder that have changed since its report was made.
 
     Raises:
         ArtifactError: The summary is missing or damaged, or one of them is no HDF5 file.
     """
-    stamp = summary_stamp(results / SUMMARY)
+    stamp = read_summary_stamp(results / SUMMARY)
     found = []
     for name, digest in ({} if stamp is None else stamp.inputs).items():
         path = results / name
@@ -126,8 +128,8 @@ def _is_whole(summary: Mapping[str, Any]) -> bool:
     """Whether the digest fits; where there is no provenance, whether none stands under a damaged name either."""
     if "provenance" not in summary:
         return not any(isinstance(entry, dict) and "digest" in entry for entry in summary.values())
-    stamp = _stamp(summary)
-    return stamp is not None and stamp.digest == _digest(summary)
+    stamp = _get_stamp(summary)
+    return stamp is not None and stamp.digest == _digest_summary(summary)
 
 
 def verify_report(path: Path) -> None:
@@ -171,6 +173,6 @@ def load_json(path: Path) -> Any:
     try:
         return json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError as error:
-        raise missing(path) from error
+        raise make_missing_error(path) from error
     except (OSError, ValueError, RecursionError) as error:
         raise ArtifactError(f"{path}: is not JSON: {error}.") from error

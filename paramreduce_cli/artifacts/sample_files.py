@@ -1,4 +1,4 @@
-"""samples.h5, the project's own or one that a user brings: written and read block by block.
+"""Files of samples, the project's own or the user's: written and read block by block.
 
 A large observation matrix is not kept where the model next to the file gives it back: it is sooner
 computed than read.
@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.hdf5 import Reader, Writer, read_stamp, reading
+from paramreduce_cli.artifacts.hdf5 import Reader, Writer, open_reader, read_stamp
 from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.joined import JoinedSet
@@ -35,13 +35,13 @@ States = Callable[[int, int], list[FloatArray]]
 
 
 def save_samples(writer: Writer, samples: Samples) -> None:
-    """samples.h5, block by block."""
-    writer.dataset("parameters/names", samples.names)
-    writer.dataset("parameters/preference", samples.preference)
+    """Write samples.h5, block by block."""
+    writer.write_dataset("parameters/names", samples.names)
+    writer.write_dataset("parameters/preference", samples.preference)
     for name in ("values", "nominal_torque", "nominal_acceleration"):
         value = getattr(samples, name)
         if value is not None:
-            writer.dataset("parameters/values" if name == "values" else name, value)
+            writer.write_dataset("parameters/values" if name == "values" else name, value)
     for name in SETS:
         one = getattr(samples, name)
         if one is not None:
@@ -53,52 +53,52 @@ _GENERALISED = ("q", "dq", "ddq")
 
 
 def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
-    """One set; its triangular factors are collected on the way, unless they are known from its parts."""
+    """Write one set; its triangular factors are collected on the way, unless they are known from its parts."""
     known = sample_set.compute_factors() if isinstance(sample_set, JoinedSet) else None
     accumulator = FactorAccumulator()
     appenders: dict[str, Any] = {}
-    for block in _read(sample_set, known):
+    for block in _iterate_blocks(sample_set, known):
         if not appenders:
             n_parameters = block.W.shape[1]
-            kept = not _left_out(sample_set, block.tau.shape[1], n_parameters)
-            appenders = _appenders(writer, name, block, sample_set.n_samples, kept=kept)
+            kept = not _is_matrix_left_out(sample_set, block.tau.shape[1], n_parameters)
+            appenders = _start_datasets(writer, name, block, sample_set.n_samples, kept=kept)
         for key, append in appenders.items():  # in this order: the digest depends on it
             own = np.full(block.time.size, float(block.trajectory))
             append(own if key == "trajectory" else getattr(block, key))
         if known is None:
             accumulator.add(block)
-    writer.dataset(f"{name}/factors", accumulator.result() if known is None else known)
+    writer.write_dataset(f"{name}/factors", accumulator.result() if known is None else known)
 
 
-def _read(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
-    """The samples; without observation matrices where these are neither kept nor needed."""
+def _iterate_blocks(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
+    """Yield the samples, without observation matrices if these are neither kept nor needed."""
     if isinstance(sample_set, JoinedSet) and known is not None:
         _, n_dof, k, _ = known.shape
-        if _left_out(sample_set, n_dof, k - 1):
-            return sample_set.states()
+        if _is_matrix_left_out(sample_set, n_dof, k - 1):
+            return sample_set.iterate_states()
     return sample_set.iterate_blocks()
 
 
-def _left_out(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
-    """Whether the observation matrix is not kept."""
+def _is_matrix_left_out(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
+    """Return whether the observation matrix is not kept."""
     return sample_set.recomputable and sample_set.n_samples * n_dof * n_parameters > _MOST_KEPT
 
 
-def _appenders(
+def _start_datasets(
     writer: Writer, name: str, first: Block, n_samples: int, *, kept: bool
 ) -> dict[str, Callable[[FloatArray], None]]:
-    """What writes each dataset of a set, block by block."""
+    """Return the functions that write each dataset of a set, block by block."""
     (_, n_dof), n_parameters = first.tau.shape, first.W.shape[1]
-    appenders = {key: writer.rows(f"{name}/{key}", n_dof) for key in _STATES}
-    appenders["time"] = writer.rows(f"{name}/time", None)
-    appenders["trajectory"] = writer.rows(f"{name}/trajectory", None)
+    appenders = {key: writer.start_rows(f"{name}/{key}", n_dof) for key in _STATES}
+    appenders["time"] = writer.start_rows(f"{name}/time", None)
+    appenders["trajectory"] = writer.start_rows(f"{name}/trajectory", None)
     if kept:
-        appenders["W"] = writer.rows(f"{name}/W", n_parameters)
+        appenders["W"] = writer.start_rows(f"{name}/W", n_parameters)
     else:
-        writer.dataset(f"{name}/{_LEFT_OUT}", (n_samples * n_dof, n_parameters))
+        writer.write_dataset(f"{name}/{_LEFT_OUT}", (n_samples * n_dof, n_parameters))
     n_q = first.q.shape[1]
     if n_q != n_dof:  # loops: the independent coordinates are not all there is
-        appenders |= {key: writer.rows(f"{name}/{key}", n_q) for key in _GENERALISED}
+        appenders |= {key: writer.start_rows(f"{name}/{key}", n_q) for key in _GENERALISED}
     return appenders
 
 
@@ -118,28 +118,29 @@ class StoredSet:
     def __init__(self, path: Path, name: str, n_parameters: int, *, own: bool) -> None:
         self._path, self._name, self._own = path, name, own
         self._n_parameters = n_parameters
-        with reading(path) as reader:
-            tau = reader.rows(f"{name}/tau")
+        with open_reader(path) as reader:
+            tau = reader.open_rows(f"{name}/tau")
             self.recomputable = own and f"{name}/{_LEFT_OUT}" in reader
-            self._check_matrix(_matrix_shape(reader, name), tau.shape, n_parameters)
+            self._check_matrix(_read_matrix_shape(reader, name), tau.shape, n_parameters)
             self.n_samples, self.n_dof = tau.shape
             present = [key for key in ("z", "dz", "ddz") if f"{name}/{key}" in reader]
             self._has_states = len(present) == 3
             for key in present:
-                if reader.rows(f"{name}/{key}").shape != tau.shape:
+                if reader.open_rows(f"{name}/{key}").shape != tau.shape:
                     raise ArtifactError(f"{path}: /{name}/{key} must have the shape {tau.shape}.")
             self._has_generalised = all(f"{name}/{key}" in reader for key in _GENERALISED)
             if self._has_generalised:
-                shapes = {reader.rows(f"{name}/{key}").shape for key in _GENERALISED}
+                shapes = {reader.open_rows(f"{name}/{key}").shape for key in _GENERALISED}
                 if len(shapes) > 1 or next(iter(shapes))[0] != self.n_samples:
                     raise ArtifactError(
                         f"{path}: /{name}/q, dq and ddq must have one shape, (n_samples, n_q)."
                     )
-            self._column(reader, "time")
-            self.first = int(self._column(reader, "trajectory")[0])
+            self._read_column(reader, "time")
+            self.first = int(self._read_column(reader, "trajectory")[0])
             """Number of its first trajectory."""
 
     def _check_matrix(self, W: tuple[int, ...], tau: tuple[int, ...], n_parameters: int) -> None:
+        """Raise ArtifactError unless the observation matrix has one row per sample and joint."""
         place = f"{self._path}: /{self._name}/"
         if len(W) != 2 or len(tau) != 2 or W[0] != tau[0] * tau[1]:
             raise ArtifactError(
@@ -153,7 +154,7 @@ class StoredSet:
 
     @cached_property
     def _dynamics(self) -> Dynamics:
-        """Of the model that the samples were computed with.
+        """Dynamics of the model that the samples were computed with.
 
         Raises:
             ArtifactError: It is not next to the file.
@@ -163,7 +164,7 @@ class StoredSet:
             path = self._path.parent.with_name(_MODEL)
         own = read_stamp(self._path)
         needed = f"The observation matrix of {self._path} is computed from it."
-        with reading(path, remedy=needed) as reader:
+        with open_reader(path, remedy=needed) as reader:
             stamp = read_stamp(path)
             if own is None or stamp is None or own.inputs.get(_MODEL) != stamp.digest:
                 raise ArtifactError(
@@ -178,23 +179,26 @@ class StoredSet:
 
     def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        return self._blocks(W=True)
+        return self._iterate(W=True)
 
-    def states(self) -> Iterator[Block]:
-        """The same with observation matrices of no rows."""
-        return self._blocks(W=False)
+    def iterate_states(self) -> Iterator[Block]:
+        """Yield the samples with observation matrices without rows."""
+        return self._iterate(W=False)
 
-    def _blocks(self, *, W: bool) -> Iterator[Block]:
-        with reading(self._path) as reader:
+    def _iterate(self, *, W: bool) -> Iterator[Block]:
+        """Yield the samples block by block, with or without rows of W."""
+        with open_reader(self._path) as reader:
             base = self._name
-            tau = reader.rows(f"{base}/tau")
-            rows = None if self.recomputable else reader.rows(f"{base}/W")
+            tau = reader.open_rows(f"{base}/tau")
+            rows = None if self.recomputable else reader.open_rows(f"{base}/W")
             none = np.zeros((0, self._n_parameters))
-            owner = self._column(reader, "trajectory")
-            time = self._column(reader, "time")
-            states_of = self._states(reader, _STATES[:3])
-            generalised_of = self._states(reader, _GENERALISED if self._has_generalised else ())
-            for start, stop in _slices(owner, BLOCK_SAMPLES):
+            owner = self._read_column(reader, "trajectory")
+            time = self._read_column(reader, "time")
+            states_of = self._open_states(reader, _STATES[:3])
+            generalised_of = self._open_states(
+                reader, _GENERALISED if self._has_generalised else ()
+            )
+            for start, stop in _iterate_ranges(owner, BLOCK_SAMPLES):
                 tau_block = tau[start:stop].astype(float)
                 states = states_of(start, stop)
                 whole = generalised_of(start, stop) if self._has_generalised else states
@@ -215,18 +219,19 @@ class StoredSet:
                     int(owner[start]), time[start:stop], z, dz, ddz, tau_block, q, dq, ddq, W_block
                 )
 
-    def _states(self, reader: Reader, keys: tuple[str, ...]) -> States:
-        """Gives states of a range of samples; not numbers where the file has none."""
+    def _open_states(self, reader: Reader, keys: tuple[str, ...]) -> States:
+        """Return a function that reads the states of a range of samples; NaN if the file has none."""
         if not self._has_states:
             return lambda start, stop: [np.full((stop - start, self.n_dof), np.nan)] * 3
-        rows = [reader.rows(f"{self._name}/{key}") for key in keys]
+        rows = [reader.open_rows(f"{self._name}/{key}") for key in keys]
         return lambda start, stop: [data[start:stop] for data in rows]
 
-    def _column(self, reader: Reader, key: str) -> FloatArray:
+    def _read_column(self, reader: Reader, key: str) -> FloatArray:
+        """Return one number per sample; zeros if the file has none."""
         name = f"{self._name}/{key}"
         if name not in reader:
             return np.zeros(self.n_samples)
-        column = reader.array(name, 1).astype(float)
+        column = reader.read_array(name, 1).astype(float)
         if column.size != self.n_samples or not np.isfinite(column).all():
             raise ArtifactError(
                 f"{self._path}: /{name} must hold {self.n_samples} finite numbers, one per sample."
@@ -236,15 +241,15 @@ class StoredSet:
         return column
 
     def compute_factors(self) -> FloatArray:
-        """Triangular factors per trajectory and joint, stored or computed."""
+        """Return the triangular factors by trajectory and joint, stored or computed."""
         if self._own:
-            with reading(self._path) as reader:
-                return reader.array(f"{self._name}/factors", 4)
+            with open_reader(self._path) as reader:
+                return reader.read_array(f"{self._name}/factors", 4)
         return joint_factors(self.iterate_blocks())
 
 
-def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
-    """Consecutive ranges of samples, none longer than ``most`` or over two trajectories."""
+def _iterate_ranges(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
+    """Yield consecutive ranges of samples, none longer than ``most`` or across two trajectories."""
     edges = [0, *(np.flatnonzero(np.diff(owner)) + 1).tolist(), owner.size]
     for first, last in itertools.pairwise(edges):
         for start in range(first, last, most):
@@ -252,14 +257,14 @@ def _slices(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:
 
 
 def load_samples(reader: Reader) -> Samples:
-    """samples.h5, the project's own or one that a user brings."""
-    own = reader.attribute("stage") == "sample"
-    W = _matrix_shape(reader, "estimation")
+    """Return the samples in a file, the project's own or the user's."""
+    own = reader.read_attribute("stage") == "sample"
+    W = _read_matrix_shape(reader, "estimation")
     if len(W) != 2:
         raise ArtifactError(f"{reader.path}: /estimation/W must be a matrix.")
     n = W[1]
     if "parameters/names" in reader:
-        names = reader.texts("parameters/names")
+        names = reader.read_texts("parameters/names")
         if len(names) != n or len(set(names)) != n:
             raise ArtifactError(
                 f"{reader.path}: /parameters/names must hold {n} different names, one per column "
@@ -276,15 +281,15 @@ def load_samples(reader: Reader) -> Samples:
     estimation = stored("estimation")
     assert estimation is not None
     nominal = {
-        key: _optional(reader, key, reader.rows("estimation/tau").shape[1])
+        key: _read_optional(reader, key, reader.open_rows("estimation/tau").shape[1])
         for key in ("nominal_torque", "nominal_acceleration")
         if key in reader
     }
-    ranks = _optional(reader, "parameters/preference", n)
+    ranks = _read_optional(reader, "parameters/preference", n)
     return Samples(
         names=names,
         preference=np.full(n, LAST) if ranks is None else ranks.astype(np.int64),
-        values=_optional(reader, "parameters/values", n),
+        values=_read_optional(reader, "parameters/values", n),
         nominal_torque=nominal.get("nominal_torque"),
         nominal_acceleration=nominal.get("nominal_acceleration"),
         estimation=estimation,
@@ -295,20 +300,21 @@ def load_samples(reader: Reader) -> Samples:
 
 def load_item_set(reader: Reader, name: str) -> StoredSet:
     """Return a set that the project wrote by itself."""
-    return StoredSet(reader.path, name, _matrix_shape(reader, name)[1], own=True)
+    return StoredSet(reader.path, name, _read_matrix_shape(reader, name)[1], own=True)
 
 
-def _matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:
-    """Of an observation matrix, be it kept or not."""
+def _read_matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:
+    """Return the shape of an observation matrix, whether it is kept or not."""
     if f"{name}/{_LEFT_OUT}" in reader:
-        return tuple(reader.array(f"{name}/{_LEFT_OUT}", 1).tolist())
-    return tuple(reader.rows(f"{name}/W").shape)
+        return tuple(reader.read_array(f"{name}/{_LEFT_OUT}", 1).tolist())
+    return tuple(reader.open_rows(f"{name}/W").shape)
 
 
-def _optional(reader: Reader, name: str, size: int) -> FloatArray | None:
+def _read_optional(reader: Reader, name: str, size: int) -> FloatArray | None:
+    """Return a vector of finite numbers, or None if the file has none."""
     if name not in reader:
         return None
-    value = reader.array(name, 1)
+    value = reader.read_array(name, 1)
     numbers = ~np.isnan(value) if name == "nominal_torque" else np.isfinite(value)
     if value.size != size or not numbers.all():
         raise ArtifactError(f"{reader.path}: /{name} must hold {size} finite numbers.")

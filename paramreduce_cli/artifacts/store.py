@@ -1,4 +1,4 @@
-"""A results folder: which record is in which file, and which files are up to date."""
+"""Results folder: the files of records, and whether they are up to date."""
 
 import contextlib
 import hashlib
@@ -12,22 +12,22 @@ from typing import Any
 import filelock
 
 from paramreduce_cli.artifacts import layouts
-from paramreduce_cli.artifacts.atomic import check_is_file, missing, remove_leftovers
+from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error, remove_leftovers
 from paramreduce_cli.artifacts.hdf5 import (
     SCHEMA,
     Reader,
     Stamp,
     Writer,
+    open_reader,
     read_stamp,
-    reading,
-    stamp_of,
+    read_stamp_from,
     write,
 )
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import (
     load_json,
+    read_summary_stamp,
     save_report,
-    summary_stamp,
     verify_report,
 )
 from paramreduce_cli.artifacts.sample_files import load_samples, save_samples
@@ -37,7 +37,7 @@ from paramreduce_cli.records import STORED, Report, Samples
 
 @dataclass(frozen=True)
 class Layout:
-    """How one kind of record is kept in HDF5."""
+    """A layout of one kind of record in HDF5."""
 
     file: str
     save: Callable[[Writer, Any], None]
@@ -51,8 +51,8 @@ LAYOUTS: dict[type, Layout] = {
 """How the records that name their file are kept."""
 
 
-def file_of(record: type) -> str:
-    """Path of a record's file below the results folder."""
+def get_file(record: type) -> str:
+    """Return the path of a record's file below the results folder."""
     return SUMMARY if record is Report else LAYOUTS[record].file
 
 
@@ -66,17 +66,17 @@ class Store:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def path(self, record: type) -> Path:
-        """Where a record is kept."""
-        return self.folder / file_of(record)
+    def get_path(self, record: type) -> Path:
+        """Return the path of a record's file."""
+        return self.folder / get_file(record)
 
-    def stamp(self, record: type) -> Stamp | None:
-        """Provenance of a record's file, None if it is not there or not readable."""
-        path = self.path(record)
+    def read_stamp(self, record: type) -> Stamp | None:
+        """Return the stamp of a record's file, or None if it does not exist or is not readable."""
+        path = self.get_path(record)
         if not path.exists():
             return None
         try:
-            return summary_stamp(path) if record is Report else read_stamp(path)
+            return read_summary_stamp(path) if record is Report else read_stamp(path)
         except ArtifactError:
             return None
 
@@ -84,9 +84,9 @@ class Store:
         """Whether a record's file can be read to its end: no checksum in it is wrong."""
         try:
             if record is Report:
-                verify_report(self.path(record))
+                verify_report(self.get_path(record))
             else:
-                with reading(self.path(record)) as reader:
+                with open_reader(self.get_path(record)) as reader:
                     reader.verify()
         except ArtifactError:
             return False
@@ -101,10 +101,10 @@ class Store:
         Raises:
             ArtifactError: The record's file is such a file.
         """
-        path = self.path(record)
+        path = self.get_path(record)
         if not path.exists():
             return
-        stamp = self.stamp(record)
+        stamp = self.read_stamp(record)
         if stamp is not None and stamp.robot != robot:
             raise ArtifactError(
                 f"{path}: belongs to the robot {stamp.robot} and would be overwritten by {robot}. "
@@ -126,15 +126,15 @@ class Store:
     def touch(self, record: type) -> None:
         """Make a file look new, so that Make agrees that it is current."""
         with contextlib.suppress(OSError):  # where nobody may write Make cannot be told
-            os.utime(self.path(record))
+            os.utime(self.get_path(record))
 
     @contextlib.contextmanager
-    def locked(self, part: str = "", *, wait: bool = False) -> Iterator[None]:
-        """Keep other runs out of the folder, or away from one part of an artifact.
+    def lock(self, part: str = "", *, wait: bool = False) -> Iterator[None]:
+        """Keep other runs out of the folder, or away from one part of an artifact, within the block.
 
         Args:
-            part: Name of it; all if empty.
-            wait: Whether another run is waited for.
+            part: Name of the part; the whole folder if empty.
+            wait: Whether to wait for another run instead of raising an error.
 
         Raises:
             ArtifactError: Another run is in it.
@@ -176,8 +176,8 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
     Raises:
         ArtifactError: It is missing, damaged, of another robot or of another schema.
     """
-    with reading(path, command=maker) as reader:
-        stamp = stamp_of(reader)
+    with open_reader(path, command=maker) as reader:
+        stamp = read_stamp_from(reader)
         if stamp is not None:
             check_schema(path, stamp)
         if stamp is None and robot is not None:
@@ -208,8 +208,8 @@ def check_schema(path: Path, stamp: Stamp) -> None:
         )
 
 
-def file_digest(path: Path) -> str:
-    """SHA-256 of a file's bytes.
+def digest_file(path: Path) -> str:
+    """Return the SHA-256 of a file's bytes.
 
     Raises:
         ArtifactError: It cannot be read.
@@ -218,12 +218,12 @@ def file_digest(path: Path) -> str:
         check_is_file(path)
     try:
         if path.is_dir():  # a bag
-            parts = {p.name: file_digest(p) for p in sorted(path.iterdir()) if p.is_file()}
+            parts = {p.name: digest_file(p) for p in sorted(path.iterdir()) if p.is_file()}
             return hashlib.sha256(repr(parts).encode()).hexdigest()
         with path.open("rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()
     except FileNotFoundError as error:
-        raise missing(path) from error
+        raise make_missing_error(path) from error
     except OSError as error:
         raise ArtifactError(f"{path}: cannot be read: {error.strerror}.") from error
 
@@ -234,9 +234,9 @@ def is_foreign(path: Path) -> bool:
         if path.suffix == ".json":
             data = load_json(path)
             return not (isinstance(data, dict) and {"provenance", "config_sha256"} & data.keys())
-        with reading(path) as reader:
+        with open_reader(path) as reader:
             for name in reader.file.attrs:
-                reader.attribute(name)
+                reader.read_attribute(name)
             return True
     except ArtifactError:
         return False

@@ -1,4 +1,4 @@
-"""Finished items of an artifact that is not whole yet, a file each."""
+"""Finished items of an artifact that is not complete yet, one file each."""
 
 import contextlib
 import time
@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import remove_leftovers
-from paramreduce_cli.artifacts.hdf5 import Reader, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.hdf5 import Reader, Stamp, Writer, open_reader, read_stamp, write
 from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.artifacts.sample_files import load_item_set, save_sample_set
 from paramreduce_cli.errors import ArtifactError
@@ -25,13 +25,13 @@ _GROUP = "item"
 
 
 class StoredItems(MutableMapping[str, Any]):
-    """Records of finished items by key.
+    """A mapping of finished items by key, stored as files.
 
     Each carries the digests of what it was made from; an item that is damaged, or made from anything else, counts as
     absent.
 
     Args:
-        path: The artifact that they are items of.
+        path: Path of the artifact that the items belong to.
         stamp: Returns the provenance of an item, given the seconds that it took.
         from_start: Whether items of earlier runs count as absent.
         check: Called before an item is written; raises a KeyboardInterrupt that a library swallowed, which may
@@ -55,11 +55,11 @@ class StoredItems(MutableMapping[str, Any]):
         self.written: set[str] = set()
         """Keys of the items that this run has finished."""
 
-    def _path(self, key: str) -> Path:
+    def _get_path(self, key: str) -> Path:
         return self.folder / f"{key}.h5"
 
     def __getitem__(self, key: str) -> Any:
-        path = self._path(key)
+        path = self._get_path(key)
         if self._from_start and key not in self.written:
             raise KeyError(key)
         try:
@@ -67,19 +67,20 @@ class StoredItems(MutableMapping[str, Any]):
         except OSError as error:
             raise KeyError(key) from error
         if self._read.get(key, (0, None))[0] != written:
-            self._read[key] = written, self._load(key)
+            self._read[key] = written, self._load_item(key)
         record = self._read[key][1]
         if isinstance(record, _Absent):
             raise KeyError(key)
         return record
 
-    def _load(self, key: str) -> Any:
-        path = self._path(key)
+    def _load_item(self, key: str) -> Any:
+        """Return the item in a file, or _Absent if it is damaged or of another origin."""
+        path = self._get_path(key)
         try:
             stamp = read_stamp(path)
-            if stamp is None or _origin(stamp) != self._own_origin:
+            if stamp is None or _get_origin(stamp) != self._own_origin:
                 return _Absent()
-            with reading(path) as reader:
+            with open_reader(path) as reader:
                 reader.verify()
                 return _load_record(reader)
         except ArtifactError:
@@ -87,18 +88,18 @@ class StoredItems(MutableMapping[str, Any]):
 
     @cached_property
     def _own_origin(self) -> tuple[Any, ...]:
-        return _origin(self._stamp(0.0))
+        return _get_origin(self._stamp(0.0))
 
     def __setitem__(self, key: str, record: Any) -> None:
         self._check()
         now = time.perf_counter()
         stamp = self._stamp(now - self._since)
         self._since = now
-        write(self._path(key), stamp, lambda writer: _save_record(writer, record))
+        write(self._get_path(key), stamp, lambda writer: _save_record(writer, record))
         self.written.add(key)
 
     def __delitem__(self, key: str) -> None:
-        self._path(key).unlink()
+        self._get_path(key).unlink()
 
     def __iter__(self) -> Iterator[str]:
         names = (path.stem for path in self.folder.glob("*.h5"))
@@ -107,13 +108,13 @@ class StoredItems(MutableMapping[str, Any]):
     def __len__(self) -> int:
         return sum(1 for _ in self)
 
-    def stamps(self) -> list[Stamp]:
-        """Return the provenance of the items that were made from the same as the artifact."""
+    def list_stamps(self) -> list[Stamp]:
+        """Return the stamps of the items that have the same origin as the artifact."""
         found: list[Stamp] = []
         for key in [] if self._from_start else self:
             with contextlib.suppress(ArtifactError):
-                stamp = read_stamp(self._path(key))
-                if stamp is not None and _origin(stamp) == self._own_origin:
+                stamp = read_stamp(self._get_path(key))
+                if stamp is not None and _get_origin(stamp) == self._own_origin:
                     found.append(stamp)
         return found
 
@@ -127,35 +128,37 @@ class StoredItems(MutableMapping[str, Any]):
 
 
 class _Absent:
-    """Stands for an item that is damaged or of another origin."""
+    """A marker of an item that is damaged or of another origin."""
 
 
-def _origin(stamp: Stamp) -> tuple[Any, ...]:
-    """Return what an artifact was made from, and by what."""
+def _get_origin(stamp: Stamp) -> tuple[Any, ...]:
+    """Return the origin of a file: versions, and digests of sections and inputs."""
     return (stamp.schema, stamp.robot, stamp.versions, stamp.sections, stamp.inputs)
 
 
 def _save_record(writer: Writer, record: Any) -> None:
+    """Write an item as the kind of record that it is."""
     kind = type(record).__name__
     if record is None:
-        writer.attribute(_KIND, _NOTHING)
+        writer.write_attribute(_KIND, _NOTHING)
     elif isinstance(record, np.ndarray):
-        writer.attribute(_KIND, _ARRAY)
-        writer.dataset(_GROUP, record)
+        writer.write_attribute(_KIND, _ARRAY)
+        writer.write_dataset(_GROUP, record)
     elif kind in _RECORDS:
-        writer.attribute(_KIND, kind)
+        writer.write_attribute(_KIND, kind)
         layouts.save(writer, record, _GROUP)
     else:
-        writer.attribute(_KIND, _SET)
+        writer.write_attribute(_KIND, _SET)
         save_sample_set(writer, _GROUP, record)
 
 
 def _load_record(reader: Reader) -> Any:
-    kind = reader.attribute(_KIND)
+    """Return an item as the kind of record that it is."""
+    kind = reader.read_attribute(_KIND)
     if kind == _NOTHING:
         return None
     if kind == _ARRAY:
-        return reader.array(_GROUP)
+        return reader.read_array(_GROUP)
     if kind in _RECORDS:
         return layouts.load(reader, _RECORDS[kind], _GROUP)
     return load_item_set(reader, _GROUP)

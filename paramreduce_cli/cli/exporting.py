@@ -5,7 +5,7 @@ from typing import Any
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.running.pipeline import maker_of
+from paramreduce_cli.running.pipeline import find_maker
 from paramreduce_cli.running.runner import Runner
 
 
@@ -16,10 +16,10 @@ def up_to_date(config: Config | None, store: Store, record: type) -> Any:
         ArtifactError: It is missing, or was made from something else.
     """
     robot = config.robot if config is not None else None
-    found = load_file(store.path(record), record, robot, maker_of(record).name)[0]
+    found = load_file(store.get_path(record), record, robot, find_maker(record).name)[0]
     if mismatch := Runner(config, store, jobs=1).describe_mismatch(record):
         again, command = ("Make it again.", "") if config is None else ("", "run")
         raise ArtifactError(
-            f"{mismatch}.", rejected=str(store.path(record)), remedy=again, command=command
+            f"{mismatch}.", rejected=str(store.get_path(record)), remedy=again, command=command
         )
     return found

@@ -77,10 +77,10 @@ def _robot(folder: Path, path: Path) -> list[str]:
 
 def _said_of(results: Path) -> str:
     """The selected model of a finished run."""
-    from paramreduce_cli.artifacts.report_files import load_summary, newer_than_report  # HDF5
+    from paramreduce_cli.artifacts.report_files import list_newer_artifacts, load_summary  # HDF5
 
     try:
-        newer = newer_than_report(results)
+        newer = list_newer_artifacts(results)
         if newer:
             return f"{' and '.join(newer)} changed since its report was made; paramreduce run makes it anew"
         summary = load_summary(results)

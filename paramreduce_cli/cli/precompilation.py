@@ -56,12 +56,12 @@ def _leave_out_terms() -> None:
     from paramreduce_cli.config import load_config
     from paramreduce_cli.config.examples import list_examples
     from paramreduce_cli.records import Run, TermReduction
-    from paramreduce_cli.running.in_memory import made_in_memory
-    from paramreduce_cli.running.pipeline import stages_to_run
+    from paramreduce_cli.running.in_memory import run_in_memory
+    from paramreduce_cli.running.pipeline import list_stages_to_run
 
     config = load_config(list_examples()[_EXAMPLE], _QUICK)
     records: dict[type, Any] = {}
-    for stage in stages_to_run(config):
-        records[stage.output] = made_in_memory(stage, config, records, Run())
+    for stage in list_stages_to_run(config):
+        records[stage.output] = run_in_memory(stage, config, records, Run())
         if stage.output is TermReduction:
             return

@@ -6,7 +6,7 @@ from typing import Any
 
 import click
 
-from paramreduce_cli.artifacts.store import file_of, load_file
+from paramreduce_cli.artifacts.store import get_file, load_file
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import (
     FORCE,
@@ -28,7 +28,7 @@ from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
 from paramreduce_cli.running.pipeline import Stage, check_is_asked_for, describe_stage
-from paramreduce_cli.running.runner import Outcome, Runner, asked
+from paramreduce_cli.running.runner import Outcome, Runner, format_arguments
 from paramreduce_cli.stages import stages
 
 _OF_LOGS = (MeasuredLog, Identification)
@@ -59,7 +59,7 @@ def stage_command(name: str) -> click.Command:
         store = results_store(loaded, results)
         placed = locate_errors(config, overrides)
         lock = "" if part is None else f"-{stage.name}-{part.number}-{part.count}"
-        with placed, store.locked(lock, wait=wait), show_progress(stage.name, quiet) as progress:
+        with placed, store.lock(lock, wait=wait), show_progress(stage.name, quiet) as progress:
             if loaded is not None:
                 check_is_asked_for(stage, loaded)
             runner = Runner(
@@ -69,7 +69,7 @@ def stage_command(name: str) -> click.Command:
                 callbacks(progress),
                 samples,
                 settings,
-                asked(config if robot else None, results, overrides),
+                format_arguments(config if robot else None, results, overrides),
             )
             outcome = runner.run(stage, force=force, go_on=True, part=part or WHOLE)
         if not quiet:
@@ -101,9 +101,9 @@ def stage_command(name: str) -> click.Command:
 
 
 def _stage_help(stage: Stage) -> str:
-    reads = [file_of(entry.type) for entry in stage.artifacts]
+    reads = [get_file(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
-    flow = f"Reads {source or 'the config'}; writes {file_of(stage.output)}."
+    flow = f"Reads {source or 'the config'}; writes {get_file(stage.output)}."
     text = (stage.function.__doc__ or "").strip().replace("\n    ", "\n")
     return f"{text}\n\n{flow}"
 

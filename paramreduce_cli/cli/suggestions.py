@@ -195,9 +195,15 @@ def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
 
     Args:
         rejected: Word that was typed, such as ``swop:9`` or ``9``.
-        choices: Words such as ``full``, ``swap:1...7`` or ``swap:2|4|6``; one with a single number is the default.
+        choices: Words such as ``full``, ``swap:1...7`` or ``swap:2|4|6``. A choice with a single number, such as
+            ``swap:4``, is the default if another choice has the same name.
     """
-    default = next((c for c in choices if c.partition(":")[2].isdecimal()), "")
+    names = [choice.partition(":")[0] for choice in choices]
+    default = next(
+        (c for c, name in zip(choices, names, strict=True)
+         if c.partition(":")[2].isdecimal() and names.count(name) > 1),
+        "",
+    )  # fmt: skip
     others = [choice for choice in choices if choice != default]
     name, _, number = rejected.partition(":")
     digits = "".join(c for c in rejected.lstrip(":") if c.isdecimal())

@@ -37,8 +37,7 @@ def make_exists_error(path: Path, config: Path | None = None) -> ConfigError:
     if config is None:
         free = (path.with_stem(f"{path.stem}_{k}") for k in numbers)
     else:
-        folder = config.parent.resolve()
-        free = (folder.with_name(f"{folder.name}_{k}") / config.name for k in numbers)
+        free = (config.parent / f"{config.stem}_{k}" / config.name for k in numbers)
     there = next((other for other in free if not other.exists()), path)
     return ConfigError(
         f"{path}: exists already; choose another place with --output.",

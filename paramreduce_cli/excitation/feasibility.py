@@ -1,4 +1,4 @@
-"""Motions that close the loops and keep the bounds: where to begin, and how to make sure.
+"""Feasible starts of motions: loops closed, bounds kept.
 
 Bounds are checked on a grid finer than the one optimised on; what they miss by between its
 points is mended by drawing the motion together towards a resting position inside.
@@ -23,21 +23,22 @@ _INSET = 0.98
 """Share of the position range in which a resting position is looked for."""
 
 
-def resting_position(
+def find_resting_position(
     excitation: Excitation,
     limits: JointLimits,
     margin: float = 1.0,
     wanted: FloatArray | None = None,
 ) -> FloatArray:
-    """Independent coordinates inside all limits and bounds, (n_dof,).
+    """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, or the assembly,
+    or what a search from there finds.
 
     The middle of the limits, or the assembly, or what a search from there finds.
 
     Args:
-        excitation: With the bounds.
-        limits: Of the independent coordinates.
-        margin: Share of the limits that may be used.
-        wanted: Where to look first, (n_dof,).
+        excitation: Excitation with the bounds.
+        limits: Limits of the independent coordinates.
+        margin: Fraction of the limits that may be used.
+        wanted: Coordinates from which to search first, (n_dof,).
 
     Raises:
         NumericalError: There is none to be found; says which bound stands in the way.
@@ -50,7 +51,7 @@ def resting_position(
         tried.append(np.clip(home, middle - reach, middle + reach))
 
     def worst(z: FloatArray) -> Bound:
-        return excitation.worst_bound(z[None], Follower(excitation.coordinates))
+        return excitation.find_worst_bound(z[None], Follower(excitation.coordinates))
 
     for z in list(tried):
         if worst(z).excess < 0:
@@ -82,13 +83,13 @@ def _stop_inside(intermediate_result: "scipy.optimize.OptimizeResult") -> None:
         raise StopIteration
 
 
-def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective) -> FloatArray:
-    """Draw a free series together towards a resting position until it keeps the bounds.
+def shrink_to_feasible(free: FloatArray, still: FloatArray, objective: FreeObjective) -> FloatArray:
+    """Shrink a free series towards a resting position until it keeps the bounds.
 
     Args:
-        free: A free series, (n_dof, 1 + 2 harmonics).
-        still: The free series that rests inside all bounds.
-        objective: Not a number outside the bounds.
+        free: Free series, (n_dof, 1 + 2 harmonics).
+        still: Free series that rests inside all bounds.
+        objective: Objective, which is NaN outside the bounds.
 
     Raises:
         NumericalError: Even the smallest motion does not keep them.
@@ -99,7 +100,7 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
         if np.isfinite(objective(drawn.ravel())[0]):
             return drawn
         share *= _SHRINKS
-    nearest = objective.worst_bound(drawn.ravel())
+    nearest = objective.find_worst_bound(drawn.ravel())
     if nearest.excess < 0:
         raise NumericalError(
             "leave no motion: even the smallest about a position that keeps all bounds needs more. Raise "
@@ -117,16 +118,16 @@ def feasible_start(free: FloatArray, still: FloatArray, objective: FreeObjective
     )
 
 
-def drawn_inside(
+def shrink_inside_bounds(
     excitation: Excitation, coefficients: FloatArray, rest: FloatArray, basis: FourierBasis
 ) -> FloatArray:
-    """Draw a series together towards a resting position until it keeps the bounds on a fine grid.
+    """Shrink a series towards a resting position until it keeps the bounds on a fine grid.
 
     Args:
-        excitation: With the bounds.
-        coefficients: Of a series, (n_dof, 1 + 2 harmonics).
+        excitation: Excitation with the bounds.
+        coefficients: Coefficients of a series, (n_dof, 1 + 2 harmonics).
         rest: Independent coordinates inside all bounds, (n_dof,).
-        basis: The series on the fine grid.
+        basis: Basis of the series on the fine grid.
 
     Raises:
         NumericalError: Hardly any motion keeps them there.
@@ -138,16 +139,16 @@ def drawn_inside(
         return still + share * (coefficients - still)
 
     def inside(share: float) -> bool:
-        z, dz, ddz = basis.states(drawn(share))
+        z, dz, ddz = basis.evaluate(drawn(share))
         positions = Follower(excitation.coordinates)
-        if excitation.worst_bound(z, positions).excess > 0:
+        if excitation.find_worst_bound(z, positions).excess > 0:
             return False
         try:
             q = positions(z)
             excitation.coordinates.check_motion(basis.time, q)
         except DataError:
             return False
-        return excitation.load_share(q, dz, ddz) <= 1
+        return excitation.compute_load_share(q, dz, ddz) <= 1
 
     if inside(1.0):
         return coefficients

@@ -16,9 +16,8 @@ FINER = 4
 
 @dataclass(frozen=True)
 class FourierBasis:
-    """Matrices that turn the coefficients of a joint into its motion on a set of times.
-
-    Each is (n_points, 1 + 2 harmonics).
+    """A basis of matrices that turn the coefficients of a joint into its motion at given times, (n_points, 1 + 2
+    harmonics) each.
     """
 
     time: FloatArray
@@ -26,11 +25,11 @@ class FourierBasis:
     velocity: FloatArray
     acceleration: FloatArray
 
-    def states(self, coefficients: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Motion of all joints.
+    def evaluate(self, coefficients: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the motion of all joints.
 
         Args:
-            coefficients: (n_dof, 1 + 2 harmonics)
+            coefficients: Coefficients of the series, (n_dof, 1 + 2 harmonics).
 
         Returns:
             z, dz and ddz, each (n_points, n_dof).
@@ -43,17 +42,17 @@ class FourierBasis:
 
 
 def sample_times(period: float, points: int) -> FloatArray:
-    """Equidistant times over one period, the end point left out, (points,), s."""
+    """Return equidistant times over one period without its end, (points,), s."""
     return period * np.arange(points) / points
 
 
-def fourier_basis(period: float, harmonics: int, time: FloatArray) -> FourierBasis:
-    """Evaluate the series' functions at some times.
+def evaluate_basis(period: float, harmonics: int, time: FloatArray) -> FourierBasis:
+    """Return the series' functions at given times.
 
     Args:
-        period: s.
+        period: Period, s.
         harmonics: Number of harmonics.
-        time: (n_points,), s.
+        time: Times, (n_points,), s.
     """
     frequency = 2 * np.pi / period * np.arange(1, harmonics + 1)
     phase = np.outer(time, frequency)
@@ -66,13 +65,13 @@ def fourier_basis(period: float, harmonics: int, time: FloatArray) -> FourierBas
     return FourierBasis(time, position, velocity, acceleration)
 
 
-def begun_at(coefficients: FloatArray, period: float, time: float) -> FloatArray:
-    """Coefficients of the same motion with the clock set to zero at some time, by the addition theorems.
+def shift_start(coefficients: FloatArray, period: float, time: float) -> FloatArray:
+    """Return the coefficients of the same motion with the clock set to zero at some time, by the addition theorems.
 
     Args:
-        coefficients: (n_dof, 1 + 2 harmonics)
-        period: s.
-        time: s.
+        coefficients: Coefficients of the series, (n_dof, 1 + 2 harmonics).
+        period: Period, s.
+        time: Time that becomes zero, s.
     """
     phase = 2 * np.pi / period * time * np.arange(1, (coefficients.shape[1] + 1) // 2)
     sine, cosine = np.sin(phase), np.cos(phase)
@@ -82,11 +81,11 @@ def begun_at(coefficients: FloatArray, period: float, time: float) -> FloatArray
     return result
 
 
-def grid_margin(harmonics: int, points: int) -> float:
-    """By what factor limits must be tightened on a grid to hold everywhere.
+def compute_grid_margin(harmonics: int, points: int) -> float:
+    """Return the factor by which limits must be tightened on a grid to hold between its points too.
 
-    A trigonometric polynomial of degree N exceeds its largest magnitude on M equidistant
-    points of its period by at most 1 / cos(pi N / M) [Ehlich1964].
+    A trigonometric polynomial of degree N exceeds its largest magnitude on M equidistant points of its period by at
+    most 1 / cos(pi N / M) [Ehlich1964].
 
     Raises:
         ValueError: The grid has no more than twice as many points as harmonics.

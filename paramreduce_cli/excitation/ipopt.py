@@ -45,7 +45,7 @@ TIGHT = {"acceptable_tol": 1e-3, "acceptable_iter": 15, "acceptable_obj_change_t
 
 @dataclass(frozen=True)
 class Minimum:
-    """Where a minimisation ended."""
+    """A minimum with the way it was reached."""
 
     x: FloatArray
     value: float
@@ -68,7 +68,8 @@ class _Memory:
         self.best = np.inf
         self.best_x: FloatArray | None = None
 
-    def at(self, x: FloatArray) -> tuple[float, FloatArray]:
+    def evaluate(self, x: FloatArray) -> tuple[float, FloatArray]:
+        """Return value and gradient, which are kept for the last point."""
         if self._x is None or not np.array_equal(x, self._x):
             self._value, self._gradient = self._objective(x)
             self._x = x.copy()
@@ -76,16 +77,18 @@ class _Memory:
                 self.best, self.best_x = self._value, self._x
         return self._value, self._gradient
 
-    def curvature_at(self, x: FloatArray) -> FloatArray:
-        gradient = self.at(x)[1]
+    def update_curvature(self, x: FloatArray) -> FloatArray:
+        """Return the quasi-Newton matrix, updated by the step to a point."""
+        gradient = self.evaluate(x)[1]
         if self.curvature is None:
             self.curvature = max(float(np.linalg.norm(gradient)), 1e-8) * np.eye(x.size)
         if self._last is not None:
-            self._update(x - self._last[0], gradient - self._last[1])
+            self._apply_damped_bfgs(x - self._last[0], gradient - self._last[1])
         self._last = (x.copy(), gradient.copy())
         return self.curvature
 
-    def _update(self, step: FloatArray, change: FloatArray) -> None:
+    def _apply_damped_bfgs(self, step: FloatArray, change: FloatArray) -> None:
+        """Update the matrix by damped BFGS."""
         assert self.curvature is not None
         if not np.any(step) or not np.all(np.isfinite(change)):
             return
@@ -135,6 +138,7 @@ class _Call(ca.Callback):
         return self._outputs[i]
 
     def eval(self, arguments: list[ca.DM]) -> list:
+        """Call the function with the arguments as arrays."""
         try:
             return self._function(*(np.array(argument.nonzeros()) for argument in arguments))
         except KeyboardInterrupt as error:
@@ -173,10 +177,12 @@ def minimise(
 
     def hessian(x: FloatArray, _p: FloatArray, scale: FloatArray, _g: FloatArray) -> list:
         # IPOPT scales steep objectives and says so through the objective's multiplier.
-        return [ca.DM(upper, scale[0] * memory.curvature_at(x)[rows, columns])]
+        return [ca.DM(upper, scale[0] * memory.update_curvature(x)[rows, columns])]
 
-    value = _Call("f", [x_sparsity], [scalar], lambda x: [memory.at(x)[0]])
-    slope = _Call("grad_f", [x_sparsity, none], [scalar, x_sparsity], lambda x, _: [*memory.at(x)])
+    value = _Call("f", [x_sparsity], [scalar], lambda x: [memory.evaluate(x)[0]])
+    slope = _Call(
+        "grad_f", [x_sparsity, none], [scalar, x_sparsity], lambda x, _: [*memory.evaluate(x)]
+    )
     bend = _Call("hess_lag", [x_sparsity, none, scalar, none], [upper], hessian)
     x = ca.MX.sym("x", n)
     options = {

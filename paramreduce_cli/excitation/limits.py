@@ -1,4 +1,4 @@
-"""Joint limits, met by construction instead of by constraints.
+"""Joint limits that series meet by construction instead of by constraints.
 
 Free harmonics P are mapped to admissible ones p = P / g(P), where g is a smooth maximum of the
 shares of the limits that their motion uses on the grid:
@@ -14,7 +14,7 @@ from typing import Literal
 
 import numpy as np
 
-from paramreduce_cli.excitation.fourier import FourierBasis, grid_margin
+from paramreduce_cli.excitation.fourier import FourierBasis, compute_grid_margin
 from paramreduce_cli.records import FloatArray, JointLimits
 
 LimitMapping = Literal["gauge", "ball"]
@@ -49,53 +49,55 @@ class LimitMap:
         points, columns = basis.position.shape
         self.n_dof = limits.middle.size
         self.n_columns = columns
-        self.margin = grid_margin((columns - 1) // 2, points)
+        self.margin = compute_grid_margin((columns - 1) // 2, points)
         self._mapping = mapping
         self._projection = np.eye(columns - 1)
         if rest_to_rest:
             ends = np.vstack([basis.velocity[0, 1:], basis.acceleration[0, 1:]])
             self._projection -= np.linalg.pinv(ends) @ ends
         self._middle, self._reach = limits.middle, limits.reach
-        self._positions = _harmonic_shares(basis.position, limits.reach * self.margin)
-        speeds = _harmonic_shares(basis.velocity, limits.velocity * self.margin)
-        accelerations = _harmonic_shares(basis.acceleration, limits.acceleration * self.margin)
+        self._positions = _divide_by_limits(basis.position, limits.reach * self.margin)
+        speeds = _divide_by_limits(basis.velocity, limits.velocity * self.margin)
+        accelerations = _divide_by_limits(basis.acceleration, limits.acceleration * self.margin)
         self._rates = np.concatenate([speeds, accelerations], axis=1)
 
-    def shares(self, free: FloatArray) -> FloatArray:
-        """Largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
-        up, down, rate = self._extremes(free[:, 1:] @ self._projection)
+    def compute_shares(self, free: FloatArray) -> FloatArray:
+        """Return the largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
+        up, down, rate = self._compute_extremes(free[:, 1:] @ self._projection)
         return np.maximum((up + down) / 2, rate)
 
-    def scaled(self, free: FloatArray) -> FloatArray:
-        """Series whose motion reaches a limit exactly, or stays inside for the ball."""
-        share = self.shares(free)
+    def scale_to_limits(self, free: FloatArray) -> FloatArray:
+        """Return the series scaled so that its motion reaches a limit exactly, or stays inside for the ball mapping."""
+        share = self.compute_shares(free)
         if self._mapping == "ball":
             share = np.maximum(share, 1.0)
         harmonics = free[:, 1:] @ self._projection / share[:, None]
-        up, down, _ = self._extremes(harmonics)
-        return self._with_offset(free[:, 0], harmonics, up, down)
+        up, down, _ = self._compute_extremes(harmonics)
+        return self._insert_offset(free[:, 0], harmonics, up, down)
 
-    def admissible(
+    def map_to_admissible(
         self, free: FloatArray, norm: float
     ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-        """Admissible coefficients, and how a derivative by them is pulled back.
+        """Return admissible coefficients, and a function that pulls derivatives back through the mapping.
 
         Args:
             free: Offset and harmonics of each joint, (n_dof, 1 + 2 harmonics).
             norm: Exponent of the smooth maxima; they are never below the true ones.
         """
         offset, harmonics = free[:, 0], free[:, 1:] @ self._projection
-        position = _apply(self._positions, harmonics)
-        rates = _apply(self._rates, harmonics)
-        up, up_slope = _smooth_maximum(np.maximum(position, 0.0), self._positions, norm)
-        down, down_slope = _smooth_maximum(np.maximum(-position, 0.0), -self._positions, norm)
-        rate, rate_slope = _smooth_maximum(np.abs(rates), self._rates, norm, np.sign(rates))
+        position = _apply_map(self._positions, harmonics)
+        rates = _apply_map(self._rates, harmonics)
+        up, up_slope = _compute_smooth_maximum(np.maximum(position, 0.0), self._positions, norm)
+        down, down_slope = _compute_smooth_maximum(
+            np.maximum(-position, 0.0), -self._positions, norm
+        )
+        rate, rate_slope = _compute_smooth_maximum(np.abs(rates), self._rates, norm, np.sign(rates))
         span, span_slope = (up + down) / 2, (up_slope + down_slope) / 2
         g = np.maximum(span, rate) * (
             (span / np.maximum(span, rate)) ** norm + (rate / np.maximum(span, rate)) ** norm
         ) ** (1 / norm)
-        g_slope = _times((span / g) ** (norm - 1), span_slope)
-        g_slope += _times((rate / g) ** (norm - 1), rate_slope)
+        g_slope = _scale_rows((span / g) ** (norm - 1), span_slope)
+        g_slope += _scale_rows((rate / g) ** (norm - 1), rate_slope)
         divisor, slope = g, np.ones_like(g)
         if self._mapping == "ball":
             divisor = (1 + g**_BALL_POWER) ** (1 / _BALL_POWER)
@@ -104,69 +106,69 @@ class LimitMap:
 
         def pull(bar: FloatArray) -> FloatArray:
             centre_bar = bar[:, 0] * self._reach * self.margin
-            room_bar = centre_bar * _squashed(offset)
+            room_bar = centre_bar * _squash(offset)
             # Harmonics, centre and room all divide by the same number.
             along = np.sum(bar[:, 1:] * harmonics, axis=1)
             along = along + centre_bar * (down - up) / 2 - room_bar * span
             result = np.empty_like(free)
             result[:, 0] = centre_bar * room * (1 + offset**2) ** -1.5
-            result[:, 1:] = _times(1 / divisor, bar[:, 1:])
-            result[:, 1:] -= _times(along * slope / divisor**2, g_slope)
-            result[:, 1:] += _times(centre_bar / (2 * divisor), down_slope - up_slope)
-            result[:, 1:] -= _times(room_bar / divisor, span_slope)
+            result[:, 1:] = _scale_rows(1 / divisor, bar[:, 1:])
+            result[:, 1:] -= _scale_rows(along * slope / divisor**2, g_slope)
+            result[:, 1:] += _scale_rows(centre_bar / (2 * divisor), down_slope - up_slope)
+            result[:, 1:] -= _scale_rows(room_bar / divisor, span_slope)
             result[:, 1:] = result[:, 1:] @ self._projection  # which is symmetric
             return result
 
         harmonics_in = harmonics / divisor[:, None]
-        return self._with_offset(offset, harmonics_in, up / divisor, down / divisor), pull
+        return self._insert_offset(offset, harmonics_in, up / divisor, down / divisor), pull
 
-    def resting_offset(self, z: FloatArray) -> FloatArray:
-        """Free offsets of joints that rest at ``z``, both (n_dof,)."""
+    def compute_resting_offset(self, z: FloatArray) -> FloatArray:
+        """Return the free offsets of joints that rest at ``z``, both (n_dof,)."""
         share = (z - self._middle) / (self._reach * self.margin)
         share = np.clip(share, -_FURTHEST, _FURTHEST)
         return share / np.sqrt(1 - share**2)
 
-    def _extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Shares of half the position range up and down, and of the rates; each (n_dof,)."""
-        position = _apply(self._positions, harmonics)
-        rate = np.abs(_apply(self._rates, harmonics)).max(axis=1)
+    def _compute_extremes(self, harmonics: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return the shares of half the position range up and down, and of the rates, (n_dof,) each."""
+        position = _apply_map(self._positions, harmonics)
+        rate = np.abs(_apply_map(self._rates, harmonics)).max(axis=1)
         up, down = position.max(axis=1), -position.min(axis=1)
         return np.maximum(up, 0.0), np.maximum(down, 0.0), rate
 
-    def _with_offset(
+    def _insert_offset(
         self, offset: FloatArray, harmonics: FloatArray, up: FloatArray, down: FloatArray
     ) -> FloatArray:
-        """Put the offset where the motion stays in its range, whatever the free offset is."""
+        """Place the offset so that the motion stays in its range, whatever the free offset is."""
         centre, room = (down - up) / 2, 1 - (up + down) / 2
-        share = centre + room * _squashed(offset)
+        share = centre + room * _squash(offset)
         return np.column_stack([self._middle + self._reach * self.margin * share, harmonics])
 
 
-def _harmonic_shares(motion: FloatArray, limits: FloatArray) -> FloatArray:
-    """Harmonics to shares of each joint's limit, (n_dof, n_points, 2 harmonics)."""
+def _divide_by_limits(motion: FloatArray, limits: FloatArray) -> FloatArray:
+    """Return the maps from harmonics to shares of each joint's limit, (n_dof, n_points, 2 harmonics)."""
     shares: FloatArray = motion[None, :, 1:] / limits[:, None, None]
     return shares
 
 
-def _apply(shares: FloatArray, harmonics: FloatArray) -> FloatArray:
+def _apply_map(shares: FloatArray, harmonics: FloatArray) -> FloatArray:
     used: FloatArray = (shares @ harmonics[:, :, None])[:, :, 0]
     return used
 
 
-def _times(factors: FloatArray, rows: FloatArray) -> FloatArray:
-    """Each row multiplied by its joint's factor."""
+def _scale_rows(factors: FloatArray, rows: FloatArray) -> FloatArray:
+    """Return each row multiplied by its joint's factor."""
     return factors[:, None] * rows
 
 
-def _squashed(offset: FloatArray) -> FloatArray:
-    """Any number to one between -1 and 1."""
+def _squash(offset: FloatArray) -> FloatArray:
+    """Return any number mapped to the interval from -1 to 1."""
     return offset / np.sqrt(1 + offset**2)
 
 
-def _smooth_maximum(
+def _compute_smooth_maximum(
     used: FloatArray, shares: FloatArray, norm: float, signs: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
-    """The norm of each row of ``used``, (n_dof,), and its derivative by the harmonics.
+    """Return the norm of each row of ``used``, (n_dof,), and its derivative by the harmonics.
 
     Args:
         used: Magnitudes, (n_dof, n_points).

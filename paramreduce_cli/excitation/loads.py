@@ -9,7 +9,7 @@ from paramreduce_cli.records import FloatArray
 
 @dataclass(frozen=True)
 class Loads:
-    """Rows that are at most zero where torque and power keep to their limits.
+    """The limits of torque and power as rows that are at most zero where the limits are kept.
 
     Attributes:
         values: Of the base parameters, (r,).
@@ -28,21 +28,21 @@ class Loads:
         """Whether there is any limit."""
         return bool(np.isfinite(self.torque).any() or np.isfinite(self.power).any())
 
-    def torques(self, W: FloatArray) -> FloatArray:
-        """Torques over their scale, (n_points, n_dof), from rows of W over it."""
+    def compute_torques(self, W: FloatArray) -> FloatArray:
+        """Return torques divided by their scale, (n_points, n_dof), from scaled rows of W."""
         found: FloatArray = (W @ self.values).reshape(-1, self.scale.size)
         return found
 
-    def rows(self, scaled: FloatArray, dz: FloatArray) -> FloatArray:
-        """Squared shares of the limits minus one, (n_points, 2 n_dof)."""
+    def compute_rows(self, scaled: FloatArray, dz: FloatArray) -> FloatArray:
+        """Return squared shares of the limits minus one, (n_points, 2 n_dof)."""
         share = scaled * self._per_torque
         power = scaled * dz * self._per_power
         return np.column_stack([share, power]) ** 2 - 1
 
-    def pulled(
+    def pull_back(
         self, scaled: FloatArray, dz: FloatArray, bar: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Derivatives by scaled torques and by speeds, from those by the rows."""
+        """Return the derivatives by scaled torques and by speeds, from the derivatives by the rows."""
         n = self.scale.size
         torque, power = bar[:, :n], bar[:, n:]
         moved = 2 * power * scaled * dz * self._per_power**2

@@ -1,4 +1,4 @@
-"""Value and gradient of an excitation criterion by the coefficients of a trajectory.
+"""Objective of an excitation: value and gradient of a criterion by the coefficients of a trajectory.
 
 For the eigenvalues l_i and vectors v_i of G = W'W, a function f(l) has dG = V diag(f') V'
 and so dW = 2 W dG; one reverse sweep through the regressor takes that to the states and the
@@ -49,7 +49,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class Excitation:
-    """What is measured along a trajectory: base columns of W, weighted and scaled, and bounds."""
+    """An excitation criterion on the base columns of W, weighted and scaled, with bounds."""
 
     observation: ObservationFunction
     """Base columns of W along a motion, (n_points * n_dof, r), and its adjoint; smooth."""
@@ -68,8 +68,8 @@ class Excitation:
     loads: Loads
     """Limits of torque and power."""
 
-    def weighted(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """W with every row divided by its joint's scale of torque; smooth."""
+    def weigh_rows(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        """Return W with every row divided by its joint's torque scale, with smooth friction."""
         W = self.observation.forward(q, dz, ddz)
         W *= self._row_weights(q.shape[0])
         return W
@@ -77,8 +77,10 @@ class Excitation:
     def _row_weights(self, points: int) -> FloatArray:
         return np.tile(1 / self.torque_scale, points)[:, None]
 
-    def condition_numbers(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> dict[str, float]:
-        """The condition number in every scaling, by singular values.
+    def compute_condition_numbers(
+        self, q: FloatArray, dz: FloatArray, ddz: FloatArray
+    ) -> dict[str, float]:
+        """Return the condition number in every scaling, by singular values.
 
         Args:
             q: Generalised coordinates along a motion, (n_points, n_q).
@@ -91,17 +93,17 @@ class Excitation:
             for name, scaling in scalings.items()
         }
 
-    def value_and_gradient(
+    def evaluate(
         self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
-        """The criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics).
+        """Return the criterion and its derivative by the coefficients, (n_dof, 1 + 2 harmonics).
 
         With a barrier where torque or power are limited; infinite beyond the limits.
         """
-        states = basis.states(coefficients)
+        states = basis.evaluate(coefficients)
         weights = self._row_weights(states[0].shape[0])
         q, rates = positions(states[0]), states[1:]
-        W = self.weighted(q, *rates)
+        W = self.weigh_rows(q, *rates)
         scaled, pull = self.scaling(W, self.beta, level.maxima)
         gram = scaled.T @ scaled
         eigenvalues, vectors = scipy.linalg.eigh(gram, driver="evd", check_finite=False)
@@ -109,12 +111,12 @@ class Excitation:
         W_bar = pull(gram, (2 * vectors * slope) @ vectors.T)
         load_dz_bar: FloatArray | float = 0.0
         if self.loads.limited:
-            torques = self.loads.torques(W)
-            load, bar = _log_barrier(self.loads.rows(torques, rates[0]), level)
+            torques = self.loads.compute_torques(W)
+            load, bar = _evaluate_log_barrier(self.loads.compute_rows(torques, rates[0]), level)
             if np.isinf(load):
                 return np.inf, np.full_like(coefficients, np.nan)
             value += load
-            torque_bar, load_dz_bar = self.loads.pulled(torques, rates[0], bar)
+            torque_bar, load_dz_bar = self.loads.pull_back(torques, rates[0], bar)
             W_bar += np.outer(torque_bar, self.loads.values)
         W_bar *= weights
         z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, W_bar)
@@ -124,39 +126,39 @@ class Excitation:
         )
         return value, gradient
 
-    def barrier(
+    def evaluate_barrier(
         self, basis: FourierBasis, coefficients: FloatArray, level: Level, positions: Follower
     ) -> tuple[float, FloatArray]:
-        """Logarithmic barrier of the bounds and its derivative by the coefficients.
+        """Return the logarithmic barrier of the bounds and its derivative by the coefficients.
 
         Each bound's row is replaced by its smooth maximum over time, which is never below the
         true one. Infinite outside the bounds.
         """
         if not self.quantities.constraints:
             return 0.0, np.zeros_like(coefficients)
-        q = positions(basis.states(coefficients)[0])
-        value, slopes = _log_barrier(self.quantities.rows(q), level)
+        q = positions(basis.evaluate(coefficients)[0])
+        value, slopes = _evaluate_log_barrier(self.quantities.rows(q), level)
         if np.isinf(value):
             return np.inf, np.full_like(coefficients, np.nan)
         z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.jacobian(q))
         return value, z_bar.T @ basis.position
 
-    def load_share(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
-        """Largest share of a limit of torque or power that a motion uses, zero without limits."""
+    def compute_load_share(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
+        """Return the largest share of a torque or power limit that a motion uses, zero without limits."""
         if not self.loads.limited:
             return 0.0
         W = self.measured(q, dz, ddz) * self._row_weights(q.shape[0])
-        rows = self.loads.rows(self.loads.torques(W), dz)
+        rows = self.loads.compute_rows(self.loads.compute_torques(W), dz)
         return float(np.sqrt(max(0.0, rows.max() + 1)))
 
-    def peak_torques(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """Largest torques of the model with the values that are known, (n_dof,)."""
+    def compute_peak_torques(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        """Return the largest torques of the model with the config's values, (n_dof,)."""
         W = self.measured(q, dz, ddz)
-        peaks: FloatArray = np.abs(self.loads.torques(W)).max(axis=0)
+        peaks: FloatArray = np.abs(self.loads.compute_torques(W)).max(axis=0)
         return peaks
 
-    def worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
-        """Of the positions z, (n_samples, n_dof); infinite where the loops cannot be closed."""
+    def find_worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
+        """Return the bound that positions z, (n_samples, n_dof), miss by most; infinite where loops cannot be closed."""
         try:
             rows = self.quantities.rows(positions(z))
         except DataError as error:
@@ -174,10 +176,10 @@ class Excitation:
         return Bound(float(rows[:, worst].max()), name)
 
 
-def _log_barrier(rows: FloatArray, level: Level) -> tuple[float, FloatArray]:
-    """Logarithmic barrier of the smooth maximum over time of each row, and its derivative by the rows.
+def _evaluate_log_barrier(rows: FloatArray, level: Level) -> tuple[float, FloatArray]:
+    """Return the logarithmic barrier of the smooth maximum over time of each row, and its derivative by the rows.
 
-    Infinite where one of them, (n_points, n_rows), is above zero.
+    It is infinite if an entry of the rows, (n_points, n_rows), is above zero.
     """
     largest = rows.max(axis=0)
     terms = np.exp(level.maxima * (rows - largest))
@@ -209,12 +211,12 @@ class FreeObjective:
 
         Not a number outside the bounds and where the loops cannot be closed.
         """
-        coefficients, pull = self._admissible(x)
+        coefficients, pull = self._map_to_admissible(x)
         along = (self.basis, coefficients, self.level, self.positions)
         try:
-            barrier, barrier_bar = self.excitation.barrier(*along)
+            barrier, barrier_bar = self.excitation.evaluate_barrier(*along)
             if np.isfinite(barrier):
-                value, bar = self.excitation.value_and_gradient(*along)
+                value, bar = self.excitation.evaluate(*along)
                 if np.isfinite(value):
                     self.positions.keep()
                     return value + barrier, pull(bar + barrier_bar)
@@ -222,12 +224,17 @@ class FreeObjective:
             pass
         return np.nan, np.full(x.size, np.nan)
 
-    def worst_bound(self, x: FloatArray) -> Bound:
-        """The bound that the series at ``x`` misses by most, or is nearest to."""
-        coefficients, _ = self._admissible(x)
-        return self.excitation.worst_bound(self.basis.states(coefficients)[0], self.positions)
+    def find_worst_bound(self, x: FloatArray) -> Bound:
+        """Return the bound that the series at ``x`` misses by most, or is nearest to."""
+        coefficients, _ = self._map_to_admissible(x)
+        return self.excitation.find_worst_bound(
+            self.basis.evaluate(coefficients)[0], self.positions
+        )
 
-    def _admissible(self, x: FloatArray) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+    def _map_to_admissible(
+        self, x: FloatArray
+    ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
+        """Return admissible coefficients for free variables, and the pullback of derivatives."""
         free = self.mixing @ x.reshape(self.limits.n_dof, self.limits.n_columns)
-        coefficients, pull = self.limits.admissible(free, self.level.limits)
+        coefficients, pull = self.limits.map_to_admissible(free, self.level.limits)
         return coefficients, lambda bar: (self.mixing.T @ pull(bar)).ravel()

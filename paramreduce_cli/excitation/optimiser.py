@@ -1,4 +1,4 @@
-"""One exciting trajectory: random starts, a smooth objective that sharpens, the best kept.
+"""Optimiser of one exciting trajectory: random starts, a smooth objective that sharpens level by level.
 
 Many starts are drawn and the best of them kept; level by level the objective sharpens and the
 most promising go on, with IPOPT's stopping rules tightened at the end. The numbers were chosen by
@@ -19,8 +19,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.errors import Cause, DataError, NumericalError, ParamreduceError
-from paramreduce_cli.excitation.feasibility import drawn_inside, feasible_start, resting_position
-from paramreduce_cli.excitation.fourier import FINER, FourierBasis, fourier_basis, sample_times
+from paramreduce_cli.excitation.feasibility import (
+    find_resting_position,
+    shrink_inside_bounds,
+    shrink_to_feasible,
+)
+from paramreduce_cli.excitation.fourier import FINER, FourierBasis, evaluate_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
 from paramreduce_cli.excitation.limits import LimitMap, LimitMapping
 from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
@@ -35,7 +39,7 @@ _ASTRAY = 0.25
 
 @dataclass(frozen=True)
 class Step:
-    """One level, and who goes through it."""
+    """A step of a search: one level, and which candidates take it."""
 
     level: Level
     share: float
@@ -48,7 +52,7 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """How a search goes."""
+    """A plan of a search: its random starts and its steps."""
 
     drawn: int
     """Random series for every start; the best of them by the first level's objective are starts."""
@@ -86,7 +90,7 @@ BOUNDED_TREE = Plan(
 
 @dataclass(frozen=True)
 class TrajectorySettings:
-    """What is asked of every trajectory."""
+    """The settings for every trajectory."""
 
     period: float
     """s"""
@@ -108,24 +112,26 @@ class TrajectorySettings:
     scaling: str
     """Name of the scaling whose condition number is reported first."""
 
-    def going_on(self, share: float) -> int:
-        """How many candidates take a step with this share."""
+    def count_candidates(self, share: float) -> int:
+        """Return the number of candidates that take a step with this share."""
         return self.polished + round(share * (self.starts - self.polished))
 
-    def basis(self, finer: int = 1) -> FourierBasis:
-        """The series on the grid, or on one so many times finer."""
-        return self._basis_on(finer * self.points)
+    def build_basis(self, finer: int = 1) -> FourierBasis:
+        """Return the basis of the series on the grid, or on a grid that is so many times finer."""
+        return self._build_basis_on(finer * self.points)
 
-    def coarse_basis(self) -> FourierBasis:
-        """The series on a grid that is fine enough to find the way."""
-        return self._basis_on(_ENOUGH * self.harmonics)
+    def build_coarse_basis(self) -> FourierBasis:
+        """Return the basis of the series on the coarse grid of all levels but the last."""
+        return self._build_basis_on(_ENOUGH * self.harmonics)
 
-    def _basis_on(self, points: int) -> FourierBasis:
-        return fourier_basis(self.period, self.harmonics, sample_times(self.period, points))
+    def _build_basis_on(self, points: int) -> FourierBasis:
+        return evaluate_basis(self.period, self.harmonics, sample_times(self.period, points))
 
 
 @dataclass(frozen=True)
 class _Grid:
+    """A grid of times with the limits on it."""
+
     basis: FourierBasis
     limits: LimitMap
     """To series that keep the limits of the independent coordinates on it."""
@@ -133,6 +139,8 @@ class _Grid:
 
 @dataclass
 class _Candidate:
+    """A candidate of the search, from its random start to its present series."""
+
     start: FloatArray
     """The free series that it began with."""
     free: FloatArray
@@ -158,19 +166,19 @@ def optimise_trajectory(
     started = time.process_time()
     search = _Search(excitation, settings)
     steps = search.plan.steps
-    counts = [settings.going_on(step.share) for step in steps]
-    candidates = search.starts(seed)
+    counts = [settings.count_candidates(step.share) for step in steps]
+    candidates = search.draw_starts(seed)
     iterations = 0
     for step, count in zip(steps, counts, strict=True):
         candidates = sorted(candidates, key=lambda candidate: candidate.value)[:count]
         for candidate in candidates:
-            iterations += search.descend(candidate, step)
+            iterations += search.take_step(candidate, step)
     results: list[tuple[_Candidate, FloatArray, float]] = []
     failures: list[ParamreduceError] = []
     for candidate in candidates:
         try:
-            series = search.result(candidate)
-            results.append((candidate, series, search.kappa(series)))
+            series = search.finish_series(candidate)
+            results.append((candidate, series, search.compute_kappa(series)))
         except ParamreduceError as error:  # one of several may fail
             failures.append(error)
     if not results:
@@ -182,7 +190,7 @@ def optimise_trajectory(
         excitation,
         settings,
         series,
-        kappa_start=search.kappa_start(best),
+        kappa_start=search.compute_start_kappa(best),
         cpu_seconds=time.process_time() - started,
         iterations=iterations,
         status=best.status,
@@ -194,9 +202,9 @@ class _Search:
 
     def __init__(self, excitation: Excitation, settings: TrajectorySettings) -> None:
         self._excitation, self._settings = excitation, settings
-        self._grid = self._coarse = self._grid_of(settings.basis())
+        self._grid = self._coarse = self._build_grid(settings.build_basis())
         if settings.points > _ENOUGH * settings.harmonics:
-            self._coarse = self._grid_of(settings.coarse_basis())
+            self._coarse = self._build_grid(settings.build_coarse_basis())
         self._limits = self._grid.limits
         mechanism = excitation.coordinates.mechanism
         bounded = bool(excitation.quantities.constraints) or excitation.loads.limited
@@ -207,7 +215,7 @@ class _Search:
         self._rest = settings.limits.middle
         self._mixing = np.eye(mechanism.n_dof)
         if self._bounded:
-            self._rest = resting_position(
+            self._rest = find_resting_position(
                 excitation, settings.limits, self._limits.margin, settings.start_pose
             )
             q = excitation.coordinates.positions(self._rest[None], None)
@@ -215,75 +223,81 @@ class _Search:
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
 
-    def _grid_of(self, basis: FourierBasis) -> _Grid:
+    def _build_grid(self, basis: FourierBasis) -> _Grid:
+        """Return the grid of a basis, with the limits on it."""
         settings = self._settings
         limits = LimitMap(
             settings.limits, basis, settings.mapping, rest_to_rest=settings.rest_to_rest
         )
         return _Grid(basis, limits)
 
-    def starts(self, seed: list[int]) -> list[_Candidate]:
-        """Random series, each with what the first level's objective says of it."""
+    def draw_starts(self, seed: list[int]) -> list[_Candidate]:
+        """Return random series, each with its value of the first level's objective."""
         result = []
         for start in range(self._settings.starts * self.plan.drawn):
-            free = self._drawn(np.random.default_rng([*seed, start]))
-            value, _ = self._objective(self._coarse, self.plan.steps[0].level)(free.ravel())
+            free = self._draw_series(np.random.default_rng([*seed, start]))
+            value, _ = self._build_objective(self._coarse, self.plan.steps[0].level)(free.ravel())
             result.append(_Candidate(free, free, value if np.isfinite(value) else np.inf))
         return result
 
-    def _drawn(self, rng: np.random.Generator) -> FloatArray:
-        """A normal random series, scaled to its limits and drawn together to keep its bounds."""
+    def _draw_series(self, rng: np.random.Generator) -> FloatArray:
+        """Return a normally distributed random series, scaled to its limits and shrunk until it keeps its bounds."""
         limits = self._limits
         free = rng.normal(size=(limits.n_dof, limits.n_columns))
         if not self._bounded:  # on a scale of its own for every joint
-            free[:, 1:] /= limits.shares(free)[:, None]
+            free[:, 1:] /= limits.compute_shares(free)[:, None]
             return free
-        free[:, 1:] /= limits.shares(self._mixing @ free).max()
+        free[:, 1:] /= limits.compute_shares(self._mixing @ free).max()
         still = np.zeros_like(free)
-        still[:, 0] = np.linalg.solve(self._mixing, limits.resting_offset(self._rest))
-        return feasible_start(free, still, self._objective(self._grid, self.plan.steps[0].level))
+        still[:, 0] = np.linalg.solve(self._mixing, limits.compute_resting_offset(self._rest))
+        return shrink_to_feasible(
+            free, still, self._build_objective(self._grid, self.plan.steps[0].level)
+        )
 
-    def kappa_start(self, candidate: _Candidate) -> float:
-        """The condition number that a candidate began with."""
+    def compute_start_kappa(self, candidate: _Candidate) -> float:
+        """Return the condition number of a candidate's random start."""
         if not self._bounded:
-            return self.kappa(self._limits.scaled(candidate.start))
+            return self.compute_kappa(self._limits.scale_to_limits(candidate.start))
         norm = self.plan.steps[0].level.limits
         try:
-            return self.kappa(self._limits.admissible(self._mixing @ candidate.start, norm)[0])
+            return self.compute_kappa(
+                self._limits.map_to_admissible(self._mixing @ candidate.start, norm)[0]
+            )
         except DataError:  # closed on the grid, but not between its points
             return np.inf
 
-    def descend(self, candidate: _Candidate, step: Step) -> int:
-        """Take a candidate through one step, the last on all points; the iterations it took."""
+    def take_step(self, candidate: _Candidate, step: Step) -> int:
+        """Take a candidate through one step, the last one on all points, and return the iterations it took."""
         if step is not self.plan.steps[-1]:
-            return self._descend(candidate, step, self._coarse)
+            return self._minimise(candidate, step, self._coarse)
         iterations = 0
-        if self._astray(candidate):
+        if self._is_astray(candidate):
             candidate.free, candidate.curvature = candidate.start, None
             for earlier in self.plan.steps[:-1]:
-                iterations += self._descend(candidate, earlier, self._grid)
-        return iterations + self._descend(candidate, step, self._grid)
+                iterations += self._minimise(candidate, earlier, self._grid)
+        return iterations + self._minimise(candidate, step, self._grid)
 
-    def _astray(self, candidate: _Candidate) -> bool:
-        """Whether a candidate is not on all points what it is on few."""
+    def _is_astray(self, candidate: _Candidate) -> bool:
+        """Return whether a candidate has another condition number on all points than on few."""
         if self._coarse is self._grid:
             return False
         if not np.isfinite(candidate.value):  # no way was found from where it began
             return True
         few, many = self._coarse.basis, self._grid.basis
         level = self.plan.steps[-1].level
-        if not np.isfinite(self._objective(self._grid, level)(candidate.free.ravel())[0]):
+        if not np.isfinite(self._build_objective(self._grid, level)(candidate.free.ravel())[0]):
             return True
-        series, _ = self._limits.admissible(self._mixing @ candidate.free, level.limits)
+        series, _ = self._limits.map_to_admissible(self._mixing @ candidate.free, level.limits)
         try:
-            ratio = self._kappa_on(few, series) / self._kappa_on(many, series)
+            ratio = self._compute_kappa_on(few, series) / self._compute_kappa_on(many, series)
         except DataError:  # closed on all points, but not on few, which may be others
             return True
         return not abs(ratio - 1) < _ASTRAY
 
-    def _descend(self, candidate: _Candidate, step: Step, grid: _Grid) -> int:
+    def _minimise(self, candidate: _Candidate, step: Step, grid: _Grid) -> int:
+        """Minimise a level's objective from a candidate, and return the iterations it took."""
         end = minimise(
-            self._objective(grid, step.level),
+            self._build_objective(grid, step.level),
             candidate.free.ravel(),
             min(self._settings.max_iterations, step.most),
             candidate.curvature,
@@ -295,43 +309,49 @@ class _Search:
         candidate.status = end.status
         return end.iterations
 
-    def _objective(self, grid: _Grid, level: Level) -> FreeObjective:
+    def _build_objective(self, grid: _Grid, level: Level) -> FreeObjective:
+        """Return the objective of a level on a grid."""
         positions = Follower(self._excitation.coordinates)
         return FreeObjective(
             self._excitation, grid.basis, grid.limits, level, positions, self._mixing
         )
 
-    def result(self, candidate: _Candidate) -> FloatArray:
-        """The candidate's series, exactly on its limits and inside its bounds."""
+    def finish_series(self, candidate: _Candidate) -> FloatArray:
+        """Return the candidate's series, exactly on its limits and inside its bounds."""
         if not self._bounded:
-            return self._limits.scaled(candidate.free)
-        series, _ = self._limits.admissible(
+            return self._limits.scale_to_limits(candidate.free)
+        series, _ = self._limits.map_to_admissible(
             self._mixing @ candidate.free, self.plan.steps[-1].level.limits
         )
-        return drawn_inside(self._excitation, series, self._rest, self._settings.basis(FINER))
+        return shrink_inside_bounds(
+            self._excitation, series, self._rest, self._settings.build_basis(FINER)
+        )
 
-    def kappa(self, series: FloatArray) -> float:
-        """The condition number that the settings ask for."""
-        _, q = fine_positions(self._excitation, self._settings, series)
-        _, dz, ddz = self._grid.basis.states(series)
-        return self._excitation.condition_numbers(q[::FINER], dz, ddz)[self._settings.scaling]
+    def compute_kappa(self, series: FloatArray) -> float:
+        """Return the condition number in the scaling of the settings."""
+        _, q = compute_fine_positions(self._excitation, self._settings, series)
+        _, dz, ddz = self._grid.basis.evaluate(series)
+        return self._excitation.compute_condition_numbers(q[::FINER], dz, ddz)[
+            self._settings.scaling
+        ]
 
-    def _kappa_on(self, basis: FourierBasis, series: FloatArray) -> float:
-        z, dz, ddz = basis.states(series)
+    def _compute_kappa_on(self, basis: FourierBasis, series: FloatArray) -> float:
+        """Return the condition number of a series on the grid of a basis."""
+        z, dz, ddz = basis.evaluate(series)
         q = self._excitation.coordinates.positions(z, None)
-        return self._excitation.condition_numbers(q, dz, ddz)[self._settings.scaling]
+        return self._excitation.compute_condition_numbers(q, dz, ddz)[self._settings.scaling]
 
 
-def fine_positions(
+def compute_fine_positions(
     excitation: Excitation, settings: TrajectorySettings, series: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Times and generalised coordinates on the grid on which bounds are checked.
+    """Return times and generalised coordinates on the grid on which bounds are checked.
 
     Raises:
         DataError: The loops cannot be closed along it.
     """
-    fine = settings.basis(FINER)
-    return fine.time, excitation.coordinates.positions(fine.states(series)[0], None)
+    fine = settings.build_basis(FINER)
+    return fine.time, excitation.coordinates.positions(fine.evaluate(series)[0], None)
 
 
 def describe(
@@ -351,10 +371,10 @@ def describe(
     Raises:
         DataError: The loops cannot be closed along it.
     """
-    z, dz, ddz = settings.basis().states(coefficients)
-    times, q = fine_positions(excitation, settings, coefficients)
+    z, dz, ddz = settings.build_basis().evaluate(coefficients)
+    times, q = compute_fine_positions(excitation, settings, coefficients)
     excitation.coordinates.check_motion(times, q)
-    variants = excitation.condition_numbers(q[::FINER], dz, ddz)
+    variants = excitation.compute_condition_numbers(q[::FINER], dz, ddz)
     quantities = excitation.quantities.values(q)
     limits = settings.limits
     shares = [
@@ -369,7 +389,7 @@ def describe(
         kappa_variants=variants,
         peak_position=np.abs(z - limits.middle).max(axis=0),
         peak_velocity=np.abs(dz).max(axis=0),
-        peak_torque=excitation.peak_torques(q[::FINER], dz, ddz),
+        peak_torque=excitation.compute_peak_torques(q[::FINER], dz, ddz),
         reach=np.max([share.max(axis=0) for share in shares], axis=0),
         extremes=np.column_stack([quantities.min(axis=0), quantities.max(axis=0)]),
         cpu_seconds=cpu_seconds,

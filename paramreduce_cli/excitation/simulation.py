@@ -1,4 +1,4 @@
-"""Motions of a mechanism under inputs, for those that cannot follow any trajectory.
+"""Simulated motions of a mechanism under inputs, for mechanisms that cannot follow every trajectory.
 
 Coordinates without an input move as the others make them. States are those of the full model's
 forward dynamics; accelerations follow from the inputs at each sample, so that torques and states fit
@@ -53,7 +53,7 @@ class Input:
 
 @dataclass(frozen=True)
 class SimulatedMotion:
-    """Samples of a motion; each (n_samples, n_dof)."""
+    """A simulated motion; each array (n_samples, n_dof)."""
 
     time: FloatArray
     """(n_samples,), s"""
@@ -88,20 +88,21 @@ def simulate(
     state = np.concatenate([start, np.zeros(n)])
     with np.errstate(over="ignore", invalid="ignore"):
         found = scipy.integrate.solve_ivp(
-            forward.rates, (0.0, float(time[-1])), state, _METHOD, time,
+            forward.compute_rates, (0.0, float(time[-1])), state, _METHOD, time,
             rtol=_TOLERANCE, atol=_TOLERANCE,
         )  # fmt: skip
     z, dz = found.y[:n].T, found.y[n:].T
     if not found.success or not np.isfinite(found.y).all():
-        raise _lost(float(found.t[-1]) if found.t.size else 0.0)
+        raise _make_divergence_error(float(found.t[-1]) if found.t.size else 0.0)
     forward.restart()
-    tau = np.array([forward.inputs(*sample) for sample in zip(time, z, dz, strict=True)])
+    tau = np.array([forward.compute_inputs(*sample) for sample in zip(time, z, dz, strict=True)])
     samples = zip(time, z, dz, strict=True)
-    ddz = np.array([forward.rates(t, np.concatenate([*some]))[n:] for t, *some in samples])
+    ddz = np.array([forward.compute_rates(t, np.concatenate([*some]))[n:] for t, *some in samples])
     return SimulatedMotion(time, z, dz, ddz, tau)
 
 
-def _lost(time: float) -> DataError:
+def _make_divergence_error(time: float) -> DataError:
+    """Return the error that a motion cannot be simulated beyond some time."""
     return DataError(
         f"the simulated motion cannot be followed beyond {time:.3g} s; give it smaller inputs, or "
         "feedback that keeps it within bounds."
@@ -109,6 +110,8 @@ def _lost(time: float) -> DataError:
 
 
 class _ForwardDynamics:
+    """The forward dynamics of a mechanism under inputs."""
+
     def __init__(
         self, dynamics: Dynamics, phi: FloatArray, inputs: Sequence[Input], most: int
     ) -> None:
@@ -120,26 +123,26 @@ class _ForwardDynamics:
         """Where the mechanism was last, to close its loops from."""
 
     def restart(self) -> None:
-        """Follow the loops from the assembly again, not from where the mechanism was last."""
+        """Close the loops from the assembly again, instead of from their last position."""
         self._near = None
 
-    def inputs(self, time: float, z: FloatArray, dz: FloatArray) -> FloatArray:
-        """Forces on the independent coordinates, (n_dof,)."""
+    def compute_inputs(self, time: float, z: FloatArray, dz: FloatArray) -> FloatArray:
+        """Return the forces on the independent coordinates, (n_dof,)."""
         pairs = zip(self._inputs, z, dz, strict=True)
         return np.array([signal(time, *state) for signal, *state in pairs])
 
-    def rates(self, time: float, state: FloatArray) -> FloatArray:
-        """Derivative of positions and velocities, (2 n_dof,)."""
+    def compute_rates(self, time: float, state: FloatArray) -> FloatArray:
+        """Return the derivative of positions and velocities, (2 n_dof,)."""
         self._left -= 1
         if self._left < 0 or not np.isfinite(state).all():
-            raise _lost(time)
+            raise _make_divergence_error(time)
         z, dz = np.split(state, 2)
         q = self._coordinates.positions(z[None], self._near)
         self._near = q[0]
         dq, _ = self._coordinates.rates(q, dz[None], np.zeros((1, dz.size)))
         M, delta = self._dynamics.direct(q, dq, self._phi)
         try:
-            ddz = np.linalg.solve(M[0], self.inputs(time, z, dz) - delta[0])
+            ddz = np.linalg.solve(M[0], self.compute_inputs(time, z, dz) - delta[0])
         except np.linalg.LinAlgError as error:
             raise DataError(
                 f"the mass matrix is singular at {time:.3g} s, as where a moving body has no mass; "

@@ -1,4 +1,4 @@
-"""Complete a set of trajectories to one with the symmetry of the mechanism.
+"""Symmetries of a mechanism, which complete a set of trajectories.
 
 A symmetry lets each independent coordinate move as another one did, perhaps the other way.
 All products of those given are taken, so that the set has the symmetry of their group.
@@ -19,30 +19,30 @@ _MOST = 200
 
 @dataclass(frozen=True)
 class Symmetry:
-    """Coordinate k moves as coordinate ``sources[k]`` did, times ``signs[k]``."""
+    """A symmetry: coordinate k moves as coordinate ``sources[k]`` did, times ``signs[k]``."""
 
     sources: tuple[int, ...]
     signs: tuple[int, ...]
 
-    def after(self, other: Symmetry) -> Symmetry:
-        """Apply first the other one, then this."""
+    def compose(self, other: Symmetry) -> Symmetry:
+        """Return the symmetry that applies first the other one, then this."""
         return Symmetry(
             tuple(other.sources[k] for k in self.sources),
             tuple(s * other.signs[k] for s, k in zip(self.signs, self.sources, strict=True)),
         )
 
-    def image(self, coefficients: FloatArray) -> FloatArray:
-        """The image of a series, (n_dof, 1 + 2 harmonics)."""
+    def map_series(self, coefficients: FloatArray) -> FloatArray:
+        """Return the image of a series, (n_dof, 1 + 2 harmonics)."""
         return coefficients[list(self.sources)] * np.array(self.signs)[:, None]
 
 
-def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Symmetry]:
-    """The group that some symmetries generate, the identity first.
+def generate_group(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Symmetry]:
+    """Return the group that some symmetries generate, the identity first.
 
     Args:
         given: For each, the names of the coordinates that move in place of each one in turn,
             ``-NAME`` where it moves the other way.
-        names: Of the independent coordinates, (n_dof,).
+        names: Names of the independent coordinates, (n_dof,).
 
     Raises:
         NumericalError: They generate too many.
@@ -58,7 +58,7 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
     known = set(found)
     for element in found:  # grows while it is walked through, until nothing new comes
         for generator in generators:
-            product = generator.after(element)
+            product = generator.compose(element)
             if product not in known:
                 known.add(product)
                 found.append(product)
@@ -71,6 +71,6 @@ def symmetries(given: Sequence[Sequence[str]], names: Sequence[str]) -> list[Sym
     return found
 
 
-def completed(series: Sequence[FloatArray], images: Sequence[Symmetry]) -> list[FloatArray]:
-    """All images of all series, those of one series together."""
-    return [symmetry.image(coefficients) for coefficients in series for symmetry in images]
+def complete_series(series: Sequence[FloatArray], images: Sequence[Symmetry]) -> list[FloatArray]:
+    """Return all images of all series; the images of one series stand together."""
+    return [symmetry.map_series(coefficients) for coefficients in series for symmetry in images]

@@ -35,7 +35,7 @@ from paramreduce_cli.resources.item_completion import complete_items
 
 @dataclass(frozen=True)
 class ExcitationTask:
-    """What is asked of all trajectories."""
+    """The settings that all trajectories share."""
 
     mechanism: Mechanism
     base: BaseParameters
@@ -49,8 +49,8 @@ class ExcitationTask:
     seed: int
 
 
-def excitation_of(task: ExcitationTask) -> Excitation:
-    """The measurement of a mechanism's base columns; compiles its regressor."""
+def build_excitation(task: ExcitationTask) -> Excitation:
+    """Return the excitation criterion of a mechanism's base columns; its regressor is compiled here."""
     mechanism, columns = task.mechanism, task.base.columns
     settings = task.settings
     # No motion of the series is faster, whatever the limits allow.
@@ -98,7 +98,7 @@ def optimise_all(
     """
 
     def prepare() -> None:
-        excitation_of(task)  # compile once, before the processes all ask for it
+        build_excitation(task)  # compile once, before the processes all ask for it
 
     return complete_items(
         run, items, keys, partial(_Optimiser, task), _optimise,
@@ -107,14 +107,14 @@ def optimise_all(
 
 
 class _Optimiser:
-    """Optimises the trajectories of a task.
+    """An optimiser of a task's trajectories.
 
     Args:
-        task: What is asked of all trajectories.
+        task: Settings that all trajectories share.
     """
 
     def __init__(self, task: ExcitationTask) -> None:
-        self._task, self._excitation = task, excitation_of(task)
+        self._task, self._excitation = task, build_excitation(task)
 
     def optimise(self, key: str) -> Trajectory:
         """Return the trajectory of a key, which seeds its random numbers."""

@@ -132,7 +132,7 @@ class LoggedSet:
         for number, blocks in groupby(observed.iterate_blocks(), attrgetter("trajectory")):
             yield from self._low_passed(self._stretches[number], blocks)
 
-    def states(self) -> Iterator[StateBlock]:
+    def iterate_states(self) -> Iterator[StateBlock]:
         """Yield states and low-passed torques of the samples alone."""
         m = self.motions
         k = self._taps.size // 2

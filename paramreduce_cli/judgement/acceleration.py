@@ -1,11 +1,11 @@
-"""Errors of the accelerations that reduced models predict, and the health of their mass matrices."""
+"""Errors of accelerations that reduced models predict, and properties of their mass matrices."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.judgement.torque import joint_errors
+from paramreduce_cli.judgement.torque import compute_joint_errors
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS
 from paramreduce_cli.records import Block, FloatArray
 
@@ -18,7 +18,7 @@ _VALUES_AT_ONCE = 4_000_000
 
 @dataclass(frozen=True)
 class AccelerationErrors:
-    """Acceleration errors and mass matrices of many models."""
+    """The acceleration errors and mass-matrix properties of many models."""
 
     squares: FloatArray
     """Sums of the squares of what is missed, each joint's divided by its nominal acceleration, (n_models, n_dof)."""
@@ -31,7 +31,7 @@ class AccelerationErrors:
 
     @property
     def error(self) -> FloatArray:
-        """Of all joints together, (n_models,)."""
+        """Relative error of all joints together, (n_models,)."""
         total = max(self.total.sum(), np.finfo(float).tiny)
         result: FloatArray = np.sqrt(self.squares.sum(axis=1) / total)
         return result
@@ -39,16 +39,16 @@ class AccelerationErrors:
     @property
     def joints(self) -> FloatArray:
         """Joint by joint, (n_models, n_dof)."""
-        return joint_errors([self])
+        return compute_joint_errors([self])
 
 
-def acceleration_errors(
+def compute_acceleration_errors(
     blocks: Iterable[Block],
     direct: Direct,
     parameters: FloatArray,
     nominal_acceleration: FloatArray,
 ) -> AccelerationErrors:
-    """Normalised errors of ddz_R = M_R^-1 (tau - delta_R) [Ros2019], Eq. 24.
+    """Return the normalised errors of ddz_R = M_R^-1 (tau - delta_R) [Ros2019], Eq. 24.
 
     Args:
         blocks: The samples.

@@ -1,4 +1,4 @@
-"""How many parameters the data can tell: errors on parts of the data that were left out."""
+"""Cross-validation: errors of selections on parts of the data that were left out."""
 
 from collections.abc import Callable, Mapping, Sequence
 
@@ -12,13 +12,13 @@ Selector = Callable[[SelectionProblem], Sequence[IntArray]]
 """Subsets by growing size on some data."""
 
 
-def cross_validated(
+def cross_validate(
     problem: SelectionProblem, folds: Sequence[tuple[FloatArray, FloatArray]], select: Selector
 ) -> CrossValidation:
-    """Selection repeated without each fold, and judged on it [Hastie2009], Sec. 7.10.
+    """Return the errors of selections that are repeated without each fold, on that fold [Hastie2009], Sec. 7.10.
 
     Args:
-        problem: On all data.
+        problem: Selection problem on all data.
         folds: Triangular factors of the data without each fold, and of the fold.
         select: The heuristic.
     """
@@ -37,10 +37,9 @@ def cross_validated(
     )
 
 
-def one_standard_error(results: Mapping[str, CrossValidation]) -> ModelChoice:
-    """The smallest model whose mean error is within one standard error of the best model's.
-
-    Of several of that size the one with the smallest mean error.
+def choose_by_one_standard_error(results: Mapping[str, CrossValidation]) -> ModelChoice:
+    """Return the smallest model whose mean error is within one standard error of the best model's; of several of that
+    size, the model with the smallest mean error.
     """
     best = min(results.values(), key=lambda r: float(r.mean.min()))
     row = int(np.argmin(best.mean))

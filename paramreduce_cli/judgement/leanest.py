@@ -1,4 +1,4 @@
-"""The leanest function within tolerances, whether parameters alone or terms were left out."""
+"""The function with the fewest operations within tolerances, with only parameters or also terms removed."""
 
 from collections.abc import Iterator, Mapping
 
@@ -15,14 +15,14 @@ _Limits = Mapping[tuple[str, str], float]
 Results = Mapping[str, HeuristicValidation]
 
 
-def leanest(
+def find_leanest(
     function: str, wanted: SelectedSection, results: Results, terms: TermReduction | None
 ) -> Leanest | None:
-    """The function with the fewest operations whose errors are within what is asked for.
+    """Return the function with the fewest operations whose errors are within the tolerances, or None.
 
-    That are the errors under ``selected``, on both sets, else those that terms were left out within, on
-    the sets that these are of, else the usual ones. Errors of accelerations count for the direct dynamics
-    alone, whose mass matrices must be positive definite on both sets.
+    The tolerances are those under ``selected``, on both sets; else the budgets within which terms were removed, on the
+    sets of these budgets; else the defaults. Errors of accelerations count for the direct dynamics alone, whose mass
+    matrices must be positive definite on both sets.
 
     Args:
         function: ``inverse`` or ``direct``.
@@ -33,37 +33,40 @@ def leanest(
     Returns:
         None if there is none.
     """
-    tolerances = _tolerances(function, wanted.get_tolerances())
+    tolerances = _list_tolerances(function, wanted.get_tolerances())
     looked_at: tuple[str, ...] = _BOTH
     if not tolerances and terms is not None:
         budget = {
             "torque_error": terms.torque_budget,
             "acceleration_error": terms.acceleration_budget,
         }
-        tolerances = _tolerances(function, budget)
+        tolerances = _list_tolerances(function, budget)
         looked_at = _BOTH[:1] if terms.held_out else _BOTH
     limits = {
         (key, part): limit
         for key, limit in (tolerances or SelectedSection.USUAL).items()
         for part in looked_at
     }
-    found = [*_alone(function, limits, results), *_without_terms(function, limits, terms)]
+    found = [
+        *_iterate_models(function, limits, results),
+        *_iterate_term_models(function, limits, terms),
+    ]
     return min(found, key=_rank, default=None)
 
 
-def _tolerances(function: str, given: Tolerances) -> Tolerances:
-    """Of errors that the function has, without infinite ones."""
+def _list_tolerances(function: str, given: Tolerances) -> Tolerances:
+    """Return the tolerances of the errors that a function has, without infinite ones."""
     kinds = ("torque_error", "acceleration_error")[: 2 if function == "direct" else 1]
     return {key: given[key] for key in kinds if np.isfinite(given.get(key, np.inf))}
 
 
 def _rank(one: Leanest) -> tuple[int, float]:
-    """The less the better; of as many operations the most exact one."""
+    """Return operations, then torque error: what the leanest function minimises."""
     return one.operations, one.torque_error.estimation
 
 
-def _alone(function: str, limits: _Limits, results: Results) -> Iterator[Leanest]:
-    """Functions of models with parameters alone left out, as far as their operations are known."""
+def _iterate_models(function: str, limits: _Limits, results: Results) -> Iterator[Leanest]:
+    """Yield the functions of models with only parameters removed, as far as their operations are known."""
     for heuristic, result in results.items():
         kept = [getattr(result, key)[part] <= limit for (key, part), limit in limits.items()]
         if function == "direct":
@@ -82,9 +85,10 @@ def _alone(function: str, limits: _Limits, results: Results) -> Iterator[Leanest
             )
 
 
-def _without_terms(
+def _iterate_term_models(
     function: str, limits: _Limits, terms: TermReduction | None
 ) -> Iterator[Leanest]:
+    """Yield the function with terms removed, if there is one and it keeps to the limits."""
     one = None if terms is None else terms.functions.get(function)
     if one is not None and all(
         getattr(one, key)[part] <= limit for (key, part), limit in limits.items()

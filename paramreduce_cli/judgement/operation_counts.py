@@ -23,7 +23,7 @@ Heuristics = Mapping[str, HeuristicValidation]
 
 
 class OperationCounts:
-    """Operations of reduced models.
+    """A counter of the operations of reduced models.
 
     Args:
         model: Model of the robot.
@@ -56,7 +56,7 @@ class OperationCounts:
             key: (counts.estimate(one), counts.estimate(one, direct=True))
             for key, one in kept.items()
         }
-        return _with_operations(heuristics, found)
+        return _insert_operations(heuristics, found)
 
     def count(self, heuristics: Heuristics, shown: Sequence[ModelChoice]) -> Heuristics:
         """Return the validation of heuristics with the operations of some models, and of all that take the same."""
@@ -74,13 +74,13 @@ class OperationCounts:
             counts = count_all(self._model, self._counted, models, self._run)
             known |= dict(zip(missing, map(tuple, counts.tolist()), strict=True))
         found = {key: known[name] for key, name in self._structures.items() if name in known}
-        return _with_operations(heuristics, found)
+        return _insert_operations(heuristics, found)
 
 
-def _with_operations(
+def _insert_operations(
     heuristics: Heuristics, operations: Mapping[ModelChoice, tuple[float, ...]]
 ) -> Heuristics:
-    """Return the validation of heuristics with operations by model, not a number for the others."""
+    """Return the validation of heuristics with operations by model, NaN for models without."""
     unknown = (np.nan, np.nan)
     found = {}
     for name, result in heuristics.items():

@@ -1,4 +1,4 @@
-"""Which of many judged models to take, and which of them are worth a look."""
+"""Choice of a model from many: the smallest, the best, the Pareto front."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -23,12 +23,14 @@ _PARTS = {"torque_error": _BOTH_SETS, "acceleration_error": _BOTH_SETS, "operati
 """What tolerances are on: sets of samples, or functions."""
 
 
-def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> FloatArray:
-    """Largest ratio of what a tolerance is on to the tolerance, over both sets, (m,).
+def compute_worst_ratios(
+    result: HeuristicValidation, tolerances: Mapping[str, float]
+) -> FloatArray:
+    """Return the largest ratio of error or cost to its tolerance, over both sets, (m,).
 
     Args:
-        result: Of one heuristic.
-        tolerances: By `torque_error`, `acceleration_error` and `operations`.
+        result: Validation of one heuristic.
+        tolerances: Tolerances by `torque_error`, `acceleration_error` and `operations`.
     """
     ratios = [
         np.asarray(getattr(result, key)[part], dtype=float) / limit
@@ -39,61 +41,60 @@ def excess(result: HeuristicValidation, tolerances: Mapping[str, float]) -> Floa
     return worst
 
 
-def smallest_within(
+def find_smallest_within(
     results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]
 ) -> Pick | None:
-    """The model with the fewest parameters that keeps to all tolerances on both sets.
+    """Return the model with the fewest parameters that keeps all tolerances on both sets, or None.
 
-    Operations alone ask for the smallest error that they can buy instead. Of several with as many
-    parameters the one with the smallest torque error on the estimation set, of equal ones the last
-    heuristic's; None if there is none.
+    With a tolerance of operations alone it is the model with the smallest error instead. Of several with as many
+    parameters it is the one with the smallest torque error on the estimation set; among equals the last heuristic's.
     """
     good = [
         (name, int(row))
         for name, result in results.items()
-        for row in np.flatnonzero(excess(result, tolerances) <= 1)
+        for row in np.flatnonzero(compute_worst_ratios(result, tolerances) <= 1)
     ]
     if good and set(tolerances) == {"operations"}:
-        return _best(results, good)
-    return _smallest_then_best(results, good)
+        return _find_best(results, good)
+    return _find_smallest(results, good)
 
 
-def nearest_to(results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]) -> Pick:
-    """The model that misses the tolerances least."""
-    worst = {name: excess(result, tolerances) for name, result in results.items()}
+def find_nearest_to(
+    results: Mapping[str, HeuristicValidation], tolerances: Mapping[str, float]
+) -> Pick:
+    """Return the model that exceeds the tolerances least."""
+    worst = {name: compute_worst_ratios(result, tolerances) for name, result in results.items()}
     name = min(worst, key=lambda name: float(worst[name].min()))
     return name, int(np.argmin(worst[name]))
 
 
-def best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pick | None:
-    """The model of n parameters with the smallest torque error on the estimation set.
-
-    Of equal ones the last heuristic's; None if no heuristic has such a model.
+def find_best_of_size(results: Mapping[str, HeuristicValidation], n: int) -> Pick | None:
+    """Return the model of n parameters with the smallest torque error on the estimation set, or None if no heuristic
+    has one. Among equals it is the last heuristic's.
     """
     rows = {name: result.find_row(n) for name, result in results.items()}
-    return _smallest_then_best(
-        results, [(name, row) for name, row in rows.items() if row is not None]
-    )
+    return _find_smallest(results, [(name, row) for name, row in rows.items() if row is not None])
 
 
-def _smallest_then_best(
+def _find_smallest(
     results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]
 ) -> Pick | None:
+    """Return the best model among those with the fewest parameters, or None if there are none."""
     if not picks:
         return None
     n = min(int(results[name].n[row]) for name, row in picks)
     small = [(name, row) for name, row in picks if results[name].n[row] == n]
-    return _best(results, small)
+    return _find_best(results, small)
 
 
-def _best(results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]) -> Pick:
-    """Of the smallest torque error on the estimation set; of equal ones the last."""
+def _find_best(results: Mapping[str, HeuristicValidation], picks: Sequence[Pick]) -> Pick:
+    """Return the model with the smallest torque error on the estimation set; among equals the last."""
     errors = np.array([results[name].torque_error.estimation[row] for name, row in picks])
     return picks[int(np.flatnonzero(errors <= errors.min() * (1 + TIE) + EXACT)[-1])]
 
 
-def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> bool:
-    """Whether no subset of fewer than n parameters keeps to an error on the estimation set.
+def is_proven_smallest(proofs: Proofs, n: int, torque_error: float) -> bool:
+    """Return whether it is proven that no subset of fewer than n parameters keeps an error on the estimation set.
 
     Fewer parameters never have a smaller error, so the bound of the largest size below n decides.
     """
@@ -101,17 +102,17 @@ def proven_necessary(proofs: Proofs, n: int, torque_error: float) -> bool:
     return smaller.size == 0 or bool(proofs.lower_bound[smaller[-1]] > torque_error)
 
 
-def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoice, ...]:
-    """Models whose operations are known and that no other one beats in something without losing in something else.
+def find_pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoice, ...]:
+    """Return the models with known operations that no other model beats in one respect without losing in another.
 
-    Compared are the number of parameters, both errors on the estimation set and both operation
-    counts; models with errors of a hundred per cent are left out. Of equal models the first stays.
+    Compared are the number of parameters, both errors on the estimation set and both operation counts; models with
+    errors of 100 % are left out. Of equal models the first stays.
     """
-    picks = list(_sensible(results))
+    picks = list(_iterate_sensible(results))
     if not picks:
         return ()
     values = np.array(
-        [[_resolved(column[row]) for column in _compared(results[h])] for h, row in picks]
+        [[_round_off(column[row]) for column in _list_objectives(results[h])] for h, row in picks]
     )
     front = []
     for k, own in enumerate(values):
@@ -124,8 +125,8 @@ def pareto_front(results: Mapping[str, HeuristicValidation]) -> tuple[ModelChoic
     return tuple(ModelChoice(front[k][0], int(results[front[k][0]].n[front[k][1]])) for k in order)
 
 
-def _compared(result: HeuristicValidation) -> tuple[IntArray | FloatArray, ...]:
-    """Return what models are compared by, the less the better, (m,) each."""
+def _list_objectives(result: HeuristicValidation) -> tuple[IntArray | FloatArray, ...]:
+    """Return the quantities that the Pareto front minimises, (m,) each."""
     return (
         result.n,
         result.torque_error.estimation,
@@ -135,15 +136,15 @@ def _compared(result: HeuristicValidation) -> tuple[IntArray | FloatArray, ...]:
     )
 
 
-def every_model(results: Mapping[str, HeuristicValidation]) -> list[ModelChoice]:
+def list_models(results: Mapping[str, HeuristicValidation]) -> list[ModelChoice]:
     """Return all models of all heuristics."""
     return [ModelChoice(name, int(n)) for name, result in results.items() for n in result.n]
 
 
-def shown_models(
+def list_shown_models(
     results: Mapping[str, HeuristicValidation], selected: Selected, front: Sequence[ModelChoice]
 ) -> list[ModelChoice]:
-    """Return the models whose operations people look at; to count those of all takes minutes for large robots.
+    """Return the models whose operations people look at; counting all models takes minutes for large robots.
 
     Args:
         results: Validation of each heuristic.
@@ -156,18 +157,19 @@ def shown_models(
     whole = {selected.heuristic, "forward-selection"}
     shown = [
         choice
-        for choice in every_model(results)
+        for choice in list_models(results)
         if choice.heuristic in whole or choice.n == selected.n
     ]
     return list(dict.fromkeys([*shown, *front]))
 
 
-def _resolved(value: float) -> float:
-    """A number without what is round-off in it."""
+def _round_off(value: float) -> float:
+    """Return a number with nine digits, and zero if it is round-off."""
     return 0.0 if value < EXACT else float(f"{value:.9g}")
 
 
-def _sensible(results: Mapping[str, HeuristicValidation]) -> Iterator[Pick]:
+def _iterate_sensible(results: Mapping[str, HeuristicValidation]) -> Iterator[Pick]:
+    """Yield the models with errors below 100 % and known operations."""
     for name, result in results.items():
         sensible = (result.torque_error.estimation < 1) & (result.acceleration_error.estimation < 1)
         sensible &= np.isfinite(result.operations.inverse)

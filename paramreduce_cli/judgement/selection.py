@@ -1,17 +1,17 @@
-"""Which reduced model the config asks for."""
+"""Selection of the reduced model that the config asks for."""
 
 from collections.abc import Mapping
 
 from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.errors import ConfigError, DataError
-from paramreduce_cli.judgement.cross_validation import one_standard_error
+from paramreduce_cli.judgement.cross_validation import choose_by_one_standard_error
 from paramreduce_cli.judgement.picking import (
     Pick,
-    best_of_size,
-    excess,
-    nearest_to,
-    proven_necessary,
-    smallest_within,
+    compute_worst_ratios,
+    find_best_of_size,
+    find_nearest_to,
+    find_smallest_within,
+    is_proven_smallest,
 )
 from paramreduce_cli.records import (
     CrossValidation,
@@ -24,17 +24,17 @@ from paramreduce_cli.reduction.models import reduced_model
 from paramreduce_cli.texts import format_percent
 
 
-def select(
+def select_model(
     wanted: SelectedSection,
     known: FloatArray | None,
     reduction: Reduction,
     results: Mapping[str, HeuristicValidation],
     cross_validation: Mapping[str, CrossValidation] | None,
 ) -> Selected:
-    """The model of the size asked for, or the smallest one within the tolerances on both sets.
+    """Return the model of the size asked for, or the smallest one within the tolerances on both sets.
 
-    Where none keeps to them it is the nearest one, and says so. With cross-validation it is the
-    smallest one that the estimation set cannot tell from the best.
+    If no model keeps the tolerances it is the nearest one, with a note. With cross-validation it is the smallest model
+    that the data cannot distinguish from the best.
 
     Args:
         wanted: What the config asks for.
@@ -53,30 +53,30 @@ def select(
         results = {wanted.heuristic: results[wanted.heuristic]}
     missed = ""
     if cross_validation is not None:
-        heuristic, row, reason = _cross_validated(results, cross_validation)
+        heuristic, row, reason = _choose_by_cross_validation(results, cross_validation)
     elif wanted.n is not None:
-        heuristic, row = _of_size(wanted.n, results)
+        heuristic, row = _find_of_size(wanted.n, results)
         reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
     else:
         tolerances = wanted.get_tolerances() or SelectedSection.USUAL
-        choice = smallest_within(results, tolerances)
-        heuristic, row = choice if choice is not None else nearest_to(results, tolerances)
+        choice = find_smallest_within(results, tolerances)
+        heuristic, row = choice if choice is not None else find_nearest_to(results, tolerances)
         n = int(results[heuristic].n[row])
         if choice is None:
-            worst = float(excess(results[heuristic], tolerances)[row])
-            missed = f"no model has {_listed(tolerances)}, the nearest is {worst:.3g} times beyond"
+            worst = float(compute_worst_ratios(results[heuristic], tolerances)[row])
+            missed = f"no model has {_format_tolerances(tolerances)}, the nearest is {worst:.3g} times beyond"
             reason = f"{heuristic} with n = {n}: {missed}."
         else:
-            reason = _reason(wanted, tolerances, reduction, heuristic, n)
+            reason = _explain_choice(wanted, tolerances, reduction, heuristic, n)
     chosen = reduced_model(reduction, heuristic, row, known)
     return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
 
 
-def _cross_validated(
+def _choose_by_cross_validation(
     results: Mapping[str, HeuristicValidation], found: Mapping[str, CrossValidation]
 ) -> tuple[str, int, str]:
-    """Heuristic, row and reason of what cross-validation chooses."""
-    choice = one_standard_error(found)
+    """Return heuristic, row and reason of the model that cross-validation chooses."""
+    choice = choose_by_one_standard_error(found)
     row = results[choice.heuristic].find_row(choice.n)
     assert row is not None  # only sizes of the heuristic itself are judged
     own = found[choice.heuristic]
@@ -97,8 +97,9 @@ def _cross_validated(
     return choice.heuristic, row, reason
 
 
-def _of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:
-    choice = best_of_size(results, n)
+def _find_of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:
+    """Return the best model of n parameters, or raise ConfigError if there is none."""
+    choice = find_best_of_size(results, n)
     if choice is not None:
         return choice
     sizes = sorted({int(k) for result in results.values() for k in result.n})
@@ -113,27 +114,29 @@ def _of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:
     )
 
 
-def _reason(
+def _explain_choice(
     wanted: SelectedSection,
     tolerances: Mapping[str, float],
     reduction: Reduction,
     heuristic: str,
     n: int,
 ) -> str:
+    """Return a sentence on the reason for the choice."""
     who = f"{heuristic} with n = {n}"
     if set(tolerances) == {"operations"}:
-        return f"{who} has the smallest torque error with {_listed(tolerances)}."
+        return f"{who} has the smallest torque error with {_format_tolerances(tolerances)}."
     whose = f" of {wanted.heuristic}" if wanted.heuristic is not None else ""
-    text = f"{who} is the smallest model found{whose} with {_listed(tolerances)}"
+    text = f"{who} is the smallest model found{whose} with {_format_tolerances(tolerances)}"
     limit = tolerances.get("torque_error")
     if reduction.proofs is None or limit is None or n == 1:
         return f"{text}."
-    if proven_necessary(reduction.proofs, n, limit):
+    if is_proven_smallest(reduction.proofs, n, limit):
         return f"{text}; proven: with fewer parameters none has that torque error on the estimation set."
     return f"{text}; smaller ones are not excluded by proof."
 
 
-def _listed(tolerances: Mapping[str, float]) -> str:
+def _format_tolerances(tolerances: Mapping[str, float]) -> str:
+    """Return the tolerances as text."""
     shown = [
         f"{key.replace('_', ' ')} at most {format_percent(value)} on the estimation and the validation set"
         if "error" in key

@@ -1,4 +1,4 @@
-"""How much a selection depends on the data: which parameters other data would choose."""
+"""Stability of a selection: the parameters that other data would select."""
 
 from collections.abc import Callable, Sequence
 
@@ -9,19 +9,19 @@ from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 
-def stability(
+def measure_stability(
     problem: SelectionProblem,
     factors: Sequence[tuple[DataVariant, FloatArray]],
     select: Callable[[SelectionProblem], IntArray],
     tell: Tell,
 ) -> Stability:
-    """Select again on other data.
+    """Repeat the selection on other data.
 
     Args:
-        problem: Whose candidates, preference and groups stay.
-        factors: Triangular factors of the weighted [W | chi], with what the data are.
-        select: The subset of a problem.
-        tell: Told of each.
+        problem: Selection problem, whose candidates, preference and groups stay.
+        factors: Triangular factors of the weighted [W | chi], with the variant of the data.
+        select: Returns the subset for a problem.
+        tell: Called with the progress.
     """
     n = problem.W.shape[1]
     chosen = np.zeros((len(factors), n), dtype=bool)

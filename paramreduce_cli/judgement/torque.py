@@ -1,4 +1,4 @@
-"""Errors of the torques that reduced models predict, in three norms."""
+"""Errors of torques that reduced models predict, in three norms."""
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _TINY = np.finfo(float).tiny
 
 @dataclass(frozen=True)
 class NormErrors:
-    """Torque errors of many models in three norms."""
+    """The torque errors of many models in three norms."""
 
     one: FloatArray
     """(n_models,)"""
@@ -30,29 +30,29 @@ class NormErrors:
 
     @property
     def two(self) -> FloatArray:
-        """In the 2-norm, (n_models,)."""
+        """Relative error in the 2-norm, (n_models,)."""
         result: FloatArray = np.sqrt(self.squares.sum(axis=1) / max(np.nansum(self.total), _TINY))
         return result
 
     @property
     def joints(self) -> FloatArray:
-        """In the 2-norm, joint by joint, (n_models, n_dof); not a number where torques are not measured."""
-        return joint_errors([self])
+        """Relative error in the 2-norm, joint by joint, (n_models, n_dof); NaN where torques are not measured."""
+        return compute_joint_errors([self])
 
 
 class Squares(Protocol):
-    """Sums of squares over a part of the samples."""
+    """A pair of sums of squares over a part of the samples."""
 
     @property
     def squares(self) -> FloatArray:
-        """Of what is missed, (n_models, n_dof)."""
+        """Sum of the squared errors, (n_models, n_dof)."""
 
     @property
     def total(self) -> FloatArray:
-        """Of what is predicted, (n_dof,)."""
+        """Sum of the squared quantity, (n_dof,)."""
 
 
-def joint_errors(parts: Sequence[Squares]) -> FloatArray:
+def compute_joint_errors(parts: Sequence[Squares]) -> FloatArray:
     """Return relative errors joint by joint over all parts together, (n_models, n_dof)."""
     squares = np.sum([part.squares for part in parts], axis=0)
     total = np.sum([part.total for part in parts], axis=0)
@@ -60,10 +60,10 @@ def joint_errors(parts: Sequence[Squares]) -> FloatArray:
     return result
 
 
-def torque_errors(
+def compute_torque_errors(
     blocks: Iterable[Block], parameters: FloatArray, weights: FloatArray
 ) -> NormErrors:
-    """Errors of many models in one pass over the samples.
+    """Return the errors of many models in one pass over the samples.
 
     Args:
         blocks: The samples.

@@ -1,4 +1,4 @@
-"""Whether the selected model is accepted, and what the user should know of the others."""
+"""Acceptance of the selected model, and warnings on all models."""
 
 from collections.abc import Iterator, Mapping
 
@@ -26,23 +26,19 @@ _ERROR_FACTOR = 2.0
 """Errors on two sets part if one is so many times larger."""
 
 
-def verdict(
+def judge_model(
     limits: Acceptance, selected: Selected, result: HeuristicValidation
 ) -> tuple[bool | None, str]:
-    """Whether the selected model keeps to the limits of the config, None where there are none, and
-    the sentence for it.
-    """
+    """Return whether the selected model keeps the limits of the config, None without limits, and the sentence for it."""
     met: list[str] = []
     missed: list[str] = [selected.missed] if selected.missed else []
     for key in type(limits).model_fields:
         limit = getattr(limits, key)
         if limit is None:
             continue
-        value = _judged_value(result, selected.n, key)
+        value = _get_limited_value(result, selected.n, key)
         relative = "error" in key
-        text = (
-            f"{key.replace('_', ' ')} {_shown(value, relative)} (limit {_shown(limit, relative)})"
-        )
+        text = f"{key.replace('_', ' ')} {_format_value(value, relative)} (limit {_format_value(limit, relative)})"
         (met if value <= limit else missed).append(text)
     who = f"{selected.heuristic} with {selected.n} parameters"
     if missed:
@@ -52,8 +48,8 @@ def verdict(
     return None, f"{who} is not judged: validation.accept sets no limits."
 
 
-def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
-    """Return what a limit of the config is on, of the model of n parameters."""
+def _get_limited_value(result: HeuristicValidation, n: int, key: str) -> float:
+    """Return the quantity that a limit of the config is on, of the model of n parameters."""
     quantity, part = key.removesuffix(_WORST).rsplit("_", 1)
     own = getattr(result, quantity)[part][result.find_row(n)]
     if part != "test":
@@ -62,7 +58,7 @@ def _judged_value(result: HeuristicValidation, n: int, key: str) -> float:
     return errors.worst if key.endswith(_WORST) else errors.median
 
 
-def _shown(value: float, relative: bool) -> str:
+def _format_value(value: float, relative: bool) -> str:
     return format_percent(value) if relative else f"{value:g}"
 
 
@@ -71,7 +67,7 @@ def find_model_warnings(
     full: Mapping[str, int | float],
     selected: Selected,
 ) -> Iterator[ModelWarning]:
-    """Where reduced models should not be trusted; the same of several heuristics once."""
+    """Yield warnings on reduced models; the same warning on several heuristics is one."""
     common: dict[str, list[str]] = {}
     who = f"The selected model ({selected.heuristic}, n = {selected.n})"
     for name, result in heuristics.items():
@@ -89,7 +85,7 @@ def _check_subsets(
     full: Mapping[str, int | float], result: HeuristicValidation
 ) -> Iterator[tuple[BoolArray, str, str]]:
     """Yield which subsets are not safe to use, why, and what that means for the selected model."""
-    unsafe = _unsafe(full, result)
+    unsafe = _find_unsafe(full, result)
     last = int(result.n[unsafe].max(initial=0))
     yield (
         unsafe,
@@ -99,16 +95,17 @@ def _check_subsets(
         "is not safe for direct dynamics: use its inverse dynamics only.",
     )
     for what in ("torque", "acceleration"):
-        apart = _apart(result, what)
+        apart = _find_overfitted(result, what)
         yield (
             apart,
             f"{what} errors on the two sets differ more than {_ERROR_FACTOR:g} times at n = "
-            f"{', '.join(_ranges(result.n[apart].tolist()))}.",
+            f"{', '.join(_format_ranges(result.n[apart].tolist()))}.",
             f"has {what} errors on the two sets that part: use more trajectories, or more parameters.",
         )
 
 
-def _unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
+def _find_unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> BoolArray:
+    """Return which models have an indefinite or nearly singular mass matrix, (m,)."""
     if not full:  # nothing is known but torques
         return np.zeros(result.n.size, dtype=bool)
     smallest = result.mass_matrix.smallest_eigenvalue
@@ -120,15 +117,16 @@ def _unsafe(full: Mapping[str, int | float], result: HeuristicValidation) -> Boo
     return unsafe
 
 
-def _apart(result: HeuristicValidation, what: str) -> BoolArray:
+def _find_overfitted(result: HeuristicValidation, what: str) -> BoolArray:
+    """Return which models have much larger errors on one set than on the other, (m,)."""
     one, two = result.get_errors(what).estimation, result.get_errors(what).validation
     smaller, larger = np.minimum(one, two), np.maximum(one, two)
     apart: BoolArray = (larger > _ERROR_FACTOR * smaller) & ((smaller > _NEGLIGIBLE) & (larger < 1))
     return apart
 
 
-def _ranges(numbers: list[int]) -> Iterator[str]:
-    """Runs of consecutive numbers as text."""
+def _format_ranges(numbers: list[int]) -> Iterator[str]:
+    """Yield runs of consecutive numbers as text."""
     start = 0
     for k, number in enumerate(numbers):
         if k + 1 < len(numbers) and numbers[k + 1] == number + 1:

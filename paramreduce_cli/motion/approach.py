@@ -46,16 +46,16 @@ class _NoWayError(DataError):
 
 
 @dataclass(frozen=True)
-class Way:
-    """Quintic polynomials between two states of all joints."""
+class Segment:
+    """A segment of a motion: quintic polynomials between two states of all joints."""
 
     duration: float
     """s"""
     coefficients: FloatArray
     """Of powers of time over the duration, (6, n_dof)."""
 
-    def states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Positions, speeds and accelerations, (n_samples, n_dof) each."""
+    def compute_states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return positions, speeds and accelerations, (n_samples, n_dof) each."""
         s = time / self.duration
         powers = np.arange(6)
         z = s[:, None] ** powers
@@ -65,18 +65,18 @@ class Way:
         return z @ self.coefficients, dz @ self.coefficients, ddz @ self.coefficients
 
 
-def at_rest(pose: FloatArray) -> State:
-    """The state of a machine that stands still."""
+def make_rest_state(pose: FloatArray) -> State:
+    """Return the state of a machine at rest."""
     return pose, np.zeros_like(pose), np.zeros_like(pose)
 
 
-class Ways:
-    """Finds ways.
+class PathPlanner:
+    """A planner of motions between states.
 
     Args:
-        model: Of the robot, for torques and distances.
-        trajectories: With the limits: speeds and accelerations are kept by half, positions, torques, powers and
-            bounds whole.
+        model: Model of the robot, for torques and distances.
+        trajectories: Trajectories with the limits: speeds and accelerations use half of their limits, positions,
+            torques, powers and bounds all of theirs.
     """
 
     def __init__(self, model: Model, trajectories: Trajectories) -> None:
@@ -85,29 +85,29 @@ class Ways:
         self._coordinates = Coordinates(model.mechanism)
         self._quantities = Quantities(model.mechanism, trajectories.constraints)
 
-    def between(self, start: State, end: State) -> list[Way]:
-        """One way, or several by poses between.
+    def plan(self, start: State, end: State) -> list[Segment]:
+        """Return one segment, or several through poses in between.
 
         Raises:
             DataError: None was found; the message says what is in the way of the straight one.
         """
         try:
-            return [self._straight(start, end)]
+            return [self._plan_straight(start, end)]
         except _NoWayError as error:
             standing = all(self._can_stand(state[0]) for state in (start, end))
-            found = self._around(start, end) if standing else []
+            found = self._plan_detour(start, end) if standing else []
             if not found:
                 raise DataError(str(error)) from None
             return found
 
-    def _around(self, start: State, end: State) -> list[Way]:
-        """By clear poses between, the shortest of what is tried; none if all fails [Bohlin2000]."""
-        states = [start, end, *map(at_rest, self._poses(start[0], end[0]))]
+    def _plan_detour(self, start: State, end: State) -> list[Segment]:
+        """Return the shortest detour found through clear poses, or nothing if all tries fail [Bohlin2000]."""
+        states = [start, end, *map(make_rest_state, self._sample_poses(start[0], end[0]))]
         poses = np.array([state[0] for state in states])
         moves = np.abs(poses[:, None] - poses) / self._limits.velocity
         lengths = np.max(moves, axis=2) ** _MANY_SHORT
         lengths[0, 1] = lengths[1, 0] = np.inf
-        clear: dict[tuple[int, int], Way] = {}
+        clear: dict[tuple[int, int], Segment] = {}
         for _ in range(_TRIED):
             total, before = dijkstra(lengths, indices=0, return_predecessors=True)
             if np.isinf(total[1]):
@@ -120,7 +120,7 @@ class Ways:
                 if (one, other) in clear:
                     continue
                 try:
-                    clear[one, other] = self._straight(states[one], states[other])
+                    clear[one, other] = self._plan_straight(states[one], states[other])
                 except _NoWayError:
                     lengths[one, other] = lengths[other, one] = np.inf
                     break
@@ -128,19 +128,19 @@ class Ways:
                 return [clear[leg] for leg in legs]
         return []
 
-    def _poses(self, one: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
-        """Clear poses, the same for every call: around the middle, and ever farther away."""
+    def _sample_poses(self, one: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
+        """Yield clear poses, the same at every call: around the middle, and ever farther away."""
         rng = np.random.default_rng(0)
         limits = self._limits
         for k in range(_POSES):
             spread = _FARTHEST * limits.reach * (k + 1) / _POSES
             pose = (one + other) / 2 + spread * rng.normal(size=one.size)
             pose = np.clip(pose, limits.lower, limits.upper)
-            if self._missed(pose[None]) is None:
+            if self._find_violated_bound(pose[None]) is None:
                 yield pose
 
-    def _straight(self, start: State, end: State) -> Way:
-        """The shortest of a row of durations that keeps to the limits.
+    def _plan_straight(self, start: State, end: State) -> Segment:
+        """Return the straight segment with the shortest of several durations that keeps the limits.
 
         Raises:
             _NoWayError: None does, or something is in the way.
@@ -150,11 +150,11 @@ class Ways:
         hard = np.maximum(_GENTLE * limits.acceleration, np.abs([start[2], end[2]]).max(axis=0))
         duration = _SHORTEST
         while duration < _LONGEST:
-            way = Way(duration, _quintic(start, end, duration))
-            z, dz, ddz = way.states(np.linspace(0, duration, _CHECKED))
+            way = Segment(duration, _fit_quintic(start, end, duration))
+            z, dz, ddz = way.compute_states(np.linspace(0, duration, _CHECKED))
             slow = (np.abs(dz) <= fast * (1 + _ROUNDING)) & (np.abs(ddz) <= hard * (1 + _ROUNDING))
             if self._is_inside(z) and slow.all():
-                name = self._missed(z)
+                name = self._find_violated_bound(z)
                 if name is not None:
                     raise _NoWayError(
                         "the way between trajectories.start_pose and the trajectory misses the bounds of "
@@ -172,15 +172,18 @@ class Ways:
         """Whether a pose is within the limits and can be held; else no detour helps."""
         z, still = pose[None], np.zeros((1, pose.size))
         inside = self._is_inside(z)
-        return inside and self._missed(z) is None and self._is_loadable(z, still, still)
+        return (
+            inside and self._find_violated_bound(z) is None and self._is_loadable(z, still, still)
+        )
 
     def _is_inside(self, z: FloatArray) -> bool:
+        """Return whether all positions are within their limits."""
         limits = self._limits
         inside = (z >= limits.lower - _ROUNDING) & (z <= limits.upper + _ROUNDING)
         return bool(inside.all())
 
-    def _missed(self, z: FloatArray) -> str | None:
-        """Name of a bound that is not kept along a motion, None if all are."""
+    def _find_violated_bound(self, z: FloatArray) -> str | None:
+        """Return the name of a bound that a motion violates, or None."""
         quantities = self._quantities
         if not quantities.constraints:
             return None
@@ -210,7 +213,8 @@ class Ways:
         return Dynamics(self._model.mechanism)
 
 
-def _quintic(start: State, end: State, duration: float) -> FloatArray:
+def _fit_quintic(start: State, end: State, duration: float) -> FloatArray:
+    """Return the coefficients of quintic polynomials between two states, (6, n_dof), of time from 0 to 1."""
     scale = np.array([1.0, duration, duration**2])
     rows = np.array(
         [

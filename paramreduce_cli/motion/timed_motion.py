@@ -1,12 +1,12 @@
-"""An exciting trajectory as a controller runs it: there, along it, and back, at its own rate."""
+"""An exciting trajectory with its approach and return, sampled at a controller's rate."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.motion.approach import State, Ways, at_rest
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
+from paramreduce_cli.motion.approach import PathPlanner, State, make_rest_state
 from paramreduce_cli.records import FloatArray, Kind, Mechanism, Trajectories, Trajectory
 
 _FINER = 4
@@ -15,7 +15,7 @@ _FINER = 4
 
 @dataclass(frozen=True)
 class TimedMotion:
-    """States at a controller's rate."""
+    """A motion as states at a controller's rate."""
 
     title: str
     names: tuple[str, ...]
@@ -33,7 +33,7 @@ class TimedMotion:
     """Seconds that it takes."""
 
 
-def timed_motion(
+def sample_motion(
     mechanism: Mechanism,
     trajectories: Trajectories,
     trajectory: Trajectory,
@@ -41,16 +41,16 @@ def timed_motion(
     rate: float,
     title: str,
     start_pose: FloatArray | None = None,
-    ways: Ways | None = None,
+    ways: PathPlanner | None = None,
 ) -> TimedMotion:
-    """A trajectory at some rate, from where the machine stands and back to there.
+    """Return a trajectory at some rate, from the pose of the machine and back to it.
 
     Args:
-        mechanism: Of the robot.
-        trajectories: With the period.
-        trajectory: One of them; joints of it may be whole turns away, where that is nearer to the pose.
+        mechanism: Mechanism of the robot.
+        trajectories: Trajectories with their period.
+        trajectory: One of the trajectories; its joints may be whole turns away if that is nearer to the pose.
         rate: Samples per second.
-        title: For people.
+        title: Title for people.
         start_pose: Where the machine stands, (n_dof,); None to begin with the trajectory itself.
         ways: Finds ways there and back, where there is a pose.
 
@@ -62,36 +62,36 @@ def timed_motion(
     turns = np.zeros(mechanism.n_dof)
 
     def along(time: FloatArray) -> State:
-        z, dz, ddz = fourier_basis(period, harmonics, time).states(trajectory.coefficients)
+        z, dz, ddz = evaluate_basis(period, harmonics, time).evaluate(trajectory.coefficients)
         return z + 2 * np.pi * turns, dz, ddz
 
     if start_pose is None or ways is None:
         time = np.arange(int(np.floor(period * rate + 1e-9)) + 1) / rate
         z, dz, ddz = along(time)
         return TimedMotion(title, names, rate, time, z, dz, ddz, 0.0, period)
-    turns = _turns(mechanism, trajectories, along, start_pose)
+    turns = _choose_turns(mechanism, trajectories, along, start_pose)
     border = tuple(state[0] for state in along(np.zeros(1)))
     there, back = (
-        ways.between(at_rest(start_pose), border),
-        ways.between(border, at_rest(start_pose)),
+        ways.plan(make_rest_state(start_pose), border),
+        ways.plan(border, make_rest_state(start_pose)),
     )
     lead = sum(way.duration for way in there)
     parts: list[tuple[float, Callable[[FloatArray], State]]] = [
-        *((way.duration, way.states) for way in there),
+        *((way.duration, way.compute_states) for way in there),
         (period, along),
-        *((way.duration, way.states) for way in back),
+        *((way.duration, way.compute_states) for way in back),
     ]
-    time, (z, dz, ddz) = _sampled(parts, rate)
+    time, (z, dz, ddz) = _sample_parts(parts, rate)
     return TimedMotion(title, names, rate, time, z, dz, ddz, lead, period)
 
 
-def _turns(
+def _choose_turns(
     mechanism: Mechanism,
     trajectories: Trajectories,
     along: Callable[[FloatArray], State],
     pose: FloatArray,
 ) -> FloatArray:
-    """Whole turns of joints by which a trajectory begins nearest to a pose, within their limits, (n_dof,).
+    """Return the whole turns of joints that bring the start of a trajectory nearest to a pose, within limits, (n_dof,).
 
     After a turn a joint of an open tree is where it was, but the way there may be another one, or none.
     """
@@ -111,10 +111,10 @@ def _turns(
         turns[wrong] -= np.sign(turns[wrong])
 
 
-def _sampled(
+def _sample_parts(
     parts: Sequence[tuple[float, Callable[[FloatArray], State]]], rate: float
 ) -> tuple[FloatArray, list[FloatArray]]:
-    """Times, and states of motions that follow each other, each with its duration; the last sample is the end."""
+    """Return times and states of motions that follow each other, each with its duration; the last sample is the end."""
     ends = np.cumsum([duration for duration, _ in parts])
     time = np.arange(int(np.ceil(ends[-1] * rate - 1e-9)) + 1) / rate
     owner = np.minimum(np.searchsorted(ends, time, side="right"), len(parts) - 1)

@@ -14,7 +14,7 @@ class StoredStates(SampleSet, Protocol):
     def first(self) -> int:
         """Number of its first trajectory."""
 
-    def states(self) -> Iterator[Block]:
+    def iterate_states(self) -> Iterator[Block]:
         """Yield the samples in order, with observation matrices of no rows."""
 
 
@@ -41,10 +41,10 @@ class JoinedSet:
         for part in self._parts:
             yield from part.iterate_blocks()
 
-    def states(self) -> Iterator[Block]:
+    def iterate_states(self) -> Iterator[Block]:
         """The same with observation matrices of no rows."""
         for part in self._parts:
-            yield from part.states()
+            yield from part.iterate_states()
 
     def compute_factors(self) -> FloatArray:
         """Triangular factors per trajectory and joint, from those of the parts."""

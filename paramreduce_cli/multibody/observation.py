@@ -88,7 +88,7 @@ class ObservedSet:
         """How many samples it yields in all."""
         return sum(span.stop - span.start for span in self.spans)
 
-    def states(self) -> Iterator[StateBlock]:
+    def iterate_states(self) -> Iterator[StateBlock]:
         """Yield the states in order; every call starts anew."""
         return map(self.at, self.spans)
 
@@ -115,7 +115,7 @@ class ObservedSet:
         """
         nothing = np.empty(0), np.empty((0, self.dynamics.mechanism.n_q))
         trajectory, before = -1, nothing
-        for s in self.states():
+        for s in self.iterate_states():
             if s.trajectory != trajectory:
                 trajectory, before = s.trajectory, nothing
             try:

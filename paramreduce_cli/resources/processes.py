@@ -94,9 +94,6 @@ def choose_start_method() -> BaseContext:
 
     A fork of this process itself could hang, as Matplotlib, h5py and the progress display keep threads and locks.
     Without a server, as on Windows, each process imports everything by itself.
-
-    A fork of this process could hang, as Matplotlib, h5py and the progress display keep threads and locks. Where there
-    is no server, as on Windows, each process imports all by itself.
     """
     if "forkserver" not in multiprocessing.get_all_start_methods():
         return multiprocessing.get_context("spawn")

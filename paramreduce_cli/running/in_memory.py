@@ -1,4 +1,4 @@
-"""Runs stages on records, without files."""
+"""Runs stages on records in memory, without files."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -7,20 +7,20 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import get_section, is_section
 from paramreduce_cli.records import Items, Run, Tell
-from paramreduce_cli.running.pipeline import Stage, maker_of
-from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, called
+from paramreduce_cli.running.pipeline import Stage, find_maker
+from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, call_stage
 
 
-def made_in_memory(
+def run_in_memory(
     stage: Stage, config: Config | Settings, records: Mapping[type, Any], run: Run
 ) -> Any:
-    """Run a stage.
+    """Run a stage on records.
 
     Args:
-        stage: Which one.
-        config: Whose sections it takes.
-        records: What other stages have made, by type.
-        run: Workers and an audience.
+        stage: Stage to run.
+        config: Config with the sections of the stage.
+        records: Records of other stages by type.
+        run: Worker processes and callbacks.
 
     Raises:
         TypeError: A record that it needs is not among them.
@@ -38,6 +38,6 @@ def made_in_memory(
             arguments[entry.name] = lent.get(entry.type)
         else:
             name = entry.type.__name__
-            maker = maker_of(entry.type).name.replace("-", "_")
+            maker = find_maker(entry.type).name.replace("-", "_")
             raise TypeError(f"{stage.function.__name__} needs a {name}, which {maker} makes")
-    return called(stage, arguments)
+    return call_stage(stage, arguments)

@@ -1,4 +1,4 @@
-"""The declared stages as their signatures describe them, and the order that follows."""
+"""The stages as their signatures describe them, in their order."""
 
 import inspect
 import types
@@ -50,7 +50,7 @@ class StageInput:
 
 @dataclass(frozen=True)
 class Stage:
-    """A declared stage as its signature describes it."""
+    """A stage as its signature describes it."""
 
     name: str
     function: Callable[..., Any]
@@ -59,23 +59,23 @@ class Stage:
 
     @property
     def sections(self) -> list[StageInput]:
-        """The sections of the config that its result depends on."""
+        """Sections of the config that the result of the stage depends on."""
         return [entry for entry in self.inputs if is_section(entry.type)]
 
     @property
     def artifacts(self) -> list[StageInput]:
-        """The inputs that other stages make."""
+        """Inputs that other stages make."""
         own = self.output
         return [e for e in self.inputs if e.type in ARTIFACTS and e.type is not own]
 
     @property
     def previous(self) -> StageInput | None:
-        """Where the stage takes what it has made before, to go on from there."""
+        """Input that takes the stage's own earlier artifact, to continue from it; None if there is none."""
         return next((entry for entry in self.inputs if entry.type is self.output), None)
 
     @property
     def lends_run(self) -> StageInput | None:
-        """Where the stage takes workers and an audience."""
+        """Input that takes worker processes and callbacks; None if there is none."""
         return next((entry for entry in self.inputs if entry.type is Run), None)
 
     @property
@@ -118,14 +118,15 @@ def describe_stage(name: str, function: Callable[..., Any]) -> Stage:
 
 
 def _describe_input(name: str, hint: Any, parameter: str = "") -> StageInput:
+    """Return a stage input of a name and a type hint."""
     optional = isinstance(hint, types.UnionType)
     members = [a for a in typing.get_args(hint) if a is not type(None)] if optional else [hint]
     return StageInput(name, members[0], optional, parameter)
 
 
 @cache
-def pipeline() -> tuple[Stage, ...]:
-    """All stages, each after those whose artifacts it reads."""
+def list_stages() -> tuple[Stage, ...]:
+    """Return all stages, each after the stages whose artifacts it reads."""
     waiting = [describe_stage(name, function) for name, function in stages.items()]
     ordered: list[Stage] = []
     made: set[type] = set()
@@ -141,13 +142,13 @@ def pipeline() -> tuple[Stage, ...]:
     return tuple(ordered)
 
 
-def maker_of(record: type) -> Stage:
-    """The stage that makes a record."""
-    return next(s for s in pipeline() if s.output is record)
+def find_maker(record: type) -> Stage:
+    """Return the stage that makes a record."""
+    return next(s for s in list_stages() if s.output is record)
 
 
-def brought_files(config: Config | None, kind: type) -> dict[str, Path]:
-    """Files of the user's own that a config names for an input of a stage, by name."""
+def list_user_files(config: Config | None, kind: type) -> dict[str, Path]:
+    """Return the user's files that a config names for an input of a stage, by name."""
     files: dict[str, Path | None] = {}
     if config is not None and kind is Coefficients:
         files = {"coefficients": config.trajectories.file}
@@ -168,17 +169,17 @@ _NAMED_BY = {
 """Keys of files that users bring."""
 
 
-def absent_files(config: Config) -> Iterator[tuple[Path, str]]:
-    """Files that stages of a full run need and that are not there, with the key that names them."""
-    needed = {entry.type for stage in stages_to_run(config) for entry in stage.inputs}
+def find_missing_files(config: Config) -> Iterator[tuple[Path, str]]:
+    """Yield files that a full run needs and that do not exist, with the key that names each."""
+    needed = {entry.type for stage in list_stages_to_run(config) for entry in stage.inputs}
     for kind in (kind for kind in _NAMED_BY if kind in needed):
-        for path in brought_files(config, kind).values():
+        for path in list_user_files(config, kind).values():
             if not path.exists():
                 yield path, _NAMED_BY[kind]
 
 
-def measured_torques(config: Config) -> bool:
-    """Whether the torques of both sets were measured on a machine."""
+def has_measured_torques(config: Config) -> bool:
+    """Return whether the torques of both sets were measured on a machine."""
     if config.sampling.log is not None:
         return True
     return _is_recorded(config) and config.sampling.torques == "measured"
@@ -186,7 +187,7 @@ def measured_torques(config: Config) -> bool:
 
 def _is_recorded(config: Config) -> bool:
     """Whether the estimation and the validation set are recordings, so that no trajectories are needed."""
-    return {"estimation", "validation"} <= brought_files(config, Recordings).keys()
+    return {"estimation", "validation"} <= list_user_files(config, Recordings).keys()
 
 
 def check_is_asked_for(stage: Stage, config: Config) -> None:
@@ -197,20 +198,20 @@ def check_is_asked_for(stage: Stage, config: Config) -> None:
     """
     logged = config.sampling.log is not None
     if (stage.output is MeasuredLog and not logged) or (
-        stage.output is Identification and not measured_torques(config)
+        stage.output is Identification and not has_measured_torques(config)
     ):
         raise no_log()
 
 
-def stages_to_run(config: Config) -> list[Stage]:
-    """The stages of a full run: without trajectories where both sets are recordings, or simulated."""
+def list_stages_to_run(config: Config) -> list[Stage]:
+    """Return the stages of a full run; trajectories are left out if both sets are recorded or simulated."""
     logged = config.sampling.log is not None
     simulated = config.sampling.simulation is not None
     recorded = logged or simulated or _is_recorded(config)
     idle = {
         Trajectories: recorded,
         MeasuredLog: not logged,
-        Identification: not measured_torques(config),
+        Identification: not has_measured_torques(config),
         TermReduction: config.terms is None,
     }
-    return [s for s in pipeline() if not idle.get(s.output, False)]
+    return [s for s in list_stages() if not idle.get(s.output, False)]

@@ -1,4 +1,4 @@
-"""Runs stages: finds their inputs, skips what is up to date, writes what they make.
+"""The runner of stages: it finds their inputs, skips what is up to date, and writes what they make.
 
 All it knows of a stage is its signature: a parameter's type says where the value comes
 from, the return type which artifact is written.
@@ -17,7 +17,7 @@ from typing import Any
 
 from paramreduce_cli import __version__
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp
-from paramreduce_cli.artifacts.store import Store, check_schema, file_digest, file_of, load_file
+from paramreduce_cli.artifacts.store import Store, check_schema, digest_file, get_file, load_file
 from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.checks import find_warnings
@@ -40,40 +40,40 @@ from paramreduce_cli.running.pipeline import (
     LENT,
     Stage,
     StageInput,
-    maker_of,
-    pipeline,
-    stages_to_run,
+    find_maker,
+    list_stages,
+    list_stages_to_run,
 )
-from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, called, noted_warnings
+from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, call_stage, note_warnings
 
 
-def provenance(
+def make_provenance(
     wanted: Config | Settings,
     robot: str,
     seconds: Mapping[str, float],
     warnings: Mapping[str, Sequence[str]],
     asked: str,
 ) -> Provenance:
-    """Where results come from, whatever ran the stages.
+    """Return the provenance of results, whatever has run the stages.
 
     Args:
-        wanted: What was asked for.
-        robot: Its name.
-        seconds: That stages took, by name.
-        warnings: That stages gave, by name.
-        asked: See :class:`Provenance`.
+        wanted: Config or settings.
+        robot: Name of the robot.
+        seconds: Times of the stages by name, s.
+        warnings: Warnings of the stages by name.
+        asked: Config and options of the call, as in :class:`Provenance`.
     """
     text = json.dumps(wanted.model_dump(mode="json"), sort_keys=True)
     digest = hashlib.sha256(text.encode()).hexdigest()
     changed = wanted.model_dump(mode="json", exclude_defaults=True)
     if isinstance(wanted, Config):
         warnings = {"config": find_warnings(wanted), **warnings}
-    return Provenance(robot, digest, versions(), seconds, warnings, asked, changed)
+    return Provenance(robot, digest, get_versions(), seconds, warnings, asked, changed)
 
 
 @cache
-def versions() -> dict[str, str]:
-    """Of this package and of the libraries that numbers depend on."""
+def get_versions() -> dict[str, str]:
+    """Return the versions of this package and of the libraries that numbers depend on."""
     return {"paramreduce": __version__} | {
         name: importlib.metadata.version(name) for name in ("numpy", "scipy", "casadi")
     }
@@ -81,7 +81,7 @@ def versions() -> dict[str, str]:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What became of one stage."""
+    """The outcome of one stage."""
 
     stage: str
     path: Path
@@ -90,8 +90,8 @@ class Outcome:
     record: Any = None
 
 
-def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
-    """The arguments that name a run at the shell, for commands that are to follow it."""
+def format_arguments(config: Path | None, results: Path | None, overrides: Sequence[str]) -> str:
+    """Return the config and the options of a call, for commands that follow it."""
     words = [str(config)] if config is not None else []
     words += ["--results", str(results)] if results is not None else []
     words += [word for text in overrides for word in ("--set", text)]
@@ -100,7 +100,7 @@ def asked(config: Path | None, results: Path | None, overrides: Sequence[str]) -
 
 @dataclass(frozen=True)
 class Callbacks:
-    """Functions that a run calls."""
+    """The functions that a run calls."""
 
     progress: Callable[[Progress], None] = lambda _: None
     """Called with each step of long work."""
@@ -115,7 +115,7 @@ class Callbacks:
 
 @dataclass
 class Runner:
-    """Runs stages on one robot in one folder.
+    """A runner of stages on one robot in one folder.
 
     Attributes:
         config: None where a stage is run on brought files alone.
@@ -151,32 +151,34 @@ class Runner:
         Raises:
             ParamreduceError: Its inputs are missing or wrong, or it fails.
         """
-        path = self.store.path(stage.output)
+        path = self.store.get_path(stage.output)
         self._cut_short = False
         self.store.refuse_to_replace(stage.output, self._robot)
         self._look_at_inputs(stage)
-        previous = self._previous(stage)
+        previous = self._load_previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
         if not force and not better and self.is_current(stage):
-            return self._current_outcome(stage, part)
+            return self._make_current_outcome(stage, part)
         started = time.perf_counter()
         inputs = Inputs(self.config, self.callbacks.progress)
         lent_types = (*LENT, stage.output)
         arguments = {
-            i.name: self._argument(i, inputs) for i in stage.inputs if i.type not in lent_types
+            i.name: self._load_argument(i, inputs) for i in stage.inputs if i.type not in lent_types
         }
-        with noted_warnings() as warnings:
+        with note_warnings() as warnings:
 
             def stamp(seconds: float) -> Stamp:
-                return self._stamp(stage, inputs, seconds, warnings)
+                return self._make_stamp(stage, inputs, seconds, warnings)
 
             kept = StoredItems(path, stamp, from_start=force, check=self.callbacks.check)
-            earlier = kept.stamps() if part.is_whole else []
+            earlier = kept.list_stamps() if part.is_whole else []
             said = dict.fromkeys(text for one in earlier for text in one.warnings)
             for text in said:
                 self.callbacks.warn(text)
-            unchanged = self._unchanged(stage, inputs) if previous and not force else frozenset()
-            run = Run(self.jobs, self.callbacks.progress, self._cut, unchanged)
+            unchanged = (
+                self._find_unchanged(stage, inputs) if previous and not force else frozenset()
+            )
+            run = Run(self.jobs, self.callbacks.progress, self._mark_cut_short, unchanged)
             lent = {
                 Run: run,
                 Tell: self.callbacks.progress,
@@ -185,7 +187,7 @@ class Runner:
             }
             arguments |= {i.name: lent[i.type] for i in stage.inputs if i.type in lent}
             try:
-                record = called(stage, arguments)
+                record = call_stage(stage, arguments)
             except PartFinished:
                 self.callbacks.check()
                 seconds = time.perf_counter() - started
@@ -194,54 +196,55 @@ class Runner:
         seconds = time.perf_counter() - started
         total = seconds + sum(one.seconds for one in earlier)
         texts = tuple(dict.fromkeys([*said, *warnings]))
-        self.store.save(record, self._stamp(stage, inputs, total, texts))
+        self.store.save(record, self._make_stamp(stage, inputs, total, texts))
         kept.clear()
         return Outcome(stage.name, path, False, time.perf_counter() - started, record)
 
-    def _current_outcome(self, stage: Stage, part: Part) -> Outcome:
-        """Say again what is still true of an artifact that is up to date."""
-        path = self.store.path(stage.output)
-        stamp = self.store.stamp(stage.output)
+    def _make_current_outcome(self, stage: Stage, part: Part) -> Outcome:
+        """Return the outcome of an artifact that is up to date, after repeating its warnings."""
+        path = self.store.get_path(stage.output)
+        stamp = self.store.read_stamp(stage.output)
         assert stamp is not None, "an artifact that is up to date has one"
         if part.is_whole:
-            StoredItems(
-                path, lambda _: stamp
-            ).clear()  # of jobs that ended after the artifact was combined
             self.store.touch(stage.output)
             for text in stamp.warnings:
                 self.callbacks.warn(text)
         return Outcome(stage.name, path, True, stamp.seconds)
 
-    def _previous(self, stage: Stage) -> Any:
-        """What this version of the stage has made before, None if there is nothing to go on from."""
-        stamp = self.store.stamp(stage.output)
-        known = stamp is not None and (stamp.schema, stamp.versions) == (SCHEMA, versions())
+    def _load_previous(self, stage: Stage) -> Any:
+        """Return the artifact that this version of the stage has made before, or None."""
+        stamp = self.store.read_stamp(stage.output)
+        known = stamp is not None and (stamp.schema, stamp.versions) == (SCHEMA, get_versions())
         if stage.previous is None or not known:
             return None
         try:
-            path = self.store.path(stage.output)
+            path = self.store.get_path(stage.output)
             return load_file(path, stage.output, self._robot, stage.name)[0]
         except ArtifactError:  # damaged: it is made again
             return None
 
     def is_current(self, stage: Stage) -> bool:
         """Whether a stage's artifact was made by this version from just these inputs."""
-        stamp = self.store.stamp(stage.output)
+        stamp = self.store.read_stamp(stage.output)
         if stamp is None or stamp.cut_short or self.config is None or self.samples is not None:
             return False
         made = (stamp.schema, stamp.stage, stamp.robot, stamp.versions)
-        if made != (SCHEMA, stage.name, self.config.robot, versions()):
+        if made != (SCHEMA, stage.name, self.config.robot, get_versions()):
             return False
-        if self._changed_sections(stamp) or stamp.inputs != self._input_digests(stage):
+        if self._find_changed_sections(stamp) or stamp.inputs != self._digest_inputs(stage):
             return False
         return self.store.is_whole(stage.output)
 
-    def made_otherwise(self, stage: Stage) -> bool:
-        """Whether a stage's artifact is there, made from other sections of the config."""
-        stamp = self.store.stamp(stage.output)
-        return self.config is not None and stamp is not None and bool(self._changed_sections(stamp))
+    def is_of_other_config(self, stage: Stage) -> bool:
+        """Return whether a stage's artifact exists, but from other sections of the config."""
+        stamp = self.store.read_stamp(stage.output)
+        return (
+            self.config is not None
+            and stamp is not None
+            and bool(self._find_changed_sections(stamp))
+        )
 
-    def _changed_sections(self, stamp: Stamp) -> list[str]:
+    def _find_changed_sections(self, stamp: Stamp) -> list[str]:
         assert self.config is not None
         return [
             name
@@ -249,51 +252,54 @@ class Runner:
             if digest_section(self.config, tuple(name.split("."))) != digest
         ]
 
-    def _unchanged(self, stage: Stage, inputs: Inputs) -> frozenset[str]:
-        """Sections and files that are what they were when the stage ran before."""
-        stamp = self.store.stamp(stage.output)
+    def _find_unchanged(self, stage: Stage, inputs: Inputs) -> frozenset[str]:
+        """Return the sections and files that have not changed since the stage ran before."""
+        stamp = self.store.read_stamp(stage.output)
         if stamp is None or self.config is None:
             return frozenset()
-        sections = set(stamp.sections) - set(self._changed_sections(stamp))
+        sections = set(stamp.sections) - set(self._find_changed_sections(stamp))
         same = {name for name, digest in inputs.digests.items() if stamp.inputs.get(name) == digest}
         return frozenset(sections | same)
 
-    def _input_digests(self, stage: Stage) -> dict[str, str]:
+    def _digest_inputs(self, stage: Stage) -> dict[str, str]:
+        """Return the digests of the stage's inputs by file name."""
         inputs = Inputs(self.config)
         for entry in stage.inputs:
             if entry in stage.artifacts:
-                stamp = self.store.stamp(entry.type)
+                stamp = self.store.read_stamp(entry.type)
                 if stamp is not None:
-                    inputs.digests[file_of(entry.type)] = stamp.digest
+                    inputs.digests[get_file(entry.type)] = stamp.digest
             else:
-                inputs.files(entry.type)
+                inputs.note_files(entry.type)
         return inputs.digests
 
-    def _argument(self, entry: StageInput, inputs: Inputs) -> Any:
+    def _load_argument(self, entry: StageInput, inputs: Inputs) -> Any:
+        """Return the value of a stage input: a section, provenance, user files, or an artifact."""
         if is_section(entry.type):
             return get_section(self.config or self.settings, entry.type)
         if entry.type is Provenance:
-            return self._provenance()
+            return self._make_provenance()
         if entry.type in OUTSIDE:
             return OUTSIDE[entry.type](inputs)
-        return self._artifact(entry, inputs)
+        return self._load_artifact(entry, inputs)
 
-    def _artifact(self, entry: StageInput, inputs: Inputs) -> Any:
+    def _load_artifact(self, entry: StageInput, inputs: Inputs) -> Any:
+        """Return an artifact, and note its digest; None if it is optional and not expected."""
         brought = self.samples if entry.type is Samples else None
-        path = brought or self.store.path(entry.type)
-        if entry.optional and not self._expected(entry.type):
+        path = brought or self.store.get_path(entry.type)
+        if entry.optional and not self._is_expected(entry.type):
             return None
         robot = self.config.robot if self.config is not None and brought is None else None
-        maker = "" if brought else maker_of(entry.type).name
+        maker = "" if brought else find_maker(entry.type).name
         record, stamp = load_file(path, entry.type, robot, maker)
-        inputs.digests[file_of(entry.type)] = stamp.digest if stamp else file_digest(path)
+        inputs.digests[get_file(entry.type)] = stamp.digest if stamp else digest_file(path)
         return record
 
-    def _expected(self, record: type) -> bool:
-        """Whether an optional input must be there: a full run of this config would make it."""
+    def _is_expected(self, record: type) -> bool:
+        """Return whether an optional input must exist because a full run of this config would make it."""
         if self.config is None:
             return False
-        return record in [s.output for s in stages_to_run(self.config)]
+        return record in [s.output for s in list_stages_to_run(self.config)]
 
     @property
     def config_name(self) -> str:
@@ -303,25 +309,26 @@ class Runner:
 
     @property
     def _robot(self) -> str:
+        """Name of the robot: the config's, or the folder's without a config."""
         if self.config is not None:
             return self.config.robot
         return self.store.folder.resolve().name
 
     def _look_at_inputs(self, stage: Stage) -> None:
         """Refuse inputs of another layout; say which ones, or what these were made from, do not fit."""
-        for record in self._upstream(stage):
+        for record in self._list_upstream(stage):
             if text := self.describe_mismatch(record):
                 run = f"`paramreduce run {self.asked}`".replace(" `", "`")
                 again = f"{run} rebuilds it" if self.config is not None else "make it again"
                 self.callbacks.warn(f"{text}; {again}")
 
-    def _upstream(self, stage: Stage) -> list[type]:
-        """Records of files that a stage's artifact comes from, each after those that it is made from."""
+    def _list_upstream(self, stage: Stage) -> list[type]:
+        """Return the records that a stage's artifact comes from, each after those that it is made from."""
         records: dict[type, None] = {}
         for entry in stage.artifacts:
             brought = entry.type is Samples and self.samples is not None
-            if not brought and (not entry.optional or self._expected(entry.type)):
-                records |= dict.fromkeys(self._upstream(maker_of(entry.type)))
+            if not brought and (not entry.optional or self._is_expected(entry.type)):
+                records |= dict.fromkeys(self._list_upstream(find_maker(entry.type)))
                 records[entry.type] = None
         return list(records)
 
@@ -331,22 +338,22 @@ class Runner:
         Raises:
             ArtifactError: The file is of another layout.
         """
-        stamp = self.store.stamp(record)
+        stamp = self.store.read_stamp(record)
         if stamp is None:
             return ""
-        path = self.store.path(record)
+        path = self.store.get_path(record)
         check_schema(path, stamp)
         changed = []
         if self.config is not None:
-            changed += [f"another {name} section" for name in self._changed_sections(stamp)]
-        changed += [f"another {name}" for name in self._changed_artifacts(record, stamp)]
+            changed += [f"another {name} section" for name in self._find_changed_sections(stamp)]
+        changed += [f"another {name}" for name in self._find_changed_artifacts(record, stamp)]
         return f"{path} was made with {' and '.join(changed)}" if changed else ""
 
-    def _changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
-        """Files of the folder that are not those a record was made from."""
+    def _find_changed_artifacts(self, record: type, stamp: Stamp) -> list[str]:
+        """Return the files of the folder that differ from those a record was made from."""
         stamps = {
-            file_of(entry.type): self.store.stamp(entry.type)
-            for entry in maker_of(record).artifacts
+            get_file(entry.type): self.store.read_stamp(entry.type)
+            for entry in find_maker(record).artifacts
         }
         return [
             name
@@ -354,13 +361,15 @@ class Runner:
             if found is not None and name in stamp.inputs and found.digest != stamp.inputs[name]
         ]
 
-    def _cut(self) -> None:
+    def _mark_cut_short(self) -> None:
+        """Note that Ctrl-C has ended a search of the stage."""
         self.callbacks.interrupted()
         self._cut_short = True
 
-    def _stamp(
+    def _make_stamp(
         self, stage: Stage, inputs: Inputs, seconds: float, warnings: Sequence[str] = ()
     ) -> Stamp:
+        """Return the stamp of an artifact: versions, digests of sections and inputs, time and warnings."""
         sections: dict[str, str] = {}
         seeds = []
         if self.config is not None:
@@ -371,7 +380,7 @@ class Runner:
             schema=SCHEMA,
             robot=self._robot,
             stage=stage.name,
-            versions=versions(),
+            versions=get_versions(),
             sections=sections,
             inputs=dict(inputs.digests),
             seed=next((seed for seed in seeds if seed is not None), 0),
@@ -381,12 +390,13 @@ class Runner:
             warnings=tuple(warnings),
         )
 
-    def _provenance(self) -> Provenance:
+    def _make_provenance(self) -> Provenance:
+        """Return the provenance of the results in the folder."""
         seconds, warnings = {}, {}
-        for stage in pipeline():
-            stamp = self.store.stamp(stage.output)
+        for stage in list_stages():
+            stamp = self.store.read_stamp(stage.output)
             if stamp is not None and stage.output is not Report:
                 seconds[stage.name] = stamp.seconds
                 warnings[stage.name] = stamp.warnings
         wanted = self.config or self.settings or Settings()
-        return provenance(wanted, self._robot, seconds, warnings, self.asked)
+        return make_provenance(wanted, self._robot, seconds, warnings, self.asked)

@@ -1,4 +1,4 @@
-"""What a stage takes that no other stage makes: files of the user's own, noted by their digests."""
+"""Inputs of stages that no stage makes: the user's files, noted by their digests."""
 
 import warnings
 from collections.abc import Callable, Iterator, Sequence
@@ -8,7 +8,7 @@ from typing import Any
 
 from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.log_files import load_log
-from paramreduce_cli.artifacts.store import file_digest
+from paramreduce_cli.artifacts.store import digest_file
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import NumericalError, ParamreduceWarning
@@ -22,34 +22,34 @@ from paramreduce_cli.records import (
     Recordings,
     Tell,
 )
-from paramreduce_cli.running.pipeline import Stage, brought_files
+from paramreduce_cli.running.pipeline import Stage, list_user_files
 
 _MOST_WARNINGS = 50
 """Of a stage that are kept; an attribute of a file has not room for any number."""
 
 
 class Inputs:
-    """What one stage has read so far: files by their digests.
+    """The user's files that one stage has read so far, by their digests.
 
     Args:
-        config: Names the files.
-        tell: Told of long reading.
+        config: Config that names the files; None if there is none.
+        tell: Called with the progress of long reading.
     """
 
     def __init__(self, config: Config | None, tell: Tell = lambda _: None) -> None:
         self.config, self.tell = config, tell
         self.digests: dict[str, str] = {}
 
-    def files(self, kind: type) -> dict[str, Path]:
-        """Files of a kind that the config names, by name; noted as read."""
-        found = brought_files(self.config, kind)
+    def note_files(self, kind: type) -> dict[str, Path]:
+        """Return the files of a kind that the config names, by name, and note their digests."""
+        found = list_user_files(self.config, kind)
         for path in found.values():
-            self.digests[str(path)] = file_digest(path)
+            self.digests[str(path)] = digest_file(path)
         return found
 
 
-def called(stage: Stage, arguments: dict[str, Any]) -> Any:
-    """What a stage makes of its arguments; concerns are told by the config's keys.
+def call_stage(stage: Stage, arguments: dict[str, Any]) -> Any:
+    """Call a stage; numerical errors are raised as errors of the config's keys.
 
     Raises:
         ParamreduceError: It fails.
@@ -61,8 +61,8 @@ def called(stage: Stage, arguments: dict[str, Any]) -> Any:
 
 
 @contextmanager
-def noted_warnings() -> Iterator[list[str]]:
-    """The warnings of this project that are given meanwhile; they are shown as ever."""
+def note_warnings() -> Iterator[list[str]]:
+    """Collect this project's warnings within the block; they are shown as usual."""
     noted: list[str] = []
     with warnings.catch_warnings():
         show = warnings.showwarning
@@ -77,7 +77,7 @@ def noted_warnings() -> Iterator[list[str]]:
 
 
 class _LogFiles:
-    """Logs that are read when they are gone through, and not kept: each may take gigabytes."""
+    """The logs of one kind, read one at a time when they are iterated over, as each may take gigabytes."""
 
     def __init__(self, kind: str, paths: Sequence[Path], tell: Tell) -> None:
         self._task, self._paths, self._tell = f"read {kind} logs", paths, tell
@@ -90,8 +90,9 @@ class _LogFiles:
             self._tell(Progress(self._task, len(self._paths), len(self._paths)))
 
 
-def _logs(inputs: Inputs) -> RawLogs:
-    files = inputs.files(RawLogs)
+def _load_logs(inputs: Inputs) -> RawLogs:
+    """Return the training and held-out logs that the config names."""
+    files = inputs.note_files(RawLogs)
     training, held_out = (
         _LogFiles(
             kind, [path for name, path in files.items() if name.startswith(kind)], inputs.tell
@@ -101,22 +102,24 @@ def _logs(inputs: Inputs) -> RawLogs:
     return RawLogs(training, held_out)
 
 
-def _coefficients(inputs: Inputs) -> Coefficients | None:
-    paths = inputs.files(Coefficients)
+def _load_coefficients(inputs: Inputs) -> Coefficients | None:
+    """Return the Fourier coefficients that the config names, or None."""
+    paths = inputs.note_files(Coefficients)
     return load_coefficients(paths["coefficients"]) if paths else None
 
 
-def _recordings(inputs: Inputs) -> Recordings:
+def _load_recordings(inputs: Inputs) -> Recordings:
+    """Return the recordings of states that the config names, by set."""
     assert inputs.config is not None
     found: dict[str, Recording | None] = dict.fromkeys(SETS)
-    for name, path in inputs.files(Recordings).items():
+    for name, path in inputs.note_files(Recordings).items():
         found[name] = load_recording(path, inputs.config.n_dof)
     return Recordings(**found)
 
 
 OUTSIDE: dict[type, Callable[[Inputs], Any]] = {
-    Coefficients: _coefficients,
-    Recordings: _recordings,
-    RawLogs: _logs,
+    Coefficients: _load_coefficients,
+    Recordings: _load_recordings,
+    RawLogs: _load_logs,
 }
 """What stages read from files of the user's own."""

@@ -1,4 +1,4 @@
-"""Many runs of one list: robots, seeds and changes of their configs, each in a folder of its own."""
+"""Sweeps: many runs of one list, of robots, seeds and variants, each in a folder of its own."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from paramreduce_cli.artifacts.store import file_of
+from paramreduce_cli.artifacts.store import get_file
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.config.loading import load_section
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.fields.names import UnknownNameError
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.records import PROVING, Part, Reduction, Report, Samples, Validation
-from paramreduce_cli.running.pipeline import Stage, pipeline, stages_to_run
+from paramreduce_cli.running.pipeline import Stage, list_stages, list_stages_to_run
 
 _SEED = "trajectories.seed"
 """What a seed of the list sets."""
@@ -29,14 +29,14 @@ _VARIANT = re.compile(r"\w[\w.-]*")
 """Names of variants, which become part of a folder's."""
 
 
-def _distinct(seeds: list[int]) -> list[int]:
+def _check_seeds(seeds: list[int]) -> list[int]:
     twice = sorted({seed for seed in seeds if seeds.count(seed) > 1})
     if twice:
         raise ValueError(f"the seed {twice[0]} stands there twice")
     return seeds
 
 
-def _named(variants: dict[str, list[str]]) -> dict[str, list[str]]:
+def _check_variants(variants: dict[str, list[str]]) -> dict[str, list[str]]:
     for name in variants:
         if not _VARIANT.fullmatch(name):
             raise ValueError(
@@ -45,8 +45,9 @@ def _named(variants: dict[str, list[str]]) -> dict[str, list[str]]:
     return variants
 
 
-def _known(parts: dict[str, int]) -> dict[str, int]:
-    names = [stage.name for stage in pipeline() if stage.has_items]
+def _check_parts(parts: dict[str, int]) -> dict[str, int]:
+    """Raise UnknownNameError unless all names are stages that can be done in parts."""
+    names = [stage.name for stage in list_stages() if stage.has_items]
     for name in parts:
         if name not in names:
             raise UnknownNameError("stage that is done in parts", name, names)
@@ -54,17 +55,17 @@ def _known(parts: dict[str, int]) -> dict[str, int]:
 
 
 class SweepSection(Section):
-    """What is run: every robot with every seed and every variant."""
+    """The list of a sweep: every robot with every seed and every variant."""
 
     robots: Annotated[list[Path], Field(min_length=1)]
     """Configs; relative to this file."""
-    seeds: Annotated[list[int], Field(min_length=1), AfterValidator(_distinct)] | None = None
+    seeds: Annotated[list[int], Field(min_length=1), AfterValidator(_check_seeds)] | None = None
     """Of the trajectories; those in the configs if left out."""
     variants: (
-        Annotated[dict[str, list[str]], Field(min_length=1), AfterValidator(_named)] | None
+        Annotated[dict[str, list[str]], Field(min_length=1), AfterValidator(_check_variants)] | None
     ) = None
     """Changes of the configs, KEY=VALUE as after --set, by a name of one's own; none if left out."""
-    parts: Annotated[dict[str, Annotated[int, Field(ge=1)]], AfterValidator(_known)] = Field(
+    parts: Annotated[dict[str, Annotated[int, Field(ge=1)]], AfterValidator(_check_parts)] = Field(
         default_factory=dict
     )
     """How many jobs a stage of every run is done as; one where nothing is said."""
@@ -89,13 +90,13 @@ class SweepRun:
 
     @cached_property
     def config(self) -> Config:
-        """What it is asked for."""
+        """Config of the run."""
         return load_config(self.path, self.overrides)
 
     @cached_property
     def stages(self) -> list[Stage]:
-        """What it consists of."""
-        return stages_to_run(self.config)
+        """Stages of the run."""
+        return list_stages_to_run(self.config)
 
     def divides(self, stage: Stage) -> bool:
         """Whether a stage of it can be done as several jobs."""
@@ -105,22 +106,22 @@ class SweepRun:
             return False
         return stage.has_items
 
-    def file(self, stage: Stage) -> str:
-        """What a stage makes."""
-        return str(self.folder / file_of(stage.output))
+    def get_file(self, stage: Stage) -> str:
+        """Return the path of the file that a stage of the run makes."""
+        return str(self.folder / get_file(stage.output))
 
-    def needs(self, stage: Stage) -> list[str]:
-        """Files that a stage of it reads: its config, and what its other stages make."""
+    def list_needed_files(self, stage: Stage) -> list[str]:
+        """Return the files that a stage of the run reads: its config and the artifacts of other stages."""
         read = {entry.type for entry in stage.artifacts}
-        return [str(self.path), *(self.file(s) for s in self.stages if s.output in read)]
+        return [str(self.path), *(self.get_file(s) for s in self.stages if s.output in read)]
 
-    def command(self, stage: Stage, part: Part | None = None, jobs: str = "") -> str:
-        """What does a stage of it, or a part of that, at the shell.
+    def format_command(self, stage: Stage, part: Part | None = None, jobs: str = "") -> str:
+        """Return the shell command for a stage of the run, or for a part of it.
 
         Args:
-            stage: Which one.
-            part: Which part; all of the stage if None.
-            jobs: How many processes it may have, for stages that take more than one.
+            stage: Stage to run.
+            part: Part of the stage's items; None for all items.
+            jobs: Number of processes, for stages that take more than one; may be a shell variable.
         """
         words = [sys.executable, "-m", "paramreduce_cli", stage.name, str(self.path)]
         words += ["--results", str(self.folder)]
@@ -135,7 +136,7 @@ class SweepRun:
 
 @dataclass(frozen=True)
 class Sweep:
-    """All runs of a list, by their names."""
+    """The runs of a list by name."""
 
     path: Path
     """Of the list."""
@@ -143,28 +144,28 @@ class Sweep:
     parts: dict[str, int]
     folder: Path
 
-    def summaries(self) -> list[str]:
-        """What all runs end with."""
-        return [str(run.folder / file_of(Report)) for run in self.runs.values()]
+    def list_summaries(self) -> list[str]:
+        """Return the paths of the files that all runs end with."""
+        return [str(run.folder / get_file(Report)) for run in self.runs.values()]
 
-    def table_command(self) -> str:
-        """What sets all runs that have ended beside each other, at the shell."""
+    def format_table_command(self) -> str:
+        """Return the shell command that tabulates all finished runs."""
         words = [sys.executable, "-m", "paramreduce_cli", "table", "--sweep", str(self.path)]
         return shlex.join([*words, "--output", str(self.folder / "table")])
 
-    def parts_of(self, stage: Stage, run: SweepRun) -> list[Part]:
-        """The jobs that a stage of a run is done as; none where it is one."""
+    def list_parts(self, stage: Stage, run: SweepRun) -> list[Part]:
+        """Return the parts that a stage of a run is split into; nothing if it is one job."""
         count = self.parts.get(stage.name, 1) if run.divides(stage) else 1
         return [Part(number, count) for number in range(1, count + 1)] if count > 1 else []
 
-    def phases(self, jobs: str) -> list[list[str]]:
-        """Commands that can run side by side, in phases of which each waits for the one before.
+    def list_phases(self, jobs: str) -> list[list[str]]:
+        """Return commands that can run side by side, in phases of which each waits for the one before.
 
         What needs no other job than its own run is one command; so there are no more than two phases for
         every stage that is done as several jobs, and two.
 
         Args:
-            jobs: How many processes a stage may have, as the shell is to understand it.
+            jobs: Number of processes for a stage, as the shell understands it.
         """
         found: list[list[str]] = []
         waiting: dict[str, list[str]] = {name: [] for name in self.runs}
@@ -174,21 +175,21 @@ class Sweep:
             for lines in waiting.values():
                 lines.clear()
 
-        for stage in pipeline():
+        for stage in list_stages():
             having = {name: run for name, run in self.runs.items() if stage in run.stages}
             parts = [
-                run.command(stage, part, "1")
+                run.format_command(stage, part, "1")
                 for run in having.values()
-                for part in self.parts_of(stage, run)
+                for part in self.list_parts(stage, run)
             ]
             if parts:
                 close()
                 found.append(parts)
             for name, run in having.items():
-                text = run.command(stage, jobs=jobs)
+                text = run.format_command(stage, jobs=jobs)
                 waiting[name].append(f"{{ {text}; }}" if "||" in text else text)
         close()
-        return [*(commands for commands in found if commands), [self.table_command()]]
+        return [*(commands for commands in found if commands), [self.format_table_command()]]
 
 
 def load_sweep(path: Path) -> Sweep:
@@ -201,9 +202,9 @@ def load_sweep(path: Path) -> Sweep:
         ConfigError: It is no such list, two runs would have one name, or a config cannot be used.
     """
     wanted = load_section(path, SweepSection)
-    folder = _beside(path, wanted.results)
+    folder = _resolve_beside(path, wanted.results)
     runs: dict[str, SweepRun] = {}
-    for run in _runs(path, wanted, folder):
+    for run in _iterate_runs(path, wanted, folder):
         if run.name in runs:
             raise ConfigError(
                 f"{path}: two runs are called {run.name}: {runs[run.name].path} and {run.path}. Give their files "
@@ -229,7 +230,8 @@ def _check_config(path: Path, run: SweepRun) -> None:
         raise ConfigError(f"{path}: {place}: {error}") from error
 
 
-def _runs(path: Path, wanted: SweepSection, folder: Path) -> Iterator[SweepRun]:
+def _iterate_runs(path: Path, wanted: SweepSection, folder: Path) -> Iterator[SweepRun]:
+    """Yield the runs of a list."""
     seeds: list[int | None] = [None] if wanted.seeds is None else [*wanted.seeds]
     for robot, seed, (variant, changes) in itertools.product(
         wanted.robots, seeds, (wanted.variants or {"": []}).items()
@@ -239,12 +241,12 @@ def _runs(path: Path, wanted: SweepSection, folder: Path) -> Iterator[SweepRun]:
         )
         seeding = [] if seed is None else [f"{_SEED}={seed}"]
         yield SweepRun(
-            name, _beside(path, robot), (*seeding, *changes), folder / name, seed, variant
+            name, _resolve_beside(path, robot), (*seeding, *changes), folder / name, seed, variant
         )
 
 
-def _beside(path: Path, other: Path) -> Path:
-    """A path of a list, as seen from the working folder."""
+def _resolve_beside(path: Path, other: Path) -> Path:
+    """Return a path in the list as seen from the working folder."""
     joined = other if other.is_absolute() else path.parent / other
     here = Path.cwd()
     resolved = joined.resolve()

@@ -1,15 +1,15 @@
-"""The declared stages as rules for other tools."""
+"""Stages as rules for Make and Slurm."""
 
 import shlex
 from pathlib import Path
 
-from paramreduce_cli.artifacts.store import file_of
-from paramreduce_cli.running.pipeline import Stage, pipeline
+from paramreduce_cli.artifacts.store import get_file
+from paramreduce_cli.running.pipeline import Stage, list_stages
 from paramreduce_cli.running.sweep import Sweep
 
 
-def make_rules() -> str:
-    """One pattern rule per stage for GNU Make; kept in pipelines/stages.mk."""
+def format_make_rules() -> str:
+    """Return one pattern rule per stage for GNU Make, as in pipelines/stages.mk."""
     lines = [
         "# Written by `paramreduce graph --format make`; do not edit.",
         "# One rule per stage: `make results/ROBOT/reduction.h5` does just what is missing.",
@@ -26,27 +26,27 @@ def make_rules() -> str:
         "if_made = $(addprefix $(RESULTS)/$(1)/,$(filter $(2),$(call made,$(1))))",
         ".SECONDEXPANSION:",
     ]
-    for stage in pipeline():
-        target = f"$(RESULTS)/%/{file_of(stage.output)}"
-        files = " ".join(file_of(entry.type) for entry in stage.artifacts)
+    for stage in list_stages():
+        target = f"$(RESULTS)/%/{get_file(stage.output)}"
+        files = " ".join(get_file(entry.type) for entry in stage.artifacts)
         needs = [f"$$(call if_made,$$*,{files})"] if files else []
         lines += [
             "",
             f"{target}: {' '.join(['$(CONFIGS)/%.yaml', *needs])} | $(PARAMREDUCE_READY)",
             f"\t$(PARAMREDUCE) {stage.name} $< --results $(RESULTS)/$* $(PARAMREDUCE_FLAGS)",
         ]
-    kept = " ".join(f"$(RESULTS)/%/{file_of(stage.output)}" for stage in pipeline())
+    kept = " ".join(f"$(RESULTS)/%/{get_file(stage.output)}" for stage in list_stages())
     return "\n".join([*lines, "", f".PRECIOUS: {kept}", ""])
 
 
-def outline() -> str:
-    """The stages with what they read and write, for people."""
-    return "\n".join(_line(stage) for stage in pipeline()) + "\n"
+def format_outline() -> str:
+    """Return the stages with the files that they read and write, for people."""
+    return "\n".join(_format_stage(stage) for stage in list_stages()) + "\n"
 
 
-def _line(stage: Stage) -> str:
-    needs = ", ".join(file_of(entry.type) for entry in stage.artifacts)
-    return f"{stage.name}: {needs or 'the config'} -> {file_of(stage.output)}"
+def _format_stage(stage: Stage) -> str:
+    needs = ", ".join(get_file(entry.type) for entry in stage.artifacts)
+    return f"{stage.name}: {needs or 'the config'} -> {get_file(stage.output)}"
 
 
 _MOST_TASKS = 1000
@@ -78,13 +78,13 @@ submit() {{  # NAME COUNT, and a command a line; of more than {most} a task does
 """
 
 
-def slurm_script(sweep: Sweep) -> str:
-    """A script that submits a whole list of runs, for sites without Snakemake.
+def format_slurm_script(sweep: Sweep) -> str:
+    """Return a script that submits a sweep, for sites without Snakemake.
 
     Args:
-        sweep: The list.
+        sweep: Sweep to submit.
     """
-    phases = sweep.phases("${SLURM_CPUS_PER_TASK:-1}")
+    phases = sweep.list_phases("${SLURM_CPUS_PER_TASK:-1}")
     text = _SLURM.format(
         count=len(phases),
         jobs=sum(map(len, phases)),
@@ -98,4 +98,4 @@ def slurm_script(sweep: Sweep) -> str:
     return text
 
 
-FORMATS = {"make": make_rules, "text": outline}
+FORMATS = {"make": format_make_rules, "text": format_outline}

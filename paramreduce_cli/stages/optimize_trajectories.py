@@ -7,10 +7,10 @@ import numpy as np
 
 from paramreduce_cli.config.schema import TrajectoriesSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.excitation.fourier import FINER, fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import FINER, evaluate_basis, sample_times
 from paramreduce_cli.excitation.optimiser import TrajectorySettings, describe
 from paramreduce_cli.excitation.point_to_point import find_point_to_point
-from paramreduce_cli.excitation.workers import ExcitationTask, excitation_of, optimise_all
+from paramreduce_cli.excitation.workers import ExcitationTask, build_excitation, optimise_all
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.records import (
     SETS,
@@ -134,7 +134,9 @@ def _find_point_to_point(
     passed = sets["test"] or sets["validation"] or sets["estimation"]
     times = sample_times(period, wanted.points)
     positions = [
-        fourier_basis(period, (t.coefficients.shape[1] - 1) // 2, times).states(t.coefficients)[0]
+        evaluate_basis(period, (t.coefficients.shape[1] - 1) // 2, times).evaluate(t.coefficients)[
+            0
+        ]
         for t in passed
     ]
     found = find_point_to_point(
@@ -161,7 +163,7 @@ def _measured(
     wanted: TrajectoriesSection, model: Model, task: ExcitationTask, brought: Coefficients
 ) -> dict[str, tuple[Trajectory, ...]]:
     """The trajectories of coefficients that the user brings, measured but not changed."""
-    excitation = excitation_of(task)
+    excitation = build_excitation(task)
 
     def measure(coefficients: FloatArray) -> Trajectory:
         harmonics = (coefficients.shape[1] - 1) // 2
@@ -220,7 +222,7 @@ def _check_bounds(
     trajectories: tuple[Trajectory, ...],
     constraints: tuple[Constraint, ...],
 ) -> None:
-    """Remark on bounded quantities that leave their bounds."""
+    """Warn of bounded quantities that leave their bounds."""
     for k, constraint in enumerate(constraints):
         low = min(float(t.extremes[k, 0]) for t in trajectories)
         high = max(float(t.extremes[k, 1]) for t in trajectories)

@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, Stop
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.judgement.torque import NormErrors, torque_errors
+from paramreduce_cli.judgement.torque import NormErrors, compute_torque_errors
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
@@ -305,7 +305,9 @@ def _with_norms(
         for entry in found.values()
         for subset, f in zip(entry.subsets, entry.fits, strict=True)
     ]
-    errors = torque_errors(samples.estimation.iterate_blocks(), np.column_stack(models), weights)
+    errors = compute_torque_errors(
+        samples.estimation.iterate_blocks(), np.column_stack(models), weights
+    )
     heuristics = {}
     start = 0
     for name, entry in found.items():

@@ -18,7 +18,7 @@ from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.running import RunningModel, speed
 from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.judgement.leanest import leanest
+from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import (
     SETS,
@@ -99,7 +99,7 @@ def report(
     lean = {
         name: found
         for name in (("inverse", "direct") if model is not None else ())
-        if (found := leanest(name, wanted, validation.heuristics, artifacts.terms)) is not None
+        if (found := find_leanest(name, wanted, validation.heuristics, artifacts.terms)) is not None
     }
     summary = summary_of(artifacts, lean, provenance)
     formats = [str(name) for name in section.formats]

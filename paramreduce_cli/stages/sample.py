@@ -15,13 +15,13 @@ from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import (
     FINER,
     FourierBasis,
-    begun_at,
-    fourier_basis,
+    evaluate_basis,
     sample_times,
+    shift_start,
 )
 from paramreduce_cli.excitation.point_to_point import evaluate_along
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
-from paramreduce_cli.excitation.symmetry import completed, symmetries
+from paramreduce_cli.excitation.symmetry import complete_series, generate_group
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -179,15 +179,17 @@ def _completed(
 
     Those that lead out of the limits are refused: they are none of this mechanism.
     """
-    series = completed(series, symmetries(sampling.symmetries, model.mechanism.coordinate_names))
+    series = complete_series(
+        series, generate_group(sampling.symmetries, model.mechanism.coordinate_names)
+    )
     limits = trajectories.limits
     quantities = Quantities(model.mechanism, trajectories.constraints)
     coordinates = Coordinates(model.mechanism)
     period = trajectories.period
     times = sample_times(period, trajectories.points)
     for coefficients in series:
-        basis = fourier_basis(period, (coefficients.shape[1] - 1) // 2, times)
-        z, dz, ddz = basis.states(coefficients)
+        basis = evaluate_basis(period, (coefficients.shape[1] - 1) // 2, times)
+        z, dz, ddz = basis.evaluate(coefficients)
         excess = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
         if excess <= _IMAGE_ROUNDING:
             q, _, _ = coordinates.states(z, dz, ddz)
@@ -342,15 +344,15 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
     def basis(harmonics: int, count: int) -> tuple[FourierBasis, FourierBasis | None]:
         """Of the first samples: what comes later is the same functions with other coefficients."""
         return (
-            fourier_basis(period, harmonics, times[:count]),
-            fourier_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,
+            evaluate_basis(period, harmonics, times[:count]),
+            evaluate_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,
         )
 
     def at(span: Span) -> StateBlock:
-        coefficients = begun_at(series[span.trajectory], period, times[span.start])
+        coefficients = shift_start(series[span.trajectory], period, times[span.start])
         own, between = basis((coefficients.shape[1] - 1) // 2, span.stop - span.start)
-        way = None if between is None else between.states(coefficients)[0]
-        states = own.states(coefficients)
+        way = None if between is None else between.evaluate(coefficients)[0]
+        states = own.evaluate(coefficients)
         return StateBlock(span.trajectory, times[span.start : span.stop], *states, way=way)
 
     return at
@@ -393,7 +395,7 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
 
 def _torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
     """Those of the states where they were measured; else observation matrices are needed too."""
-    states: Iterator[StateBlock | Block] = iter(found.states())
+    states: Iterator[StateBlock | Block] = iter(found.iterate_states())
     first = next(states, None)
     if first is None or first.tau is None:
         return (block.tau for block in found.iterate_blocks())
@@ -414,7 +416,7 @@ def _nominal_acceleration(
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
         return expand_per_joint(given, model.mechanism.n_dof)
-    deviation = standard_deviation(block.ddz for block in estimation.states())
+    deviation = standard_deviation(block.ddz for block in estimation.iterate_states())
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
         deviation[deviation == 0] = 1.0

@@ -8,14 +8,14 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, SelectedSection, ValidationSection
 from paramreduce_cli.errors import ConfigError, DataError, Key
-from paramreduce_cli.judgement.acceleration import AccelerationErrors, acceleration_errors
-from paramreduce_cli.judgement.cross_validation import cross_validated
+from paramreduce_cli.judgement.acceleration import AccelerationErrors, compute_acceleration_errors
+from paramreduce_cli.judgement.cross_validation import cross_validate
 from paramreduce_cli.judgement.operation_counts import OperationCounts
-from paramreduce_cli.judgement.picking import every_model, pareto_front, shown_models
-from paramreduce_cli.judgement.selection import select
-from paramreduce_cli.judgement.stability import stability
-from paramreduce_cli.judgement.torque import NormErrors, joint_errors, torque_errors
-from paramreduce_cli.judgement.verdict import find_model_warnings, verdict
+from paramreduce_cli.judgement.picking import find_pareto_front, list_models, list_shown_models
+from paramreduce_cli.judgement.selection import select_model
+from paramreduce_cli.judgement.stability import measure_stability
+from paramreduce_cli.judgement.torque import NormErrors, compute_joint_errors, compute_torque_errors
+from paramreduce_cli.judgement.verdict import find_model_warnings, judge_model
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
@@ -105,7 +105,7 @@ def validate(
     heuristics, full = measured.heuristics, dict(measured.full)
     costs = None if model is None else OperationCounts(model, counted, reduction, run)
     if costs is not None and (costs.are_few or "operations" in wanted.get_tolerances()):
-        heuristics = costs.count(heuristics, every_model(heuristics))
+        heuristics = costs.count(heuristics, list_models(heuristics))
     crossed = None
     if wanted.cross_validation:
         methods = _crossed_methods(wanted, reduction)
@@ -113,11 +113,11 @@ def validate(
         if crossed is None or set(crossed) != set(methods):
             crossed = _cross_validation(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
-    selected = select(wanted, values, reduction, heuristics, crossed)
+    selected = select_model(wanted, values, reduction, heuristics, crossed)
     if model is not None and costs is not None:
         full |= _counts_by_name(Counts(model, counted), "selected_", selected.model)
-        estimated = pareto_front(costs.estimate(heuristics))
-        heuristics = costs.count(heuristics, shown_models(heuristics, selected, estimated))
+        estimated = find_pareto_front(costs.estimate(heuristics))
+        heuristics = costs.count(heuristics, list_shown_models(heuristics, selected, estimated))
     chosen = (selected.heuristic, selected.n)
     if not judging.stability:
         repeated = None
@@ -125,7 +125,7 @@ def validate(
         repeated = known.stability
     else:
         repeated = _stability(search, model, samples, reduction, selected, run)
-    accepted, sentence = verdict(judging.accept, selected, heuristics[selected.heuristic])
+    accepted, sentence = judge_model(judging.accept, selected, heuristics[selected.heuristic])
     return Validation(
         heuristics=heuristics,
         full=full,
@@ -133,7 +133,7 @@ def validate(
         lower=measured.lower,
         upper=measured.upper,
         selected=selected,
-        pareto=pareto_front(heuristics),
+        pareto=find_pareto_front(heuristics),
         stability=repeated,
         cross_validation=crossed,
         accepted=accepted,
@@ -214,11 +214,11 @@ def _measured(
 
         spread = thinned_blocks(told_of("accelerations"), -(-n // _MOST_ACCELERATIONS))
         torques = [
-            torque_errors(part, models.values, reduction.nominal_torque)
+            compute_torque_errors(part, models.values, reduction.nominal_torque)
             for part in parts(told_of("torques"))
         ]
         accelerations = [
-            acceleration_errors(part, dynamics.direct, models.values, nominal)
+            compute_acceleration_errors(part, dynamics.direct, models.values, nominal)
             for part in parts(spread)
         ]
         return list(zip(torques, accelerations, strict=True))
@@ -255,7 +255,7 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
     nothing = AccelerationErrors(np.tile(unknown[:, None], n_dof), no_joint, unknown, unknown)
 
     def measure(blocks: Iterable[Block]) -> _Errors:
-        return torque_errors(blocks, models.values, reduction.nominal_torque), nothing
+        return compute_torque_errors(blocks, models.values, reduction.nominal_torque), nothing
 
     estimation, validation = (
         measure(part.iterate_blocks()) for part in (samples.estimation, samples.validation)
@@ -328,12 +328,12 @@ def _judged(
         joint_torque_error=JointErrors(
             estimation[0].joints[rows],
             validation[0].joints[rows],
-            (joint_errors(torques) if test else no_joint)[rows],
+            (compute_joint_errors(torques) if test else no_joint)[rows],
         ),
         joint_acceleration_error=JointErrors(
             estimation[1].joints[rows],
             validation[1].joints[rows],
-            (joint_errors(accelerations) if test else no_joint)[rows],
+            (compute_joint_errors(accelerations) if test else no_joint)[rows],
         ),
         mass_matrix=MassMatrices(
             condition=np.max([one.condition[rows] for one in every], axis=0),
@@ -416,7 +416,7 @@ def _cross_validation(
             sizes = set(reduction.heuristics[heuristic].n.tolist())
             return [s for s in run_heuristic(heuristic, task).subsets if s.size in sizes]
 
-        result = cross_validated(problem, folds, select)
+        result = cross_validate(problem, folds, select)
         if result.n.size:
             found[name] = result
     run.progress(Progress("cross-validation", len(methods), len(methods)))
@@ -465,4 +465,4 @@ def _stability(
             blocks = thinned_blocks(samples.estimation.iterate_blocks(), every)
             thinned = DataVariant(DataChange.THINNED, every)
             variants.append((thinned, factor(joint_factors(blocks))))
-    return stability(problem, variants, chosen, run.progress)
+    return measure_stability(problem, variants, chosen, run.progress)

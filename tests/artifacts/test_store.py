@@ -18,8 +18,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.artifacts import hdf5, sample_files
-from paramreduce_cli.artifacts.atomic import atomically, remove_leftovers
-from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, read_stamp, reading, write
+from paramreduce_cli.artifacts.atomic import remove_leftovers, replace_atomically
+from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, open_reader, read_stamp, write
 from paramreduce_cli.artifacts.plain import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.artifacts.stored_items import StoredItems
@@ -35,7 +35,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.pipeline import list_stages
 from paramreduce_cli.running.runner import Runner
 
 VERSIONS = {"paramreduce": "1", "numpy": "2", "scipy": "1", "casadi": "3"}
@@ -58,9 +58,9 @@ def same(a, b):
 @pytest.mark.parametrize("record", [Model, Trajectories, Reduction, Validation])
 def test_records_survive_being_written_and_read(record, two_link_copy):
     store = Store(two_link_copy)
-    first, made = load_file(store.path(record), record, "two_link", "")
+    first, made = load_file(store.get_path(record), record, "two_link", "")
     store.save(first, made)
-    second, again = load_file(store.path(record), record, "two_link", "")
+    second, again = load_file(store.get_path(record), record, "two_link", "")
     assert same(first, second)
     assert again.digest == made.digest
 
@@ -115,11 +115,11 @@ def test_names_relied_on_outside(two_link_results):
 
 def test_a_failed_write_leaves_the_old_file_and_no_litter(tmp_path):
     path = tmp_path / "x.h5"
-    write(path, STAMP, lambda w: w.dataset("a", 1))
+    write(path, STAMP, lambda w: w.write_dataset("a", 1))
     before = path.read_bytes()
 
     def fail(writer: Writer) -> None:
-        writer.dataset("a", 2)
+        writer.write_dataset("a", 2)
         raise OSError(28, "No space left on device")
 
     with pytest.raises(ArtifactError, match="disk is full"):
@@ -165,7 +165,7 @@ def test_what_a_kill_has_left_of_a_file_goes_when_it_is_written_again(tmp_path):
         path.touch()
     for path in (old, other):
         os.utime(path, (1e9, 1e9))
-    with atomically(tmp_path / "x.c") as temporary:
+    with replace_atomically(tmp_path / "x.c") as temporary:
         temporary.write_text("int x;")
     assert [path.exists() for path in (new, old, other)] == [True, False, True]
 
@@ -190,7 +190,7 @@ def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy, re
     folder = two_link_copy
     if record in (MeasuredLog, Identification, TermReduction):
         folder = request.getfixturevalue("measured_copy") / "results"
-    path = Store(folder).path(record)
+    path = Store(folder).get_path(record)
     DAMAGES[damage](path)
     with pytest.raises(ArtifactError, match=path.name):
         load_file(path, record, "two_link", "make-it")
@@ -202,7 +202,7 @@ def test_files_that_cannot_be_used_are_refused(record, damage, two_link_copy, re
      (Reduction, "qr/n"), (Validation, "qr/n")],
 )  # fmt: skip
 def test_a_file_without_one_of_its_datasets_is_refused(record, dataset, two_link_copy):
-    path = Store(two_link_copy).path(record)
+    path = Store(two_link_copy).get_path(record)
     with h5py.File(path, "a") as file:
         del file[dataset]
     with pytest.raises(ArtifactError, match=dataset):
@@ -211,27 +211,27 @@ def test_a_file_without_one_of_its_datasets_is_refused(record, dataset, two_link
 
 def test_a_large_observation_matrix_is_computed_again(two_link_copy, monkeypatch):
     store = Store(two_link_copy)
-    (sample,) = (stage for stage in pipeline() if stage.name == "sample")
-    kept, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    (sample,) = (stage for stage in list_stages() if stage.name == "sample")
+    kept, _ = load_file(store.get_path(Samples), Samples, "two_link", "")
     expected = [block.W for block in kept.validation.iterate_blocks()]
     monkeypatch.setattr(sample_files, "_MOST_KEPT", 0)
     Runner(config_of("two_link", ONE_FORMAT), store).run(sample, force=True)
 
-    with h5py.File(store.path(Samples)) as file:
+    with h5py.File(store.get_path(Samples)) as file:
         assert "W" not in file["validation"]
-    found, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    found, _ = load_file(store.get_path(Samples), Samples, "two_link", "")
     for block, W in zip(found.validation.iterate_blocks(), expected, strict=True):
         np.testing.assert_array_equal(block.W, W)
 
-    with h5py.File(store.path(Model), "a") as file:
+    with h5py.File(store.get_path(Model), "a") as file:
         file.attrs["digest"] = "another"
-    changed, _ = load_file(store.path(Samples), Samples, "two_link", "")
+    changed, _ = load_file(store.get_path(Samples), Samples, "two_link", "")
     with pytest.raises(ArtifactError, match=r"is not the model that .* was computed with"):
         next(changed.validation.iterate_blocks())
 
 
 def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
-    path = Store(two_link_copy).path(Model)
+    path = Store(two_link_copy).get_path(Model)
     with pytest.raises(ArtifactError, match="belongs to the robot two_link, not to other"):
         load_file(path, Model, "other", "")
     with h5py.File(path, "a") as file:
@@ -242,9 +242,9 @@ def test_another_robots_file_and_an_older_schema_are_refused(two_link_copy):
 
 def test_one_run_at_a_time(tmp_path):
     store = Store(tmp_path)
-    with store.locked(), pytest.raises(ArtifactError, match="another run"), store.locked():
+    with store.lock(), pytest.raises(ArtifactError, match="another run"), store.lock():
         pass
-    with store.locked():
+    with store.lock():
         pass
 
 
@@ -253,7 +253,7 @@ def test_a_run_can_be_waited_for(tmp_path):
     inside = threading.Event()
 
     def first():
-        with store.locked("-part"):
+        with store.lock("-part"):
             inside.set()
             time.sleep(0.2)
             order.append("first")
@@ -261,14 +261,14 @@ def test_a_run_can_be_waited_for(tmp_path):
     thread = threading.Thread(target=first)
     thread.start()
     inside.wait()
-    with store.locked("-part", wait=True):
+    with store.lock("-part", wait=True):
         order.append("second")
     thread.join()
     assert order == ["first", "second"]
 
 
 def test_items_belong_to_one_origin(two_link_results, tmp_path):
-    path = Store(two_link_results).path(Trajectories)
+    path = Store(two_link_results).get_path(Trajectories)
     trajectories, _ = load_file(path, Trajectories, "two_link", "")
     items = StoredItems(tmp_path / "x.h5", lambda seconds: STAMP)
     items["a"], items["b"], items["c"] = trajectories.estimation[0], None, np.arange(3)
@@ -286,7 +286,7 @@ def test_items_belong_to_one_origin(two_link_results, tmp_path):
 
 
 def test_stamp_survives(tmp_path):
-    made = write(tmp_path / "x.h5", STAMP, lambda w: w.dataset("a", [1.0, 2.0]))
+    made = write(tmp_path / "x.h5", STAMP, lambda w: w.write_dataset("a", [1.0, 2.0]))
     assert read_stamp(tmp_path / "x.h5") == made
     assert made.digest
 
@@ -309,8 +309,8 @@ def test_large_arrays_are_written_some_rows_at_a_time(tmp_path, monkeypatch):
 
     def written(name):
         def fill(writer):
-            writer.dataset("rows", rows)
-            writer.dataset("count", 5000)
+            writer.write_dataset("rows", rows)
+            writer.write_dataset("count", 5000)
 
         return write(tmp_path / name, STAMP, fill).digest
 
@@ -343,10 +343,10 @@ def test_slices_are_those_of_the_array_and_a_flip_is_noticed(
     cuts = sorted({0, rows, *(min(cut, rows) for cut in cuts)})
 
     def fill(writer):
-        append = writer.rows("grown", columns)
+        append = writer.start_rows("grown", columns)
         for start, stop in itertools.pairwise(cuts):
             append(values[start:stop])
-        writer.dataset("whole", values)
+        writer.write_dataset("whole", values)
 
     path = tmp_path / "rows.h5"
     write(path, STAMP, fill)
@@ -356,14 +356,14 @@ def test_slices_are_those_of_the_array_and_a_flip_is_noticed(
         damaged = bytearray(path.read_bytes())
         damaged[place] ^= 1 << data.draw(st.integers(0, 7))
         path.write_bytes(damaged)
-        with pytest.raises(ArtifactError, match="checksum"), reading(path) as reader:
+        with pytest.raises(ArtifactError, match="checksum"), open_reader(path) as reader:
             reader.verify()
         return
-    with reading(path) as reader:
+    with open_reader(path) as reader:
         reader.verify()
         for name in ("grown", "whole"):
-            np.testing.assert_array_equal(reader.array(name), values)
-            found = reader.rows(name)
+            np.testing.assert_array_equal(reader.read_array(name), values)
+            found = reader.open_rows(name)
             for start, stop in data.draw(st.permutations(list(itertools.pairwise(cuts)))):
                 np.testing.assert_array_equal(found[start:stop:2], values[start:stop:2])
                 found[start:stop][...] = 0  # a copy: what is kept for the next slice stays
@@ -371,10 +371,10 @@ def test_slices_are_those_of_the_array_and_a_flip_is_noticed(
 
 def test_long_lists_of_text_are_checked(tmp_path):
     names = [f"a rather long name of a parameter {k}" for k in range(1000)]
-    write(tmp_path / "t.h5", STAMP, lambda writer: writer.dataset("names", names))
-    with reading(tmp_path / "t.h5") as reader:
-        assert list(reader.texts("names")) == names
+    write(tmp_path / "t.h5", STAMP, lambda writer: writer.write_dataset("names", names))
+    with open_reader(tmp_path / "t.h5") as reader:
+        assert list(reader.read_texts("names")) == names
     damaged = (tmp_path / "t.h5").read_bytes().replace(b"parameter 777", b"parameter 778")
     (tmp_path / "t.h5").write_bytes(damaged)
-    with pytest.raises(ArtifactError, match="checksum"), reading(tmp_path / "t.h5") as reader:
-        reader.texts("names")
+    with pytest.raises(ArtifactError, match="checksum"), open_reader(tmp_path / "t.h5") as reader:
+        reader.read_texts("names")

@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
-from paramreduce_cli.excitation.workers import excitation_of, optimise_all
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
+from paramreduce_cli.excitation.workers import build_excitation, optimise_all
 from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.build_model import build_model
 from paramreduce_cli.stages.optimize_trajectories import excitation_task
@@ -29,8 +29,8 @@ def worst(config, model, task, trajectory):
     limits = task.settings.limits
     time = sample_times(config.trajectories.period, _FINER * config.trajectories.points)
     harmonics = (trajectory.coefficients.shape[1] - 1) // 2
-    basis = fourier_basis(config.trajectories.period, harmonics, time)
-    z, dz, ddz = basis.states(trajectory.coefficients)
+    basis = evaluate_basis(config.trajectories.period, harmonics, time)
+    z, dz, ddz = basis.evaluate(trajectory.coefficients)
     tau = pinocchio_model.inverse_dynamics(model.mechanism, model.values, z, dz, ddz)
     clearance = config.trajectories.clearance
     pairs = [c.bodies for c in task.constraints if c.kind == "clearance"]
@@ -54,10 +54,10 @@ def log_determinant(excitation, config, trajectory):
     """Half the logarithm of det W'W per parameter, of rows over their nominal torques."""
     harmonics = (trajectory.coefficients.shape[1] - 1) // 2
     time = sample_times(config.trajectories.period, config.trajectories.points)
-    z, dz, ddz = fourier_basis(config.trajectories.period, harmonics, time).states(
+    z, dz, ddz = evaluate_basis(config.trajectories.period, harmonics, time).evaluate(
         trajectory.coefficients
     )
-    sizes = np.linalg.svd(excitation.weighted(z, dz, ddz), compute_uv=False)
+    sizes = np.linalg.svd(excitation.weigh_rows(z, dz, ddz), compute_uv=False)
     return float(np.mean(np.log(sizes)))
 
 
@@ -93,7 +93,7 @@ def main(count=100, jobs=2):
             task, settings=dataclasses.replace(task.settings, rest_to_rest=False)
         )
         free = optimise_all(moving, some, Run(jobs=jobs), Items())
-        excitation = excitation_of(task)
+        excitation = build_excitation(task)
         rest, other = (
             [log_determinant(excitation, config, where[key]) for key in some]
             for where in (found, free)

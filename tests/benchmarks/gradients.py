@@ -9,7 +9,7 @@ from paramreduce_cli.excitation.ipopt import minimise
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE
-from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.stages.optimize_trajectories import excitation_task
 from tests.conftest import config_and_model
@@ -23,8 +23,8 @@ class Differences:
         self._limits, self._level = limits, level
 
     def value(self, x):
-        coefficients, _ = self._limits.admissible(x.reshape(6, 9), self._level.limits)
-        W = self._excitation.weighted(*self._basis.states(coefficients))
+        coefficients, _ = self._limits.map_to_admissible(x.reshape(6, 9), self._level.limits)
+        W = self._excitation.weigh_rows(*self._basis.evaluate(coefficients))
         scaled, _ = self._excitation.scaling(W, self._excitation.beta, self._level.maxima)
         eigenvalues = scipy.linalg.eigvalsh(scaled.T @ scaled, check_finite=False)
         return self._excitation.criterion(eigenvalues, self._level.sharpness)[0]
@@ -47,8 +47,8 @@ def descend(make, start):
 def rows():
     config, model = config_and_model("puma560")
     task = excitation_task(config.trajectories, model)
-    excitation, settings = excitation_of(task), task.settings
-    basis = settings.basis()
+    excitation, settings = build_excitation(task), task.settings
+    basis = settings.build_basis()
     limits = LimitMap(settings.limits, basis, "gauge")
 
     def objective(level):

@@ -47,7 +47,7 @@ def without_small_terms():
     command = ["run", ROOT / "configs" / "puma560.yaml", "--set", trajectories, "--quiet"]
     command = [sys.executable, "-m", "paramreduce_cli", *command, "--results", folder]
     subprocess.run(command, check=True)
-    return load_file(Store(folder).path(TermReduction), TermReduction, None, "run")[0]
+    return load_file(Store(folder).get_path(TermReduction), TermReduction, None, "run")[0]
 
 
 def sources():

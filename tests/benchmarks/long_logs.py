@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.excitation.fourier import fourier_basis
+from paramreduce_cli.excitation.fourier import evaluate_basis
 from paramreduce_cli.multibody.dynamics import Dynamics
 from tests.conftest import CONFIGS
 
@@ -69,7 +69,7 @@ def write_log(folder, n_samples):
     series = 0.5 * rng.normal(size=(mechanism.n_dof, 11))
     parts = []
     for start in range(0, n_samples, 10_000):
-        states = fourier_basis(11.3, 5, time[start : start + 10_000]).states(series)
+        states = evaluate_basis(11.3, 5, time[start : start + 10_000]).evaluate(series)
         parts.append((*states, dynamics.regressor(*states) @ phi))
     z, dz, ddz, tau = (np.concatenate(part) for part in zip(*parts, strict=True))
     tau += rng.normal(size=tau.shape)

@@ -15,7 +15,7 @@ import numpy as np
 
 import paramreduce_cli as pr
 from paramreduce_cli.config.schema import SelectedSection
-from paramreduce_cli.judgement.leanest import leanest
+from paramreduce_cli.judgement.leanest import find_leanest
 from tests.benchmarks.robots import ROBOTS
 
 ARMS = ("UR10", "TX40", "Panda")
@@ -25,7 +25,7 @@ TORQUE_ERROR = 0.01
 def parameters_alone(validation, direct):
     """Operations of the leanest model within the error on both sets, infinite if there is none."""
     wanted = SelectedSection(torque_error=TORQUE_ERROR)
-    found = leanest("direct" if direct else "inverse", wanted, validation.heuristics, None)
+    found = find_leanest("direct" if direct else "inverse", wanted, validation.heuristics, None)
     return np.inf if found is None else found.operations
 
 

@@ -13,10 +13,10 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import Identification, Model, Reduction
 from paramreduce_cli.reduction.models import reduced_model
-from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.pipeline import list_stages, list_stages_to_run
 
-STAGES = [stage.name for stage in pipeline()]
-USUAL = [stage.name for stage in stages_to_run(load_config(TWO_LINK))]
+STAGES = [stage.name for stage in list_stages()]
+USUAL = [stage.name for stage in list_stages_to_run(load_config(TWO_LINK))]
 COMMANDS = [*STAGES, "run", "schema", "init", "inspect", "compare", "table", "graph", "export"]
 
 
@@ -76,7 +76,7 @@ def test_an_older_schema_is_refused_by_stages_and_rebuilt_by_run(invoke, two_lin
     invoke("run", TWO_LINK, "--results", two_link_copy, "--quiet", settings=[ONE_FORMAT])
 
 
-def test_stale_inputs_are_remarked_on(invoke, two_link_copy):
+def test_stale_inputs_are_warned_of(invoke, two_link_copy):
     done = invoke("reduce", TWO_LINK, "--results", two_link_copy, settings=["sampling.points=50"])
     assert "samples.h5 was made with another sampling section" in done.err
 
@@ -100,7 +100,7 @@ def test_wrong_config_is_exit_code_2_and_leaves_artifacts_alone(
 
 
 def test_a_folder_in_use(invoke, two_link_copy):
-    with Store(two_link_copy).locked():
+    with Store(two_link_copy).lock():
         refused = invoke("run", TWO_LINK, "--results", two_link_copy, code=2)
     assert "another run is using this folder" in refused.err
 

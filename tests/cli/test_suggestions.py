@@ -56,6 +56,7 @@ def test_what_is_meant(error, typed, meant, tmp_path, monkeypatch):
         ("swap", ["swap:1|3"], "swap:1"),
         ("swap:5", ["swap:2|4|8"], "swap:4"),
         ("4", ["swap:4", "swap:2|4|8"], "swap:4"),
+        ("pareto:9", ["full", "base", "swap:1...7", "pareto:4"], "pareto:4"),
     ],
 )
 def test_the_nearest_choice(rejected, choices, nearest):

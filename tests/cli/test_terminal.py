@@ -21,9 +21,9 @@ def lines(monkeypatch):
     monkeypatch.setattr(terminal.time, "monotonic", lambda: now[0])
     shown = terminal._Lines(10.0, lambda p, left: told.append((p.done, left)))
 
-    def at(time, done, total=10.0, remark=""):
+    def at(time, done, total=10.0, detail=""):
         now[0] = time
-        shown.show(Progress("work", done, total, remark))
+        shown.show(Progress("work", done, total, detail))
         return told
 
     return at
@@ -37,7 +37,7 @@ def test_what_is_brief_is_not_told(lines):
 
 def test_what_says_something_at_its_end_is(lines):
     lines(0, 0)
-    assert lines(1, 10, remark="kappa 3") == [(10, None)]
+    assert lines(1, 10, detail="kappa 3") == [(10, None)]
 
 
 def test_long_work_is_told_with_the_time_that_is_left(lines):

@@ -115,13 +115,13 @@ def test_a_key_may_stand_for_a_merged_one():
     assert not read.problems
 
 
-def test_limits_in_degrees_are_remarked_on(write_config):
+def test_limits_in_degrees_are_warned_of(write_config):
     path = write_config(("[-pi/2, pi/2]", "[-90, 90]"))
     with pytest.warns(ParamreduceWarning, match="rad .m., not degrees"):
         load_config(path)
 
 
-def test_a_budget_of_terms_that_nothing_keeps_to_is_remarked_on(write_config):
+def test_a_budget_of_terms_that_nothing_keeps_to_is_warned_of(write_config):
     terms = "terms: {{acceleration_error: 0.05, functions: [{}]}}\nselected:"
     with pytest.warns(ParamreduceWarning, match="terms.acceleration_error is of the direct"):
         load_config(write_config(("selected:", terms.format("inverse"))))
@@ -172,7 +172,7 @@ def test_centre_of_mass_form_is_the_parallel_axis_theorem():
 @pytest.mark.parametrize(
     ("old", "new"), [("m: 2.0", "m: -2.0"), ("1e-3, 0, 0, 1/24", "1, 0, 0, 1/24")]
 )
-def test_bodies_that_cannot_exist_are_remarked_on_and_go_on(write_config, old, new):
+def test_bodies_that_cannot_exist_are_warned_of_and_go_on(write_config, old, new):
     with pytest.warns(ParamreduceWarning, match="upper"):
         load_config(write_config((old, new)))
 

@@ -7,11 +7,11 @@ import pytest
 from conftest import config_and_model, slope
 
 from paramreduce_cli.config import load_config
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory
-from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
@@ -25,15 +25,15 @@ def case(request):
     config, model = config_and_model(request.param)
     task = excitation_task(config.trajectories, model)
     settings = dataclasses.replace(task.settings, starts=1, polished=1, max_iterations=20)
-    return excitation_of(task), settings, task.constraints
+    return build_excitation(task), settings, task.constraints
 
 
 def test_gradient_with_the_barrier_against_finite_differences(case):
     excitation, settings, _ = case
     search = _Search(excitation, settings)
-    (start,) = search.starts([3])
-    assert search.kappa_start(start) < 1e5  # beyond, round-off in the Gram matrix shows
-    objective = search._objective(search._grid, Level(4, 80, 50, 0.1))
+    (start,) = search.draw_starts([3])
+    assert search.compute_start_kappa(start) < 1e5  # beyond, round-off in the Gram matrix shows
+    objective = search._build_objective(search._grid, Level(4, 80, 50, 0.1))
     x = start.free.ravel()
     value, gradient = objective(x)
     assert np.isfinite(value)
@@ -48,17 +48,17 @@ def test_a_motion_that_few_points_mistake_begins_anew_on_all(case):
     settings = dataclasses.replace(settings, points=40 * settings.harmonics)
     search, all_points = (_Search(excitation, settings) for _ in range(2))
     all_points._coarse = all_points._grid
-    (found,), (expected,) = search.starts([7]), all_points.starts([7])
+    (found,), (expected,) = search.draw_starts([7]), all_points.draw_starts([7])
     first, *_, last = search.plan.steps
-    search.descend(found, first)
-    assert not search._astray(found)
-    assert search._astray(dataclasses.replace(found, value=np.inf))
+    search.take_step(found, first)
+    assert not search._is_astray(found)
+    assert search._is_astray(dataclasses.replace(found, value=np.inf))
     few = dataclasses.replace(settings, points=2 * settings.harmonics + 1)
     search._coarse = _Search(excitation, few)._grid
-    assert search._astray(found)
-    search.descend(found, last)
+    assert search._is_astray(found)
+    search.take_step(found, last)
     for step in all_points.plan.steps:
-        all_points.descend(expected, step)
+        all_points.take_step(expected, step)
     assert found.free == pytest.approx(expected.free, rel=1e-9)
 
 
@@ -68,7 +68,7 @@ def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
     assert found.kappa < found.kappa_start
     harmonics = (found.coefficients.shape[1] - 1) // 2
     times = sample_times(settings.period, 4 * settings.points)
-    z, dz, _ = fourier_basis(settings.period, harmonics, times).states(found.coefficients)
+    z, dz, _ = evaluate_basis(settings.period, harmonics, times).evaluate(found.coefficients)
     limits = settings.limits
     assert ((z >= limits.lower) & (z <= limits.upper) & (np.abs(dz) <= limits.velocity)).all()
     q = Coordinates(excitation.coordinates.mechanism).positions(z, None)
@@ -81,7 +81,7 @@ def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
 
 def test_outside_the_bounds_there_is_no_value(case):
     excitation, settings, _ = case
-    basis = settings.basis()
+    basis = settings.build_basis()
     limits = LimitMap(settings.limits, basis, settings.mapping)
     positions = Follower(excitation.coordinates)
     n = limits.n_dof
@@ -107,7 +107,7 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
     model = build_model(config, config.model, Run())
     wanted = config.trajectories.model_copy(update={"scaling": "weighted", "harmonics": 3})
     task = excitation_task(wanted, model, 2 * np.pi)
-    excitation = excitation_of(task)
+    excitation = build_excitation(task)
     settings = dataclasses.replace(task.settings, starts=3, polished=2, max_iterations=40)
     for seed in range(2):
         found = optimise_trajectory(excitation, settings, [seed])

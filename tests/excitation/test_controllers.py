@@ -14,14 +14,14 @@ from oracles import capsules, pinocchio_model
 from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import ConfigError, DataError, NumericalError
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import optimise_trajectory
-from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
-from paramreduce_cli.motion.approach import Ways, at_rest
-from paramreduce_cli.motion.timed_motion import timed_motion
+from paramreduce_cli.motion.approach import PathPlanner, make_rest_state
+from paramreduce_cli.motion.timed_motion import sample_motion
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
@@ -53,7 +53,7 @@ def made():
 def states(trajectories, trajectory, finer=10):
     time = sample_times(trajectories.period, finer * trajectories.points)
     harmonics = (trajectory.coefficients.shape[1] - 1) // 2
-    return fourier_basis(trajectories.period, harmonics, time).states(trajectory.coefficients)
+    return evaluate_basis(trajectories.period, harmonics, time).evaluate(trajectory.coefficients)
 
 
 def test_all_is_kept_on_a_finer_grid(made):
@@ -88,8 +88,8 @@ def test_rest_costs_little(made):
 def test_gradients_of_loads_and_rest(seed):
     config, model = config_and_model("two_link", *ASKED)
     task = excitation_task(config.trajectories, model)
-    excitation = excitation_of(task)
-    basis = task.settings.basis()
+    excitation = build_excitation(task)
+    basis = task.settings.build_basis()
     limits = LimitMap(task.settings.limits, basis, "ball", rest_to_rest=True)
     loose = dataclasses.replace(
         excitation,
@@ -114,7 +114,7 @@ def test_noise_of_torques_weights_the_rows():
     config, model = config_and_model("two_link", *ASKED, "trajectories.torque_noise=[0.4, 0.02]")
     plain, _ = config_and_model("two_link", *ASKED)
     weighted, usual = (
-        excitation_of(excitation_task(c.trajectories, model)) for c in (config, plain)
+        build_excitation(excitation_task(c.trajectories, model)) for c in (config, plain)
     )
     rng = np.random.default_rng(0)
     z, dz, ddz = rng.normal(size=(3, 40, 2))
@@ -122,14 +122,18 @@ def test_noise_of_torques_weights_the_rows():
     W = dynamics.regressor(z, dz, ddz)[..., model.base.columns] / noise[:, None]
     W = W.reshape(80, -1)
     unit = W / np.linalg.norm(W, axis=0)
-    found = weighted.condition_numbers(z, dz, ddz)
+    found = weighted.compute_condition_numbers(z, dz, ddz)
     assert found["column-normalised"] == pytest.approx(np.linalg.cond(unit), rel=1e-9)
-    assert found != pytest.approx(usual.condition_numbers(z, dz, ddz), rel=0.05)
-    np.testing.assert_allclose(weighted.peak_torques(z, dz, ddz), usual.peak_torques(z, dz, ddz))
-    assert weighted.load_share(z, dz, ddz) == pytest.approx(usual.load_share(z, dz, ddz), rel=1e-9)
+    assert found != pytest.approx(usual.compute_condition_numbers(z, dz, ddz), rel=0.05)
+    np.testing.assert_allclose(
+        weighted.compute_peak_torques(z, dz, ddz), usual.compute_peak_torques(z, dz, ddz)
+    )
+    assert weighted.compute_load_share(z, dz, ddz) == pytest.approx(
+        usual.compute_load_share(z, dz, ddz), rel=1e-9
+    )
     made = optimize_trajectories(config.trajectories, model, None, Run(), Items())
     for trajectory in made.estimation:
-        own = weighted.condition_numbers(*states(made, trajectory, finer=1))
+        own = weighted.compute_condition_numbers(*states(made, trajectory, finer=1))
         assert own["column-normalised"] == pytest.approx(trajectory.kappa, rel=1e-6)
 
 
@@ -139,7 +143,7 @@ def test_limits_that_no_motion_keeps_are_said():
         "trajectories.start_pose=[-0.6, 0]",
     )  # fmt: skip
     task = excitation_task(config.trajectories, model)
-    excitation = excitation_of(task)
+    excitation = build_excitation(task)
     with pytest.raises(NumericalError, match="leave no motion") as error:
         optimise_trajectory(excitation, task.settings, [0])
     assert locate_error(error.value).key == ("trajectories", "torque_limits")
@@ -202,9 +206,9 @@ def test_bodies_of_a_clearance_must_be_there(ur10):
 @pytest.fixture(scope="module")
 def motion(made):
     _, model, trajectories = made
-    return timed_motion(
+    return sample_motion(
         model.mechanism, trajectories, trajectories.estimation[0], rate=500.0, title="two_link",
-        start_pose=np.array([-np.pi / 2, 0.0]), ways=Ways(model, trajectories),
+        start_pose=np.array([-np.pi / 2, 0.0]), ways=PathPlanner(model, trajectories),
     )  # fmt: skip
 
 
@@ -232,10 +236,10 @@ def test_ways_keep_to_torques_and_powers(motion, made):
     assert np.all(np.abs(tau) <= limits.torque * 1.02)
     assert np.all(np.abs(tau * states[1]) <= limits.power * 1.02)
     hanging, away = (
-        at_rest(np.array(pose)) for pose in ([-np.pi / 2, 0], [-np.pi / 2 + 0.7, -0.5])
+        make_rest_state(np.array(pose)) for pose in ([-np.pi / 2, 0], [-np.pi / 2 + 0.7, -0.5])
     )
-    (fast,) = Ways(model, trajectories).between(hanging, away)
-    z, dz, ddz = fast.states(np.linspace(0, fast.duration, 200))
+    (fast,) = PathPlanner(model, trajectories).plan(hanging, away)
+    z, dz, ddz = fast.compute_states(np.linspace(0, fast.duration, 200))
     still = np.zeros_like(z)
     peak, holding = (
         np.abs(pinocchio_model.inverse_dynamics(model.mechanism, model.values, *s)).max(axis=0)
@@ -244,13 +248,13 @@ def test_ways_keep_to_torques_and_powers(motion, made):
     slow = dataclasses.replace(
         trajectories, limits=dataclasses.replace(limits, torque=(peak + holding) / 2)
     )
-    (slower,) = Ways(model, slow).between(hanging, away)
+    (slower,) = PathPlanner(model, slow).plan(hanging, away)
     assert slower.duration > 1.05 * fast.duration
     weakest = dataclasses.replace(
         trajectories, limits=dataclasses.replace(limits, torque=np.full(2, 0.1))
     )
     with pytest.raises(DataError, match="keeps to the limits"):
-        Ways(model, weakest).between(hanging, away)
+        PathPlanner(model, weakest).plan(hanging, away)
 
 
 @pytest.mark.parametrize(("upper", "turned"), [(7.0, True), (2.0, False)])
@@ -261,10 +265,10 @@ def test_a_joint_is_turned_to_where_the_machine_stands(made, upper, turned):
     wide = dataclasses.replace(trajectories, limits=limits)
     pose = np.array([-np.pi / 2 + 2 * np.pi if turned else 1.9, 0.0])
     found, usual = (
-        timed_motion(
+        sample_motion(
             model.mechanism, wide, trajectories.estimation[0], rate=100.0, title="x", **where
         )
-        for where in ({"start_pose": pose, "ways": Ways(model, wide)}, {})
+        for where in ({"start_pose": pose, "ways": PathPlanner(model, wide)}, {})
     )
     first = int(np.searchsorted(found.time, found.lead - 1e-9))
     moved = found.z[first] - usual.z[0]
@@ -298,9 +302,9 @@ def test_a_way_around_what_is_in_the_way(ur10):
     blocked = np.linspace(start, end, 60)
     assert clear(blocked[[0, -1]]) > 0
     assert clear(blocked) < 0
-    ways = Ways(model, trajectories).between(at_rest(start), at_rest(end))
+    ways = PathPlanner(model, trajectories).plan(make_rest_state(start), make_rest_state(end))
     assert len(ways) > 1
-    states = [way.states(np.linspace(0, way.duration, 80)) for way in ways]
+    states = [way.compute_states(np.linspace(0, way.duration, 80)) for way in ways]
     assert min(clear(z) for z, _, _ in states) > 0
     for (z, dz, _), (z_after, dz_after, _) in itertools.pairwise(states):
         assert z[-1] == pytest.approx(z_after[0])
@@ -309,7 +313,7 @@ def test_a_way_around_what_is_in_the_way(ur10):
 
 def test_without_a_pose_it_is_the_trajectory_alone(made):
     _, model, trajectories = made
-    found = timed_motion(
+    found = sample_motion(
         model.mechanism, trajectories, trajectories.estimation[0], rate=100.0, title="x"
     )
     assert found.time[-1] == pytest.approx(trajectories.period, abs=0.01)
@@ -319,7 +323,9 @@ def test_without_a_pose_it_is_the_trajectory_alone(made):
 def test_a_pose_that_cannot_be_reached_is_said(made):
     _, model, trajectories = made
     with pytest.raises(DataError, match="start_pose"):
-        Ways(model, trajectories).between(at_rest(np.array([2.0, 0.0])), at_rest(np.zeros(2)))
+        PathPlanner(model, trajectories).plan(
+            make_rest_state(np.array([2.0, 0.0])), make_rest_state(np.zeros(2))
+        )
 
 
 def test_formats_hold_the_same(motion):

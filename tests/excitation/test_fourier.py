@@ -3,7 +3,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from paramreduce_cli.excitation.fourier import begun_at, fourier_basis, grid_margin, sample_times
+from paramreduce_cli.excitation.fourier import (
+    compute_grid_margin,
+    evaluate_basis,
+    sample_times,
+    shift_start,
+)
 
 
 def series(coefficients, period, t):
@@ -20,7 +25,7 @@ def test_series_and_its_derivatives():
     rng = np.random.default_rng(0)
     coefficients = rng.normal(size=(2, 7))
     t = np.linspace(0.1, 3, 11)
-    z, dz, ddz = fourier_basis(5.0, 3, t).states(coefficients)
+    z, dz, ddz = evaluate_basis(5.0, 3, t).evaluate(coefficients)
     step = 1e-5
     for j in range(2):
         before, here, after = (series(coefficients[j], 5.0, t + d) for d in (-step, 0, step))
@@ -34,25 +39,25 @@ def test_series_and_its_derivatives():
 def test_no_series_exceeds_its_grid_by_more_than_the_margin(harmonics, seed, extra):
     points = 2 * harmonics + extra
     coefficients = np.random.default_rng(seed).normal(size=(1, 1 + 2 * harmonics))
-    coarse = fourier_basis(1.0, harmonics, sample_times(1.0, points))
-    fine = fourier_basis(1.0, harmonics, sample_times(1.0, 4001))
+    coarse = evaluate_basis(1.0, harmonics, sample_times(1.0, points))
+    fine = evaluate_basis(1.0, harmonics, sample_times(1.0, 4001))
     for on_grid, between in zip(
-        coarse.states(coefficients), fine.states(coefficients), strict=True
+        coarse.evaluate(coefficients), fine.evaluate(coefficients), strict=True
     ):
-        bound = np.abs(on_grid).max() / grid_margin(harmonics, points)
+        bound = np.abs(on_grid).max() / compute_grid_margin(harmonics, points)
         assert np.abs(between).max() <= bound * (1 + 1e-9)
 
 
 def test_a_grid_too_coarse_for_the_harmonics_is_refused():
     with pytest.raises(ValueError, match="8 points"):
-        grid_margin(4, 8)
+        compute_grid_margin(4, 8)
 
 
 @pytest.mark.parametrize("time", [0.0, 0.3, 2.9, 400.1])
 def test_a_motion_can_begin_later(time):
     rng = np.random.default_rng(0)
     coefficients, times = rng.normal(size=(3, 9)), np.linspace(0, 1, 7)
-    later = fourier_basis(2.0, 4, time + times).states(coefficients)
-    moved = fourier_basis(2.0, 4, times).states(begun_at(coefficients, 2.0, time))
+    later = evaluate_basis(2.0, 4, time + times).evaluate(coefficients)
+    moved = evaluate_basis(2.0, 4, times).evaluate(shift_start(coefficients, 2.0, time))
     for one, other in zip(moved, later, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 if time > 100 else 1e-12)

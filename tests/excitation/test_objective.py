@@ -5,11 +5,11 @@ import pytest
 from conftest import config_and_model, slope
 
 from paramreduce_cli.excitation.criteria import criteria
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.scalings import scalings
-from paramreduce_cli.excitation.workers import excitation_of
+from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import JointLimits
@@ -21,12 +21,12 @@ NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
 @pytest.fixture(scope="module")
 def parts():
     config, model = config_and_model("puma560")
-    excitation = excitation_of(excitation_task(config.trajectories, model))
+    excitation = build_excitation(excitation_task(config.trajectories, model))
     return Dynamics(model.mechanism), model.base, excitation
 
 
 def basis_and_limits(mapping="gauge", acceleration=np.inf):
-    basis = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 100))
+    basis = evaluate_basis(2 * np.pi, 4, sample_times(2 * np.pi, 100))
     limits = JointLimits(
         *(np.full(6, limit) for limit in (-1.2, 1.6, 1.45, acceleration, np.inf, np.inf))
     )
@@ -54,18 +54,18 @@ def test_gradients_against_finite_differences(parts, criterion, scaling, mapping
 def test_sharp_objective_is_the_logarithm_of_the_condition_number(parts, scaling):
     measured = dataclasses.replace(parts[2], scaling=scalings[scaling])
     basis, limits, _ = basis_and_limits()
-    coefficients = limits.scaled(np.random.default_rng(2).normal(size=(6, 9)))
+    coefficients = limits.scale_to_limits(np.random.default_rng(2).normal(size=(6, 9)))
     follower = Follower(measured.coordinates)
     exact = Level(np.inf, np.inf, np.inf)
-    value, _ = measured.value_and_gradient(basis, coefficients, exact, follower)
-    kappa = measured.condition_numbers(*basis.states(coefficients))[scaling]
+    value, _ = measured.evaluate(basis, coefficients, exact, follower)
+    kappa = measured.compute_condition_numbers(*basis.evaluate(coefficients))[scaling]
     assert np.exp(value) == pytest.approx(kappa, rel=1e-4)
 
 
 def test_variants_by_their_definitions(parts):
     dynamics, base, excitation = parts
     basis, limits, _ = basis_and_limits()
-    states = basis.states(limits.scaled(np.random.default_rng(3).normal(size=(6, 9))))
+    states = basis.evaluate(limits.scale_to_limits(np.random.default_rng(3).normal(size=(6, 9))))
     W = dynamics.regressor(*states).reshape(-1, 60) / np.tile(NOMINAL, 100)[:, None]
     Wb = W[:, base.columns]
     equilibrated = Wb / np.abs(Wb).max(axis=0)
@@ -77,15 +77,15 @@ def test_variants_by_their_definitions(parts):
         "equilibrated": np.linalg.cond(equilibrated),
         "full": singular[0] / singular[35],
     }
-    assert excitation.condition_numbers(*states) == pytest.approx(expected, rel=1e-8)
+    assert excitation.compute_condition_numbers(*states) == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("acceleration", [np.inf, 2.0])
 def test_limits_hold_between_the_grid_points_and_are_reached(acceleration):
     _, limits, given = basis_and_limits("gauge", acceleration)
-    coefficients = limits.scaled(np.random.default_rng(4).normal(size=(6, 9)))
-    fine = fourier_basis(2 * np.pi, 4, sample_times(2 * np.pi, 5000))
-    z, dz, ddz = fine.states(coefficients)
+    coefficients = limits.scale_to_limits(np.random.default_rng(4).normal(size=(6, 9)))
+    fine = evaluate_basis(2 * np.pi, 4, sample_times(2 * np.pi, 5000))
+    z, dz, ddz = fine.evaluate(coefficients)
     assert (z >= given.lower).all()
     assert (z <= given.upper).all()
     assert (np.abs(dz) <= given.velocity).all()
@@ -98,7 +98,7 @@ def test_limits_hold_between_the_grid_points_and_are_reached(acceleration):
 def test_the_ball_leaves_small_series_alone():
     _, limits, _ = basis_and_limits("ball")
     small = np.random.default_rng(5).normal(size=(6, 9)) * 1e-3
-    coefficients, _ = limits.admissible(small, 30)
+    coefficients, _ = limits.map_to_admissible(small, 30)
     assert np.allclose(coefficients[:, 1:], small[:, 1:], rtol=1e-12)
 
 
@@ -106,7 +106,7 @@ def test_a_joint_cannot_meet_its_limit_by_being_parked_there():
     basis, limits, given = basis_and_limits()
     free = np.random.default_rng(6).normal(size=(6, 9)) * 1e-3
     free[:, 0] = 1e6
-    z, dz, _ = basis.states(limits.scaled(free))
+    z, dz, _ = basis.evaluate(limits.scale_to_limits(free))
     moved = np.maximum(np.ptp(z, axis=0) / (2 * given.reach), np.abs(dz).max(axis=0) / 1.45)
     assert (moved > 0.9).all()
     assert (z <= given.upper).all()
@@ -114,7 +114,7 @@ def test_a_joint_cannot_meet_its_limit_by_being_parked_there():
 
 def test_trajectories_follow_a_rounded_sign_and_are_measured_by_the_true_one():
     config, model = config_and_model("two_link", "drives.all.coulomb=2")
-    excitation = excitation_of(excitation_task(config.trajectories, model))
+    excitation = build_excitation(excitation_task(config.trajectories, model))
     rng = np.random.default_rng(0)
     states = tuple(rng.normal(size=(3, 50, 2)))
     expected = Dynamics(model.mechanism).regressor(*states)[..., model.base.columns]

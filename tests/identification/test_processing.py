@@ -251,9 +251,9 @@ def test_noise_is_what_lies_above_the_band():
         ),
     ],
 )
-def test_doubts(change, said):
+def test_warnings(change, said):
     assert any(said in text for text in made(change(two_link_log())).warnings)
 
 
-def test_no_doubts_of_a_good_log():
+def test_no_warnings_of_a_good_log():
     assert made(two_link_log()).warnings == ()

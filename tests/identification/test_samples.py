@@ -55,7 +55,7 @@ def test_torques_and_columns_pass_the_same_filter(arm):
 
 
 def read(folder, record):
-    return load_file(Store(folder).path(record), record, None, "")[0]
+    return load_file(Store(folder).get_path(record), record, None, "")[0]
 
 
 def test_motions_that_are_read_by_rows_are_those_in_memory(measured_results, monkeypatch):
@@ -73,7 +73,7 @@ def test_motions_that_are_read_by_rows_are_those_in_memory(measured_results, mon
         sets = [LoggedSet(motions, log, dynamics, "x") for motions in (one, other)]
         assert sets[0].n_samples == sets[1].n_samples > 50
         assert np.array_equal(sets[0].compute_factors(), sets[1].compute_factors())
-        for a, b in zip(*(found.states() for found in sets), strict=True):
+        for a, b in zip(*(found.iterate_states() for found in sets), strict=True):
             assert np.array_equal(a.tau, b.tau)
             assert np.array_equal(a.ddz, b.ddz)
 

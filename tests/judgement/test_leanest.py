@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from paramreduce_cli.config.schema import SelectedSection
-from paramreduce_cli.judgement.leanest import leanest
+from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.records import ModelErrors, Operations, SetErrors
 
 RESULTS = {
@@ -81,7 +81,7 @@ def terms(torque, acceleration, operations=50, held_out=None, budget=0.1):
 )
 def test_the_fewest_operations_within_what_is_asked_for(wanted, found, inverse, direct):
     for function, expected in (("inverse", inverse), ("direct", direct)):
-        one = leanest(function, SelectedSection(**wanted), RESULTS, found)
+        one = find_leanest(function, SelectedSection(**wanted), RESULTS, found)
         assert (one and one.model) == expected
         if expected is not None and expected != "terms":
             heuristic, _, n = expected.partition(":")

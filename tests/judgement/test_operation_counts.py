@@ -8,10 +8,10 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.judgement import operation_counts
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.records import CountedDynamics, Model, Reduction, Validation
-from paramreduce_cli.running.pipeline import pipeline
+from paramreduce_cli.running.pipeline import list_stages
 from paramreduce_cli.running.runner import Runner
 
-VALIDATE = next(stage for stage in pipeline() if stage.output is Validation)
+VALIDATE = next(stage for stage in list_stages() if stage.output is Validation)
 
 
 @pytest.fixture
@@ -21,7 +21,7 @@ def validated(two_link_copy, monkeypatch):
     store = Store(two_link_copy)
     Runner(config_of("two_link", ONE_FORMAT), store).run(VALIDATE, force=True)
     return [
-        load_file(store.path(record), record, None, "")[0]
+        load_file(store.get_path(record), record, None, "")[0]
         for record in (Model, Reduction, Validation)
     ]
 

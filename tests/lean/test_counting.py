@@ -13,7 +13,7 @@ from paramreduce_cli.reduction.models import base_model, full_model
 def models(two_link_results):
     store = Store(two_link_results)
     model, reduction = (
-        load_file(store.path(record), record, None, "")[0] for record in (Model, Reduction)
+        load_file(store.get_path(record), record, None, "")[0] for record in (Model, Reduction)
     )
     found = [
         reduction.make_model(name, k)

@@ -10,7 +10,7 @@ from conftest import CLOSED_LOOPS, config_of, slope
 from oracles.lagrange import Lagrange, forward_dynamics, tangent
 
 from paramreduce_cli.errors import DataError, NumericalError, ParamreduceWarning
-from paramreduce_cli.excitation.fourier import fourier_basis, sample_times
+from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.multibody import regressor
 from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -51,8 +51,8 @@ def motion(mechanism, points, seed=0):
     rng = np.random.default_rng(seed)
     coefficients = rng.normal(size=(mechanism.n_dof, 5)) * REACH[mechanism.robot] / 3
     coefficients[:, 0] = mechanism.loops.assembly[list(mechanism.independent)]
-    basis = fourier_basis(2 * np.pi, 2, sample_times(2 * np.pi, points))
-    return basis.time, Coordinates(mechanism).states(*basis.states(coefficients))
+    basis = evaluate_basis(2 * np.pi, 2, sample_times(2 * np.pi, points))
+    return basis.time, Coordinates(mechanism).states(*basis.evaluate(coefficients))
 
 
 def test_states_satisfy_the_closures_and_their_derivatives(case):
@@ -256,12 +256,12 @@ def test_a_rocker_driven_over_its_dead_point_is_refused():
 def test_follower_finds_what_a_fresh_start_finds():
     coordinates = Coordinates(closed("hexaglide"))
     follower = Follower(coordinates)
-    basis = fourier_basis(2 * np.pi, 2, sample_times(2 * np.pi, 40))
+    basis = evaluate_basis(2 * np.pi, 2, sample_times(2 * np.pi, 40))
     rng = np.random.default_rng(0)
     for _ in range(5):
         coefficients = rng.normal(size=(6, 5)) * 0.01
         coefficients[:, 0] = 1.5
-        z = basis.states(coefficients)[0]
+        z = basis.evaluate(coefficients)[0]
         found = follower(z)
         follower.keep()
         assert found == pytest.approx(coordinates.positions(z, None), abs=1e-10)

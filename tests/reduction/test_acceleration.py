@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from conftest import branching_tree, random_states
 
-from paramreduce_cli.judgement.acceleration import acceleration_errors
+from paramreduce_cli.judgement.acceleration import compute_acceleration_errors
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block
 
@@ -22,7 +22,7 @@ def setup(seed=0):
 
 def test_the_full_model_predicts_the_accelerations():
     dynamics, phi, blocks = setup()
-    found = acceleration_errors(blocks, dynamics.direct, phi[:, None], np.ones(5))
+    found = compute_acceleration_errors(blocks, dynamics.direct, phi[:, None], np.ones(5))
     assert found.error[0] < 1e-10
     assert found.smallest_eigenvalue[0] > 0
 
@@ -33,7 +33,7 @@ def test_error_condition_and_eigenvalue_by_definition():
     reduced[[4, 17, 29]] *= 0.9
     nominal = np.array([1.0, 2.0, 0.5, 3.0, 1.5])
     models = np.column_stack([phi, reduced])
-    found = acceleration_errors(blocks, dynamics.direct, models, nominal)
+    found = compute_acceleration_errors(blocks, dynamics.direct, models, nominal)
     (b,) = blocks
     M, delta = dynamics.direct(b.z, b.dz, reduced)
     ddz = np.linalg.solve(M, (b.tau - delta)[..., None])[..., 0]
@@ -47,6 +47,6 @@ def test_a_singular_mass_matrix_is_an_infinite_error():
     dynamics, _, blocks = setup()
     one = np.zeros((50, 1))
     one[0] = 1.0
-    found = acceleration_errors(blocks, dynamics.direct, one, np.ones(5))
+    found = compute_acceleration_errors(blocks, dynamics.direct, one, np.ones(5))
     assert np.isinf(found.error[0])
     assert np.isinf(found.condition[0])

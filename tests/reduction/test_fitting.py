@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from selecting import blocks_of, dependent_problem
 
-from paramreduce_cli.judgement.torque import torque_errors
+from paramreduce_cli.judgement.torque import compute_torque_errors
 from paramreduce_cli.reduction.fitting import fit
 
 
@@ -33,7 +33,7 @@ def test_norms_by_their_definitions():
     rng = np.random.default_rng(1)
     W, tau, weights = rng.normal(size=(60, 4)), rng.normal(size=(20, 3)), np.array([1, 5, 0.3])
     models = rng.normal(size=(4, 2))
-    found = torque_errors(blocks_of(W, tau, 0, 7), models, weights)
+    found = compute_torque_errors(blocks_of(W, tau, 0, 7), models, weights)
     rows = np.tile(weights, 20)
     chi = tau.ravel() / rows
     for m in range(2):

@@ -15,7 +15,7 @@ from paramreduce_cli.report.curves import curves
 def found(two_link_results):
     store = Store(two_link_results)
     reduction, validation = (
-        load_file(store.path(kind), kind, None, "")[0] for kind in (Reduction, Validation)
+        load_file(store.get_path(kind), kind, None, "")[0] for kind in (Reduction, Validation)
     )
     name = next(iter(validation.heuristics))
     reduction = replace(reduction, heuristics={"one": reduction.heuristics[name],

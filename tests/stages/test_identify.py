@@ -16,7 +16,7 @@ from paramreduce_cli.records import Identification, Samples, Validation
 
 @pytest.fixture(scope="module")
 def identification(measured_results):
-    path = Store(measured_results / "results").path(Identification)
+    path = Store(measured_results / "results").get_path(Identification)
     return load_file(path, Identification, "two_link", "identify")[0]
 
 
@@ -31,7 +31,7 @@ def test_friction_is_what_it_was(identification):
 
 def test_errors_are_those_of_the_samples(identification, measured_results):
     """Anew, by plain NumPy on what samples.h5 holds."""
-    path = Store(measured_results / "results").path(Samples)
+    path = Store(measured_results / "results").get_path(Samples)
     samples = load_file(path, Samples, "two_link", "sample")[0]
     for part, which in ((samples.estimation, "train"), (samples.validation, "held_out")):
         W = np.concatenate([b.W for b in part.iterate_blocks()])
@@ -56,14 +56,14 @@ def test_a_good_log_gives_no_hints(identification):
 def test_the_size_is_chosen_without_the_held_out_part(measured_copy, invoke):
     """Noise on what is held out changes errors there, and nothing else."""
     results = Store(measured_copy / "results")
-    before = load_file(results.path(Validation), Validation, "two_link", "validate")[0]
-    with h5py.File(results.path(Samples), "a") as file:
+    before = load_file(results.get_path(Validation), Validation, "two_link", "validate")[0]
+    with h5py.File(results.get_path(Samples), "a") as file:
         file["validation/tau"][...] += np.random.default_rng(0).normal(
             size=file["validation/tau"].shape
         )
         del file["validation/tau"].attrs["checks"]
     invoke("validate", measured_copy / "arm.yaml", "--results", results.folder, "--force")
-    after = load_file(results.path(Validation), Validation, "two_link", "validate")[0]
+    after = load_file(results.get_path(Validation), Validation, "two_link", "validate")[0]
     assert after.selected.n == before.selected.n
     name = before.selected.heuristic
     assert np.array_equal(
@@ -109,7 +109,9 @@ def test_other_estimators_agree_on_a_good_log(estimator, measured_copy, invoke, 
     folder = measured_copy / "results"
     settings = [f"identification.estimator={estimator}", "identification.consistency=none"]
     invoke("identify", measured_copy / "arm.yaml", "--results", folder, settings=settings)
-    found = load_file(Store(folder).path(Identification), Identification, "two_link", "identify")[0]
+    found = load_file(
+        Store(folder).get_path(Identification), Identification, "two_link", "identify"
+    )[0]
     assert found.consistency is None
     close = np.abs(found.full.values - identification.full.values)
     assert np.all(close < 4 * identification.full.deviations + 1e-6)
@@ -220,7 +222,7 @@ def test_another_heuristic_is_cross_validated_anew(measured_copy, invoke):
     for heuristic in ("essential", "forward-selection"):
         settings = [f"selected.heuristic={heuristic}"]
         invoke("validate", measured_copy / "arm.yaml", "--results", folder, settings=settings)
-        found = load_file(Store(folder).path(Validation), Validation, "two_link", "validate")[0]
+        found = load_file(Store(folder).get_path(Validation), Validation, "two_link", "validate")[0]
         assert list(found.cross_validation) == [heuristic] == [found.selected.heuristic]
 
 
@@ -264,7 +266,7 @@ def test_folds_of_which_nothing_is_left_are_none(tmp_path, invoke):
     settings = ["report.formats=[svg]", "sampling.log.folds=12", "identification.consistency=none"]
     invoke("run", log_config(tmp_path), "--results", tmp_path / "r", settings=settings)
     found = load_file(
-        Store(tmp_path / "r").path(Identification), Identification, "two_link", "identify"
+        Store(tmp_path / "r").get_path(Identification), Identification, "two_link", "identify"
     )[0]
     assert 2 <= found.full.folds.size < 12
     assert found.full.folds.min() > 1e-3

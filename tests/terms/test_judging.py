@@ -39,7 +39,7 @@ def judge(robot, z, dz, ddz, nominal, constraints=(), **more):
     samples = SimpleNamespace(
         estimation=part, validation=None, nominal_acceleration=np.ones(z.shape[1])
     )
-    limits = config_of(robot).trajectories.limits(z.shape[1])
+    limits = config_of(robot).trajectories.build_limits(z.shape[1])
     given = {"direct": False, "projected": False, "measured": False} | more
     return model, Judge(model, samples, nominal, limits, constraints, **given)
 

@@ -56,7 +56,7 @@ def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
     for name in ("nearby", "again"):
         monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)
     found = simplify.simplified(
-        searcher, [start], rounds=rounds, progress=lambda share, remark: told.append(share)
+        searcher, [start], rounds=rounds, progress=lambda share, detail: told.append(share)
     )
     counts = [one.program.n_operations for one in found.ends]
     assert counts == sorted(counts)

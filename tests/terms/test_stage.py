@@ -23,14 +23,14 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
-from paramreduce_cli.running.pipeline import pipeline, stages_to_run
+from paramreduce_cli.running.pipeline import list_stages, list_stages_to_run
 from paramreduce_cli.running.runner import Runner
 from paramreduce_cli.stages import reduce_terms
 from paramreduce_cli.terms import simplify
 from paramreduce_cli.texts import format_percent
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
-STAGES = {stage.name: stage for stage in pipeline()}
+STAGES = {stage.name: stage for stage in list_stages()}
 
 
 GEARED = """
@@ -79,7 +79,7 @@ def simplified(folder, robot, *overrides):
 
 def as_far(config, folder):
     runner = Runner(config, Store(folder))
-    for stage in stages_to_run(config):
+    for stage in list_stages_to_run(config):
         runner.run(stage)
         if stage.output is TermReduction:
             return runner
@@ -87,7 +87,7 @@ def as_far(config, folder):
 
 
 def loaded(runner, record):
-    return load_file(runner.store.path(record), record, None, "")[0]
+    return load_file(runner.store.get_path(record), record, None, "")[0]
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -198,7 +198,7 @@ def test_a_function_for_which_nothing_is_found_stops_no_run(tmp_path, monkeypatc
     ):
         runner = simplified(tmp_path, "two_link")
     assert list(loaded(runner, TermReduction).functions) == ["inverse"]
-    for stage in stages_to_run(runner.config):
+    for stage in list_stages_to_run(runner.config):
         runner.run(stage)
     summary = json.loads((tmp_path / "report" / "summary.json").read_text())
     assert [term["function"] for term in summary["terms"]] == ["inverse"]
@@ -487,7 +487,7 @@ def test_summary_and_page(two_link, tmp_path, invoke):
     runner = Runner(two_link.config, Store(tmp_path / "r"))
     for stage in ("validate", "report"):
         runner.run(STAGES[stage])
-    path = runner.store.path(Report)
+    path = runner.store.get_path(Report)
     summary = json.loads(path.read_text())
     assert [one["function"] for one in summary["terms"]] == ["inverse", "direct"]
     for one in summary["terms"]:

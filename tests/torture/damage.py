@@ -19,8 +19,8 @@ RECORDS = (*LAYOUTS, Report)
 def read(store, record):
     """All that a file holds, as something that can be compared."""
     if record is Report:
-        return load_summary(store.path(record))
-    return plain(load_file(store.path(record), record, None, "")[0])
+        return load_summary(store.get_path(record))
+    return plain(load_file(store.get_path(record), record, None, "")[0])
 
 
 def plain(value):
@@ -122,10 +122,10 @@ def try_damage(results, count, seed=0):
     """
     rng = np.random.default_rng(seed)
     store = Store(results)
-    robot = load_summary(store.path(Report))["robot"]
+    robot = load_summary(store.get_path(Report))["robot"]
     found = {}
     for record in RECORDS:
-        path = store.path(record)
+        path = store.get_path(record)
         if not path.exists():  # only runs on a log make some of them, only others the rest
             continue
         content, expected = path.read_bytes(), read(store, record)

@@ -5,7 +5,7 @@ from pathlib import Path
 import click
 from click.shell_completion import get_completion_class
 
-from paramreduce_cli.artifacts.atomic import atomically
+from paramreduce_cli.artifacts.atomic import replace_atomically
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import say
 
@@ -30,7 +30,7 @@ def completion(shell: str, install: bool) -> None:
         click.echo(text)
         return
     path = Path.home() / _PLACES[shell]
-    with atomically(path) as file:
+    with replace_atomically(path) as file:
         file.write_text(text, encoding="utf-8")
     more = "; have fpath+=~/.zfunc before compinit in ~/.zshrc" if shell == "zsh" else ""
     say(f"Wrote {path}: new shells know it{more}.")

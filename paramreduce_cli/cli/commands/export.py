@@ -27,7 +27,7 @@ from paramreduce_cli.export.robot_file import robot_file
 from paramreduce_cli.export.values import VALUES, values_file
 from paramreduce_cli.export.writing import Exported, exported_model
 from paramreduce_cli.importing.formats import formats
-from paramreduce_cli.judgement.leanest import leanest
+from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.records import (
     TERMS,
     FloatArray,
@@ -138,9 +138,9 @@ def export(
             loading.get(Validation),
             loading.get(Identification),
         )
-    stamp = store.stamp(records[-1])
+    stamp = store.read_stamp(records[-1])
     folder = output or store.folder / "export" / kind
-    origin = f"{store.path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
+    origin = f"{store.get_path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
     if kind == VALUES:
         known = loading[Model].mechanism if Model in loading else None
         files = values_file(chosen, title, origin, known, simplified)
@@ -174,7 +174,7 @@ def _leanest(config: Config, store: Store, function: str) -> str:
     """
     validation = up_to_date(config, store, Validation)
     terms = up_to_date(config, store, TermReduction) if config.terms is not None else None
-    found = leanest(function, config.selected, validation.heuristics, terms)
+    found = find_leanest(function, config.selected, validation.heuristics, terms)
     if found is None:
         raise ConfigError(
             f"--model {LEANEST}: the {function} dynamics of no model is within what is asked for. Give selected.torque_error, and more of it."

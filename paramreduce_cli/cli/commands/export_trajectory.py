@@ -16,8 +16,8 @@ from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.export.trajectory_formats import trajectory_formats
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.motion.approach import Ways
-from paramreduce_cli.motion.timed_motion import TimedMotion, timed_motion
+from paramreduce_cli.motion.approach import PathPlanner
+from paramreduce_cli.motion.timed_motion import TimedMotion, sample_motion
 from paramreduce_cli.records import SETS, Model, Trajectories, Trajectory
 
 _RUN = ("ros", "urscript")
@@ -70,11 +70,11 @@ def export_trajectory(
     model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
     start = None if pose is None else expand_per_joint(pose, loaded.n_dof)
-    ways = Ways(model, trajectories)
+    ways = PathPlanner(model, trajectories)
 
     def timed(which: str) -> TimedMotion:
         chosen, title = _chosen(trajectories, which), f"{loaded.robot} {which}"
-        return timed_motion(
+        return sample_motion(
             model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, ways=ways
         )  # fmt: skip
 

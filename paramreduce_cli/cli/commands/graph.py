@@ -6,7 +6,7 @@ import click
 
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.running.sweep import load_sweep
-from paramreduce_cli.running.workflow import FORMATS, slurm_script
+from paramreduce_cli.running.workflow import FORMATS, format_slurm_script
 
 _SLURM = "slurm"
 
@@ -23,5 +23,5 @@ def graph(kind: str, sweep: Path | None) -> None:
     """Print the stages with their inputs and outputs, as rules for Make, or a list of runs as a script for Slurm."""
     if (kind == _SLURM) != (sweep is not None):
         raise click.UsageError(f"--format {_SLURM} and --sweep FILE go together.")
-    text = FORMATS[kind]() if sweep is None else slurm_script(load_sweep(sweep))
+    text = FORMATS[kind]() if sweep is None else format_slurm_script(load_sweep(sweep))
     click.echo(text, nl=False)

@@ -14,7 +14,7 @@ import click
 import rich.markup
 import rich.table
 
-from paramreduce_cli.artifacts.inspection import contents
+from paramreduce_cli.artifacts.inspection import list_contents
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
@@ -92,7 +92,7 @@ def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
 
 
 def _say_contents(file: Path, as_json: bool) -> None:
-    attributes, datasets = contents(file)
+    attributes, datasets = list_contents(file)
     if as_json:
         keys = ("name", "shape", "content")
         emit(

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import click
 
-from paramreduce_cli.artifacts.report_files import newer_than_report, verify_report
+from paramreduce_cli.artifacts.report_files import list_newer_artifacts, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import no_results
 from paramreduce_cli.cli.terminal import complain, say
@@ -22,7 +22,7 @@ def open(results: Path) -> None:  # the file's name is the command's
     if not folder.is_dir():
         raise no_results(results, "open")
     verify_report(folder / "summary.json")
-    newer = newer_than_report(folder.parent)
+    newer = list_newer_artifacts(folder.parent)
     if newer:
         complain(
             f"Warning: {' and '.join(newer)} changed since this report was made; `paramreduce run` renews it."

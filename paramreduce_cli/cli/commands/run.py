@@ -8,7 +8,7 @@ import click
 import rich.box
 import rich.table
 
-from paramreduce_cli.artifacts.atomic import missing
+from paramreduce_cli.artifacts.atomic import make_missing_error
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import (
@@ -35,8 +35,8 @@ from paramreduce_cli.cli.terminal import (
 )
 from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.records import Report
-from paramreduce_cli.running.pipeline import absent_files, stages_to_run
-from paramreduce_cli.running.runner import Runner, asked
+from paramreduce_cli.running.pipeline import find_missing_files, list_stages_to_run
+from paramreduce_cli.running.runner import Runner, format_arguments
 from paramreduce_cli.texts import format_percent, format_percent_range
 
 _TABLE_WIDTH = 110
@@ -74,17 +74,17 @@ def run(
     loaded = load_config(config, overrides)
     store = results_store(loaded, results)
     _warn_of_open_tasks(config)
-    for path, key in absent_files(loaded):
-        raise missing(
+    for path, key in find_missing_files(loaded):
+        raise make_missing_error(
             path,
             remedy=f"It is named under {key} in {config}, whose comments may say where it is from.",
         )
-    with locate_errors(config, overrides), store.locked():
-        words = asked(config, results, overrides)
+    with locate_errors(config, overrides), store.lock():
+        words = format_arguments(config, results, overrides)
         _say_what_is_replaced(
             Runner(loaded, store, asked=words), changed=bool(overrides) and results is None
         )
-        stages = stages_to_run(loaded)
+        stages = list_stages_to_run(loaded)
         for number, stage in enumerate(stages, 1):
             label = f"{number}/{len(stages)} {stage.name}"
             with show_progress(label, quiet, as_json) as progress:
@@ -95,13 +95,13 @@ def run(
                      seconds=outcome.seconds, path=str(outcome.path))  # fmt: skip
             elif not quiet:
                 say_outcome(outcome)
-    summary = load_summary(store.path(Report))
+    summary = load_summary(store.get_path(Report))
     if not quiet:
         _say_summary(summary)
-        say(f"Report: {store.path(Report).with_name('index.html')}")
+        say(f"Report: {store.get_path(Report).with_name('index.html')}")
     selected = summary["selected"]
     if as_json:
-        page = store.path(Report).with_name("index.html")
+        page = store.get_path(Report).with_name("index.html")
         emit(event="done", report=str(page), selected=selected)
     if not quiet:
         say(f"Selected: {selected['reason']}")
@@ -127,10 +127,10 @@ def _warn_of_open_tasks(config: Path) -> None:
 def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
     """Say whose results are replaced, where they are of another config, or of one that --set changes."""
     assert runner.config is not None
-    others = [s for s in stages_to_run(runner.config) if runner.made_otherwise(s)]
+    others = [s for s in list_stages_to_run(runner.config) if runner.is_of_other_config(s)]
     if not others:
         return
-    stamp = runner.store.stamp(others[0].output)
+    stamp = runner.store.read_stamp(others[0].output)
     owner = stamp.config if stamp is not None else ""
     folder = runner.store.folder
     if owner not in ("", runner.config_name):

@@ -4,11 +4,11 @@ from pathlib import Path
 
 import click
 
-from paramreduce_cli.artifacts.store import file_of
+from paramreduce_cli.artifacts.store import get_file
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import CONFIG, SET
 from paramreduce_cli.config import load_config
-from paramreduce_cli.running.pipeline import stages_to_run
+from paramreduce_cli.running.pipeline import list_stages_to_run
 
 
 @click.command(
@@ -22,5 +22,5 @@ def stages(config: Path, overrides: tuple[str, ...], others: tuple[str, ...]) ->
 
     Options of other commands are ignored, so that Make can ask with the options of a run.
     """
-    for stage in stages_to_run(load_config(config, overrides)):
-        click.echo(f"{stage.name} {file_of(stage.output)}")
+    for stage in list_stages_to_run(load_config(config, overrides)):
+        click.echo(f"{stage.name} {get_file(stage.output)}")

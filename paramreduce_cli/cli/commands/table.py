@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from paramreduce_cli.artifacts.atomic import atomically
+from paramreduce_cli.artifacts.atomic import replace_atomically
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
@@ -134,7 +134,7 @@ def _write(prefix: Path, made: Mapping[str, Table], records: list[dict[str, Any]
         **{f"{part}.csv": one.to_csv() for part, one in made.items()},
         "-runs.csv": runs.to_csv(),
     }.items():
-        with atomically(prefix.with_name(f"{prefix.name}{ending}")) as path:
+        with replace_atomically(prefix.with_name(f"{prefix.name}{ending}")) as path:
             path.write_text(text, encoding="utf-8")
 
 
@@ -151,5 +151,5 @@ def _write_parquet(path: Path, records: list[dict[str, Any]]) -> None:
             "--parquet: needs pyarrow.",
             remedy="Install it with `pip install 'paramreduce[parquet]'`, or take the CSV.",
         ) from error
-    with atomically(path) as temporary:
+    with replace_atomically(path) as temporary:
         pyarrow.parquet.write_table(pyarrow.Table.from_pylist(records), temporary)

@@ -7,10 +7,10 @@ from paramreduce_cli.records import FloatArray
 
 
 def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
-    """Log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
+    """Return the log of (sum l^p)^(1/2p) (sum l^-p)^(1/2p), which goes to log kappa as p grows.
 
     Args:
-        eigenvalues: Of W'W, (r,).
+        eigenvalues: Eigenvalues of W'W, (r,).
         sharpness: The exponent p; infinite for the condition number itself.
 
     Returns:
@@ -23,13 +23,13 @@ def condition_number(eigenvalues: FloatArray, sharpness: float) -> tuple[float, 
         weight[np.argmax(logs)] += 1.0
         weight[np.argmin(logs)] -= 1.0
         return 0.5 * float(logs.max() - logs.min()), 0.5 * weight / safe
-    up, up_share = _log_sum_exp(sharpness * logs)
-    down, down_share = _log_sum_exp(-sharpness * logs)
+    up, up_share = _compute_log_sum_exp(sharpness * logs)
+    down, down_share = _compute_log_sum_exp(-sharpness * logs)
     return 0.5 * (up + down) / sharpness, 0.5 * (up_share - down_share) / safe
 
 
-def _log_sum_exp(values: FloatArray) -> tuple[float, FloatArray]:
-    """Log sum exp and each term's share; scipy's takes longer than all the rest here."""
+def _compute_log_sum_exp(values: FloatArray) -> tuple[float, FloatArray]:
+    """Return log sum exp and each term's share; SciPy's function takes longer than the rest of the criterion."""
     largest = float(values.max())
     terms = np.exp(values - largest)
     total = float(terms.sum())

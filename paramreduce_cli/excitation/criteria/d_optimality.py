@@ -7,7 +7,7 @@ from paramreduce_cli.records import FloatArray
 
 
 def d_optimality(eigenvalues: FloatArray, sharpness: float) -> tuple[float, FloatArray]:
-    """Minus half the logarithm of det W'W per parameter; smooth as it is."""
+    """Return minus half the logarithm of det W'W per parameter, which is smooth."""
     safe = np.maximum(eigenvalues, SMALLEST)
     r = eigenvalues.size
     return -0.5 * float(np.sum(np.log(safe))) / r, -0.5 / (safe * r)

@@ -7,7 +7,7 @@ from paramreduce_cli.records import FloatArray
 
 
 def column_normalised(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
-    """Columns divided by their 2-norms."""
+    """Return the columns divided by their 2-norms."""
     norms = np.maximum(np.sqrt(np.einsum("ij,ij->j", W, W)), np.finfo(float).tiny)
     scaled = W / norms
 

@@ -9,7 +9,7 @@ from paramreduce_cli.records import FloatArray
 
 
 def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
-    """Columns divided by their largest magnitude, then rows by theirs."""
+    """Return the columns divided by their largest magnitude, then the rows by theirs."""
     columns, pull_columns = _divide_by_largest(W, 0, norm)
     rows, pull_rows = _divide_by_largest(columns, 1, norm)
     return rows, lambda _, C: pull_columns(pull_rows(rows @ C))
@@ -18,7 +18,8 @@ def equilibrated(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArr
 def _divide_by_largest(
     W: FloatArray, axis: int, norm: float
 ) -> tuple[FloatArray, Callable[[FloatArray], FloatArray]]:
-    size, share = _largest(W, axis, norm)
+    """Return W divided by its largest magnitudes along an axis, and the pullback of derivatives."""
+    size, share = _compute_largest(W, axis, norm)
     scaled = W / size
 
     def pull(bar: FloatArray) -> FloatArray:
@@ -29,10 +30,10 @@ def _divide_by_largest(
     return scaled, pull
 
 
-def _largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:
-    """Largest magnitude along an axis and its derivative by W.
+def _compute_largest(W: FloatArray, axis: int, norm: float) -> tuple[FloatArray, FloatArray]:
+    """Return the largest magnitude along an axis and its derivative by W.
 
-    Smoothly as the norm of the next power of two, whose powers are cheap.
+    The maximum is smooth: a norm whose exponent is a power of two, as such powers are cheap.
     """
     magnitude = np.abs(W)
     largest = magnitude.max(axis=axis, keepdims=True)

@@ -5,5 +5,5 @@ from paramreduce_cli.records import FloatArray
 
 
 def weighted(W: FloatArray, beta: FloatArray, norm: float) -> tuple[FloatArray, Pullback]:
-    """Rows weighted by the nominal torques, columns as they are."""
+    """Return W with rows weighted by the nominal torques and columns as they are."""
     return W, lambda _, C: W @ C

@@ -1,10 +1,11 @@
 """Proofs of the best subsets that are kept as items of ``reduce``, by size or by a job's subtrees."""
 
+import warnings
 from collections.abc import Sequence
 
 import numpy as np
 
-from paramreduce_cli.errors import DataError
+from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.records import FloatArray, Items, ProofItem, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.merging import joined, merged
 
@@ -110,6 +111,12 @@ class KeptProofs:
                 incomplete = error
         if incomplete is not None and not joint:
             raise incomplete
+        if incomplete is not None:
+            warnings.warn(
+                f"{str(incomplete).rstrip('.')}; the proofs of fewer parts, which are complete, are used",
+                ParamreduceWarning,
+                stacklevel=2,
+            )
         return joint
 
     def _joined_jobs(self, count: int) -> list[Proofs]:
