@@ -38,7 +38,7 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.reduction.models import base_model, full_model, reduced_model
+from paramreduce_cli.reduction.models import make_base_model, make_full_model, make_reduced_model
 from paramreduce_cli.report.data_frames import frame
 from paramreduce_cli.running.in_memory import run_in_memory
 from paramreduce_cli.running.pipeline import find_maker, list_stages_to_run
@@ -48,15 +48,15 @@ __all__ = [
     "Config",
     "ParamreduceError",
     "Results",
-    "base_model",
     "build_model",
     "chosen",
     "code",
     "frame",
-    "full_model",
     "identify",
     "inverse_dynamics",
     "load_config",
+    "make_base_model",
+    "make_full_model",
     "make_report",
     "open_results",
     "optimize_trajectories",
@@ -232,7 +232,7 @@ def chosen(
     row = reduction.heuristics[heuristic].find_row(n)
     if row is None:
         raise KeyError(f"{heuristic}:{n}")
-    return reduced_model(reduction, heuristic, row, None if model is None else model.values)
+    return make_reduced_model(reduction, heuristic, row, None if model is None else model.values)
 
 
 def code(

@@ -41,14 +41,14 @@ def _compile(examples: dict[str, Callable[[], None]], name: str) -> None:
 
 def _prove_best_subsets() -> None:
     """Prove the best subset of a few columns, some of which depend on others."""
-    from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
+    from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, normalise_problem
     from paramreduce_cli.reduction.problem import SelectionProblem
 
     rng = np.random.default_rng(0)
     W = rng.normal(size=(9, 4)) @ rng.normal(size=(4, 6))
     columns = np.arange(6)
     problem = SelectionProblem(W, W @ rng.normal(size=6), columns, columns, ())
-    Search(unit_problem(problem), 3, 1.0, BEGINNING).advance(10)
+    Search(normalise_problem(problem), 3, 1.0, BEGINNING).advance(10)
 
 
 def _leave_out_terms() -> None:

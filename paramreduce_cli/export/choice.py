@@ -15,7 +15,12 @@ from paramreduce_cli.records import (
     TermReduction,
     Validation,
 )
-from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
+from paramreduce_cli.reduction.models import (
+    list_choices,
+    make_base_model,
+    make_full_model,
+    make_reduced_model,
+)
 from paramreduce_cli.texts import EXACT, format_percent, format_percent_range
 
 FULL, BASE = "full", "base"
@@ -43,9 +48,9 @@ def chosen_model(
         ConfigError: There is none of that name.
     """
     if text == FULL and model is not None:
-        return full_model(model), "full model"
+        return make_full_model(model), "full model"
     if text == BASE and model is not None:
-        return base_model(model), "base parameters"
+        return make_base_model(model), "base parameters"
     if text in (IDENTIFIED, CONSISTENT) and model is not None:
         assert identification is not None
         return _identified(text, model, identification)
@@ -58,7 +63,7 @@ def chosen_model(
     row = choice.find_row(reduction)
     if row is None:
         others = [FULL, BASE] if model is not None else []
-        choices = [*others, *known_choices(reduction)]
+        choices = [*others, *list_choices(reduction)]
         default = [f"{validation.selected.heuristic}:{validation.selected.n}"] if validation else []
         selected = f"; {default[0]} is selected" if default else ""
         raise ConfigError(
@@ -78,7 +83,7 @@ def chosen_model(
         if test.size:
             title += f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} motions of the test set"
     known = model.values if model is not None else None
-    return reduced_model(reduction, choice.heuristic, row, known), title
+    return make_reduced_model(reduction, choice.heuristic, row, known), title
 
 
 def _identified(
@@ -86,7 +91,7 @@ def _identified(
 ) -> tuple[ReducedModel, str]:
     if text == IDENTIFIED:
         found = identification.full
-        chosen = base_model(model)
+        chosen = make_base_model(model)
         worth = f"identified base parameters, {format_percent(found.held_out)} held out"
         return replace(chosen, values=found.values), worth
     consistency = identification.consistency
@@ -97,7 +102,7 @@ def _identified(
             command="identify",
         )
     worth = f"physically consistent parameters, {format_percent(consistency.held_out)} held out"
-    return full_model(replace(model, values=consistency.standard)), worth
+    return make_full_model(replace(model, values=consistency.standard)), worth
 
 
 def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from paramreduce_cli.records import CrossValidation, FloatArray, IntArray, ModelChoice
-from paramreduce_cli.reduction.fitting import fit, relative_error
+from paramreduce_cli.reduction.fitting import compute_relative_error, fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 Selector = Callable[[SelectionProblem], Sequence[IntArray]]
@@ -24,11 +24,11 @@ def cross_validate(
     """
     errors: list[dict[int, float]] = []
     for rest, left_out in folds:
-        learned, tested = problem.on(rest), problem.on(left_out)
+        learned, tested = problem.replace_data(rest), problem.replace_data(left_out)
         found = {}
         for subset in select(learned):
             parameters = fit(learned, subset).parameters
-            found[subset.size] = relative_error(tested, subset, parameters)
+            found[subset.size] = compute_relative_error(tested, subset, parameters)
         errors.append(found)
     n = sorted(set.intersection(*(set(found) for found in errors)))
     return CrossValidation(

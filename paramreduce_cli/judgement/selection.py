@@ -20,7 +20,7 @@ from paramreduce_cli.records import (
     Reduction,
     Selected,
 )
-from paramreduce_cli.reduction.models import reduced_model
+from paramreduce_cli.reduction.models import make_reduced_model
 from paramreduce_cli.texts import format_percent
 
 
@@ -68,7 +68,7 @@ def select_model(
             reason = f"{heuristic} with n = {n}: {missed}."
         else:
             reason = _explain_choice(wanted, tolerances, reduction, heuristic, n)
-    chosen = reduced_model(reduction, heuristic, row, known)
+    chosen = make_reduced_model(reduction, heuristic, row, known)
     return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
 
 

@@ -28,7 +28,7 @@ def measure_stability(
     values = np.full((len(factors), n), np.nan)
     errors = np.zeros(len(factors))
     for k, (_, factor) in enumerate(factors):
-        other = problem.on(factor)
+        other = problem.replace_data(factor)
         subset = select(other)
         fitted = fit(other, subset)
         chosen[k, subset] = True

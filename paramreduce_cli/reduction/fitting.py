@@ -1,4 +1,4 @@
-"""Approximate base parameters of a subset and the torque error they leave."""
+"""Least-squares fits of subsets, and the torque errors that they leave."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from paramreduce_cli.reduction.problem import SelectionProblem
 
 @dataclass(frozen=True)
 class Fit:
-    """Least-squares parameters of one subset."""
+    """A least-squares fit of one subset."""
 
     parameters: FloatArray
     """Approximate base parameters phi'_R, (n,)."""
@@ -35,12 +35,14 @@ def fit(problem: SelectionProblem, subset: IntArray) -> Fit:
     solution, *_ = np.linalg.lstsq(problem.X[:, subset], right, rcond=cut)
     solution = solution / problem.lengths[subset, None]
     parameters = solution[:, -1]
-    error = relative_error(problem, subset, parameters)
+    error = compute_relative_error(problem, subset, parameters)
     return Fit(parameters, solution[:, :-1], error, dependent)
 
 
-def relative_error(problem: SelectionProblem, subset: IntArray, parameters: FloatArray) -> float:
-    """Torque error of a subset with some parameters, a share of the torques."""
+def compute_relative_error(
+    problem: SelectionProblem, subset: IntArray, parameters: FloatArray
+) -> float:
+    """Return the torque error of a subset with given parameters, as a fraction of the torques."""
     left = problem.chi - problem.W[:, subset] @ parameters
     total = np.linalg.norm(problem.chi)
     return float(np.linalg.norm(left) / total) if total > 0 else 0.0

@@ -1,7 +1,7 @@
-"""Parameters that play the same role on several bodies, as columns and groups of columns.
+"""Groups of parameters that play the same role on several bodies, as columns and groups of columns.
 
-A tied group has one value for all its parameters: its columns of W add up to one. The
-parameters of an untied group keep a value each, and are chosen or left out together.
+A tied group has one value for all its parameters: its columns of W add up to one. The parameters of an untied group are
+only selected together.
 """
 
 from collections.abc import Sequence
@@ -14,7 +14,7 @@ from paramreduce_cli.records import LAST, Columns, FloatArray, IntArray, order_b
 
 @dataclass(frozen=True)
 class Group:
-    """Names of parameters that belong together."""
+    """A group of parameters by name."""
 
     name: str
     members: tuple[str, ...]
@@ -32,13 +32,11 @@ class GroupedColumns:
     """Columns that are chosen together."""
 
 
-def grouped_columns(
-    names: Sequence[str], ranks: IntArray, groups: Sequence[Group]
-) -> GroupedColumns:
-    """Replace the columns of tied groups by one each, and find those of the others.
+def group_columns(names: Sequence[str], ranks: IntArray, groups: Sequence[Group]) -> GroupedColumns:
+    """Replace the columns of each tied group by one, and find those of the other groups.
 
     Args:
-        names: Of the standard parameters, (n_standard,).
+        names: Names of the standard parameters, (n_standard,).
         ranks: Their ranks of preference, (n_standard,); a tied group has that of its members
             where they agree, and comes last where not.
         groups: With members among them, each in one group at most.
@@ -58,8 +56,8 @@ def grouped_columns(
     return GroupedColumns(Columns(tuple(labels), column), order_by_preference(wanted), together)
 
 
-def merged_factor(factor: FloatArray, columns: Columns) -> FloatArray:
-    """The triangular factor of [W T | chi], T adding up the columns of tied groups."""
+def merge_factor(factor: FloatArray, columns: Columns) -> FloatArray:
+    """Return the triangular factor of [W T | chi], where T adds up the columns of tied groups."""
     if not columns.tied:
         return factor
     added = np.column_stack([factor[:, :-1] @ columns.expansion, factor[:, -1]])

@@ -1,4 +1,4 @@
-"""What criteria may need besides the least-squares problem."""
+"""Inputs of criteria besides the least-squares problem."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from paramreduce_cli.records import FloatArray, IntArray
 
 @dataclass(frozen=True)
 class AccelerationData:
-    """Linear maps of mass matrix and bias at some samples, by the columns chosen among."""
+    """The linear maps of mass matrix and bias at some samples, by the columns of the selection."""
 
     A: FloatArray
     """M = A @ phi, (n_samples, n_dof, n_dof, n)."""
@@ -24,7 +24,7 @@ class AccelerationData:
 
 @dataclass(frozen=True)
 class CriterionInputs:
-    """Handed in by whoever asks for a criterion; made when it is first asked for."""
+    """The inputs of criteria, computed when a criterion asks for them."""
 
     error_limit: float
     """Torque error under which the cost is minimised."""

@@ -1,4 +1,4 @@
-"""The models that parameters make: the full one, base parameters, and every subset found."""
+"""Models of parameters: the full model, the base parameters, and every subset found."""
 
 from dataclasses import replace
 
@@ -19,34 +19,33 @@ _STIFF = 1e-6
 """Size of a large change of a drive's parameter: much less than that of a body's."""
 
 
-def known_choices(reduction: Reduction) -> list[str]:
-    """List what :class:`ModelChoice` may be, a word for each heuristic; all sizes where groups leave some out."""
+def list_choices(reduction: Reduction) -> list[str]:
+    """List what :class:`ModelChoice` may be: a word for each heuristic, with all sizes if groups leave some out."""
     return [
         f"{name}:{f'1...{found.n[-1]}' if found.n[-1] == found.n.size else '|'.join(map(str, found.n))}"
         for name, found in reduction.heuristics.items()
     ]
 
 
-def full_model(model: Model) -> ReducedModel:
-    """All parameters that change the torques."""
+def make_full_model(model: Model) -> ReducedModel:
+    """Return the model with all parameters that change the torques."""
     kept = np.flatnonzero(model.affecting)
-    return _of_columns(model, kept, model.values[kept])
+    return _make_model(model, kept, model.values[kept])
 
 
-def base_model(model: Model) -> ReducedModel:
-    """The base parameters."""
-    return _of_columns(model, model.base.columns, model.base_values, model.base.expressions)
+def make_base_model(model: Model) -> ReducedModel:
+    """Return the model of the base parameters."""
+    return _make_model(model, model.base.columns, model.base_values, model.base.expressions)
 
 
-def closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
-    """Standard parameters that are the same model: of all that have its base parameters, those
-    closest to the robot's own, each measured by the size of its body.
-
-    Those of drives stay what they are wherever bodies can make up for it.
+def find_closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
+    """Return standard parameters that make the same model: of all that have its base parameters, those closest to the
+    robot's own, measured by the size of each body. Parameters of drives stay what they are as far as bodies can make up
+    for them.
 
     Args:
-        model: Of the robot.
-        chosen: The model.
+        model: Model of the robot.
+        chosen: Model whose torques the parameters must give.
 
     Returns:
         (n_parameters,)
@@ -56,13 +55,13 @@ def closest_standard(model: Model, chosen: ReducedModel) -> FloatArray:
     to_base[np.arange(columns.size), columns] = 1.0
     to_base[:, np.setdiff1d(np.arange(n), columns)] = model.base.beta
     missing = to_base @ (chosen.standard - model.values)
-    sizes = _sizes(model)
+    sizes = _compute_scales(model)
     change, *_ = np.linalg.lstsq(to_base * sizes, missing, rcond=None)
     return model.values + sizes * change
 
 
-def _sizes(model: Model) -> FloatArray:
-    """What is a large change of each parameter, (n_parameters,)."""
+def _compute_scales(model: Model) -> FloatArray:
+    """Return the size of a large change of each parameter, (n_parameters,)."""
     sizes = _STIFF * (np.abs(model.values) + 1.0)
     for rigid in model.mechanism.rigid:
         values = {kind: abs(float(model.values[column])) for kind, column in rigid.columns.items()}
@@ -74,25 +73,26 @@ def _sizes(model: Model) -> FloatArray:
     return sizes
 
 
-def _of_columns(
+def _make_model(
     model: Model, kept: IntArray, values: FloatArray, expressions: tuple[str, ...] = ()
 ) -> ReducedModel:
-    """A model that keeps standard parameters, which stand for themselves unless more is said."""
+    """Return a model that keeps some standard parameters, each its own expression unless expressions are given."""
     names = model.mechanism.parameter_names
     chosen = Columns(names, np.arange(len(names))).make_model(kept, values)
     return replace(chosen, expressions=expressions or chosen.names)
 
 
-def reduced_model(
+def make_reduced_model(
     reduction: Reduction, heuristic: str, row: int, known: FloatArray | None = None
 ) -> ReducedModel:
-    """A subset with its expressions.
+    """Return a subset as a model with expressions.
 
     Args:
-        reduction: Where it was found.
-        heuristic: By which one.
-        row: In which it stands.
-        known: Standard parameters, (n_standard,), by which terms are ordered and the small ones counted.
+        reduction: Reduction that holds the subset.
+        heuristic: Heuristic that found the subset.
+        row: Row of the subset.
+        known: Standard parameters, (n_standard,), by which the terms of expressions are ordered and small terms are
+            counted.
     """
     found, columns = reduction.heuristics[heuristic], reduction.columns
     whole = None if known is None else np.linalg.pinv(columns.expansion) @ known

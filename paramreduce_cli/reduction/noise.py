@@ -1,4 +1,4 @@
-"""How noisy the torques of each joint are, from what a fit of all parameters leaves."""
+"""Torque noise of each joint, estimated from the residuals of all parameters."""
 
 import numpy as np
 
@@ -10,8 +10,8 @@ _ROUNDS = 5
 """Of fits weighted by the noise that the one before has left; it hardly changes after three."""
 
 
-def residual_deviation(factors: FloatArray, parameters: FloatArray, n_samples: int) -> FloatArray:
-    """Root mean squares of each joint's residuals, (n_dof,).
+def compute_residual_rms(factors: FloatArray, parameters: FloatArray, n_samples: int) -> FloatArray:
+    """Return the root mean square of each joint's residuals, (n_dof,).
 
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.
@@ -23,11 +23,11 @@ def residual_deviation(factors: FloatArray, parameters: FloatArray, n_samples: i
     return result
 
 
-def joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int) -> FloatArray:
-    """Standard deviation of each joint's torque noise, (n_dof,); infinite where none is measured.
+def estimate_joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int) -> FloatArray:
+    """Return the standard deviation of each joint's torque noise, (n_dof,); infinite where no torque is measured.
 
-    Iterated weighted least squares on all parameters [Gautier1997]; degrees of freedom that the
-    fit uses up are given back.
+    The fit is iterated weighted least squares on all parameters [Gautier1997], corrected for the degrees of freedom
+    that it uses.
 
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.
@@ -40,7 +40,7 @@ def joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int) -> Float
     free = max(0.1, 1 - rank / (n_samples * np.count_nonzero(measured)))
     for _ in range(_ROUNDS):
         parameters = least_squares(combined_factor(factors, noise))
-        left = residual_deviation(factors, parameters, n_samples) / np.sqrt(free)
+        left = compute_residual_rms(factors, parameters, n_samples) / np.sqrt(free)
         # A joint that is fitted without any residual would take all the weight.
         left = np.maximum(left, 1e-6 * scale)
         noise = np.where(measured, left, np.inf)

@@ -1,7 +1,6 @@
-"""What a heuristic asks of a criterion: how good a subset is, and what adding or removing does.
+"""Base class of criteria: the score of a subset, and estimates of what adding or removing a unit does.
 
-Heuristics work on units, a column or a group each, numbered in order of preference; a subset
-is a tuple of units in the order in which they were taken.
+Heuristics work on units, a column or a group each, numbered in order of preference; a subset is a tuple of units.
 """
 
 from __future__ import annotations
@@ -13,12 +12,7 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.fitting import Fit, fit
-from paramreduce_cli.reduction.problem import (
-    FULL_PRECISION,
-    TIE,
-    SelectionProblem,
-    first_of_the_best,
-)
+from paramreduce_cli.reduction.problem import FULL_PRECISION, TIE, SelectionProblem, find_first_best
 
 Units = tuple[int, ...]
 
@@ -44,30 +38,32 @@ class Objective(ABC):
         """Unit of each column of ``problem.columns``, (n_candidates,)."""
         return np.repeat(np.arange(self.widths.size), self.widths)
 
-    def per_unit(self, values: FloatArray) -> FloatArray:
-        """What the columns of each unit have, averaged over its columns, (n_units,)."""
+    def average_by_unit(self, values: FloatArray) -> FloatArray:
+        """Return the mean over the columns of each unit, (n_units,)."""
         if self.single:
             return values
         return np.bincount(self.owner, values, self.widths.size) / self.widths
 
     @abstractmethod
     def score(self, kept: Units) -> float:
-        """What is minimised."""
+        """Return the quantity that the criterion minimises."""
 
     @abstractmethod
-    def gains(self, kept: Units) -> FloatArray:
-        """How much each unit is worth, per column, if it is added; -inf if it must not be.
-
-        Higher is better; only comparisons count. (n_units,)
+    def estimate_gains(self, kept: Units) -> FloatArray:
+        """Return the benefit of adding each unit, per column, (n_units,); -inf if the unit must not be added or was not
+        evaluated. Higher is better; only comparisons count.
         """
 
     @abstractmethod
-    def losses(self, kept: Units) -> FloatArray:
-        """What the removal of each unit costs, per column; inf if it must not go, (n_units,)."""
+    def estimate_losses(self, kept: Units) -> FloatArray:
+        """Return the cost of removing each unit, per column, (n_units,); inf if the unit must not be removed or was not
+        evaluated.
+        """
 
     @abstractmethod
-    def exchanged(self, kept: Units) -> Units:
-        """The subset after the best exchange of one unit for another of the same width.
+    def swap_best(self, kept: Units) -> Units:
+        """Return the subset after the best swap of one unit for another of the same width, or the subset itself if no
+        swap helps.
 
         The subset itself where none is promising.
         """
@@ -83,54 +79,54 @@ class Objective(ABC):
         return None
 
     def fit(self, subset: IntArray) -> Fit:
-        """Values of the parameters kept."""
+        """Fit the parameters of a subset of columns."""
         return fit(self.problem, subset)
 
-    def columns(self, kept: Units) -> IntArray:
-        """Columns of a subset, in the order in which they were taken."""
+    def list_columns(self, kept: Units) -> IntArray:
+        """Return the columns of a subset, in the order in which they were added."""
         return np.concatenate([np.zeros(0, np.int64), *(self.units[u] for u in kept)])
 
-    def width(self, kept: Units) -> int:
-        """Number of its columns."""
+    def count_columns(self, kept: Units) -> int:
+        """Return the number of a subset's columns."""
         return len(kept) if self.single else int(self.widths[list(kept)].sum())
 
-    def units_of(self, columns: IntArray) -> Units:
-        """Units of a subset of columns, in their order."""
+    def find_units(self, columns: IntArray) -> Units:
+        """Return the units of a subset of columns, in their order."""
         owner = {int(c): k for k, unit in enumerate(self.units) for c in unit}
         return tuple(dict.fromkeys(owner[int(c)] for c in columns))
 
-    def with_best(self, kept: Units, most: int) -> Units:
-        """The subset with the unit that is worth most; itself where nothing may be added.
+    def add_best(self, kept: Units, most: int) -> Units:
+        """Return the subset with the most beneficial unit added, or the subset itself if no unit may be added.
 
         Args:
-            kept: The subset.
-            most: Columns it may have then.
+            kept: Subset of units.
+            most: Largest number of columns that the new subset may have.
         """
-        room = most - self.width(kept)
+        room = most - self.count_columns(kept)
         if room <= 0:
             return kept
-        gains = self.gains(kept)
+        gains = self.estimate_gains(kept)
         if not self.single:
             gains = np.where(self.widths <= room, gains, -np.inf)
-        best = first_of_the_best(gains)
+        best = find_first_best(gains)
         return (*kept, best) if gains[best] > -np.inf else kept
 
-    def without_least(self, kept: Units) -> Units:
-        """The subset without the unit that costs least; ties remove the least preferred."""
-        losses = self.losses(kept)
-        return without(kept, losses.size - 1 - first_of_the_best(-losses[::-1]))
+    def remove_worst(self, kept: Units) -> Units:
+        """Return the subset without the unit whose removal costs least; of equal units the least preferred is removed."""
+        losses = self.estimate_losses(kept)
+        return remove_unit(kept, losses.size - 1 - find_first_best(-losses[::-1]))
 
-    def improved(self, kept: Units) -> tuple[Units, float]:
-        """Exchange until nothing improves; the subset and its score."""
+    def improve(self, kept: Units) -> tuple[Units, float]:
+        """Swap units until no swap improves the score; return the subset and its score."""
         score = self.score(kept)
         while True:
-            other = self.exchanged(kept)
+            other = self.swap_best(kept)
             value = self.score(other) if other != kept else score
             if not value < score * (1 - TIE):
                 return kept, score
             kept, score = other, value
 
 
-def without(kept: Units, unit: int) -> Units:
-    """A subset without one of its units."""
+def remove_unit(kept: Units, unit: int) -> Units:
+    """Return a subset without one of its units."""
     return tuple(u for u in kept if u != unit)

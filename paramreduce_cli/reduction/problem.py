@@ -1,4 +1,4 @@
-"""The selection problem every heuristic works on, and the rules they share."""
+"""The selection problem that every heuristic works on, and rules that heuristics share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ TIE = 1e-9
 
 @dataclass(frozen=True)
 class SelectionProblem:
-    """Least squares W phi = chi, weighted and compressed to a triangular factor.
+    """A least-squares problem W phi = chi, weighted and compressed to a triangular factor.
 
     Attributes:
         W: (k, n)
@@ -36,21 +36,21 @@ class SelectionProblem:
     groups: tuple[IntArray, ...] = ()
     certifiable: bool = True
 
-    def on(self, factor: FloatArray) -> SelectionProblem:
-        """The same choice on other data, a triangular factor of [W | chi]."""
+    def replace_data(self, factor: FloatArray) -> SelectionProblem:
+        """Return the same selection on other data, given as a triangular factor of [W | chi]."""
         W, chi = factor[:, :-1], factor[:, -1]
         return replace(self, W=W, chi=chi)
 
     @property
     def candidates_by_preference(self) -> IntArray:
-        """The candidates, the most wanted first."""
+        """Candidates, the most preferred first."""
         return self.preference[np.isin(self.preference, self.candidates)]
 
     @cached_property
     def units(self) -> list[IntArray]:
-        """What is chosen as one, candidates alone or in groups, the most wanted first.
+        """Units of the selection, candidates alone or in groups, the most preferred first.
 
-        A group stands where its most wanted member does, its members in order of preference.
+        A group stands where its most preferred member does, with its members in order of preference.
         """
         owner = {int(column): k for k, group in enumerate(self.groups) for column in group}
         found: dict[int, list[int]] = {}
@@ -60,7 +60,7 @@ class SelectionProblem:
 
     @cached_property
     def columns(self) -> IntArray:
-        """The columns of all units, one unit after the other, (n_candidates,)."""
+        """Columns of all units, one unit after the other, (n_candidates,)."""
         return np.concatenate([np.zeros(0, np.int64), *self.units])
 
     @cached_property
@@ -83,10 +83,10 @@ class SelectionProblem:
         return self.chi / (np.linalg.norm(self.chi) or 1.0)
 
 
-def first_of_the_best(scores: FloatArray) -> int:
-    """Position of the first score that is the largest up to rounding.
+def find_first_best(scores: FloatArray) -> int:
+    """Return the position of the first score that is the largest up to rounding.
 
-    Scores come in order of preference, so this is where ties are broken.
+    Scores are in order of preference, so this breaks ties.
     """
     best = scores.max()
     return int(np.argmax(scores >= best - TIE * abs(best)))

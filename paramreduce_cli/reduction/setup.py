@@ -1,4 +1,4 @@
-"""What a config asks of a selection: columns and groups, effort, and the problem of an estimation set."""
+"""Selection as a config asks for it: columns and groups, effort, and the problem of an estimation set."""
 
 import warnings
 
@@ -8,23 +8,23 @@ from paramreduce_cli.config.schema import ReductionSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.multibody.base_parameters import affecting_columns
 from paramreduce_cli.records import BoolArray, FloatArray, Model, Run, Samples
-from paramreduce_cli.reduction.grouping import Group, GroupedColumns, grouped_columns
+from paramreduce_cli.reduction.grouping import Group, GroupedColumns, group_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort
 
 
-def selection_columns(wanted: ReductionSection, samples: Samples) -> GroupedColumns:
-    """The columns among which is chosen."""
+def make_columns(wanted: ReductionSection, samples: Samples) -> GroupedColumns:
+    """Return the columns that the selection chooses among."""
     groups = [
         Group(name, tuple(members), section.tied)
         for section in wanted.groups
         for name, members in section.list_groups().items()
     ]
-    return grouped_columns(samples.names, samples.preference, groups)
+    return group_columns(samples.names, samples.preference, groups)
 
 
-def effort(wanted: ReductionSection, run: Run) -> Effort:
-    """How hard the config asks to search."""
+def make_effort(wanted: ReductionSection, run: Run) -> Effort:
+    """Return the effort that the config asks for."""
     return Effort(
         time_limit=wanted.best_subset.time_limit,
         node_limit=wanted.best_subset.node_limit,
@@ -38,6 +38,7 @@ SIZES = (1e-100, 1e100)
 
 
 def _check_sizes(what: str, values: FloatArray) -> None:
+    """Raise DataError if numbers are too large or too small to calculate with."""
     largest = float(np.abs(values).max())
     small, large = SIZES
     if np.isnan(largest) or largest > large or 0 < largest < small:
@@ -51,20 +52,21 @@ _ROUND_OFF = 1e-15
 """Length of a column, relative to the longest, up to which its numbers are taken for round-off."""
 
 
-def _column_lengths(W: FloatArray) -> FloatArray:
+def _compute_lengths(W: FloatArray) -> FloatArray:
     """Return the largest magnitude in each column, whose square need not be a number."""
     lengths: FloatArray = np.abs(W).max(axis=0)
     return lengths
 
 
-def _affecting_columns(W: FloatArray, values: FloatArray | None) -> BoolArray:
-    """Find the columns with an effect, (n,): by what each contributes too where its value is known."""
+def _find_affecting(W: FloatArray, values: FloatArray | None) -> BoolArray:
+    """Return which columns have an effect, (n,), also by what each contributes if its value is known."""
     affecting = affecting_columns(W)
     return affecting if values is None else affecting | affecting_columns(W * values)
 
 
 def _warn_of_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:
-    lengths = _column_lengths(W)
+    """Warn of columns that count as zero beside much longer ones."""
+    lengths = _compute_lengths(W)
     small = np.flatnonzero((lengths > 0) & ~affecting)
     if small.size:
         largest = int(np.argmax(lengths))
@@ -78,7 +80,7 @@ def _warn_of_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str
         )
 
 
-def selection_problem(
+def make_problem(
     factor: FloatArray, model: Model | None, grouped: GroupedColumns, values: FloatArray | None
 ) -> SelectionProblem:
     """Return the least-squares problem behind a triangular factor of [W | chi].
@@ -102,9 +104,9 @@ def selection_problem(
         affecting = model.affecting @ grouped.columns.expansion > 0
     else:
         known = values if not grouped.columns.tied else None
-        affecting = _affecting_columns(W, known)
+        affecting = _find_affecting(W, known)
         _warn_of_small_columns(W, affecting, grouped.columns.names)
-        lengths = _column_lengths(W)
+        lengths = _compute_lengths(W)
         certifiable = not np.any(lengths[~affecting] > _ROUND_OFF * lengths.max())
     candidates = np.flatnonzero(affecting)
     if candidates.size == 0:

@@ -1,4 +1,4 @@
-"""What a heuristic is asked for, and what it answers."""
+"""The task of a heuristic, and the subsets that it returns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from paramreduce_cli.reduction.objective import Objective, Units
 
 @dataclass(frozen=True)
 class Effort:
-    """How hard to search."""
+    """The effort of a search: kicks, time, nodes and threads."""
 
     kicks: int = 8
     """Random changes of a subset from which the swap search starts again."""
@@ -32,7 +32,7 @@ class Effort:
     """Threads that search for proofs."""
 
 
-def _passed_on() -> None:
+def _interrupt() -> None:
     raise KeyboardInterrupt
 
 
@@ -55,7 +55,7 @@ class SelectionTask:
     keep: Callable[[Proofs], None] = lambda _: None
     """Called with the proof of a size that took long, as soon as its search has ended."""
     progress: Callable[[Progress], None] = lambda _: None
-    interrupted: Callable[[], None] = _passed_on
+    interrupted: Callable[[], None] = _interrupt
     """Told that a KeyboardInterrupt was met; raises it again where nothing is worth keeping."""
     known: dict[Any, FoundSubsets] = field(default_factory=dict)
     """What was found on the same data before, by heuristic and what was asked of it."""
@@ -69,7 +69,7 @@ class SelectionTask:
 
 @dataclass(frozen=True)
 class FoundSubsets:
-    """Subsets by growing number of columns, each in the order in which it was taken."""
+    """The subsets of a heuristic by growing number of columns, each in the order in which its columns were added."""
 
     subsets: tuple[IntArray, ...]
     proofs: Proofs | None = None
@@ -83,18 +83,18 @@ def run(heuristic: str, task: SelectionTask) -> FoundSubsets:
     return task.known[asked]
 
 
-def nested(task: SelectionTask, order: Units) -> FoundSubsets:
-    """The subsets that an order of all units passes through."""
-    columns = task.objective.columns(order)
+def make_nested(task: SelectionTask, order: Units) -> FoundSubsets:
+    """Return the nested subsets that an order of all units passes through."""
+    columns = task.objective.list_columns(order)
     ends = np.cumsum(task.objective.widths[list(order)]).tolist()
     return FoundSubsets(tuple(columns[:end] for end in ends if end <= task.limit))
 
 
-def completed(objective: Objective, kept: Units) -> Units:
-    """A subset with all other units after it, in order of preference."""
+def append_others(objective: Objective, kept: Units) -> Units:
+    """Return a subset with all other units after it, in order of preference."""
     return (*kept, *(u for u in range(len(objective.units)) if u not in kept))
 
 
-def by_size(objective: Objective, subsets: Iterable[Units]) -> FoundSubsets:
-    """One subset for every number of columns."""
-    return FoundSubsets(tuple(sorted((objective.columns(kept) for kept in subsets), key=len)))
+def sort_by_size(objective: Objective, subsets: Iterable[Units]) -> FoundSubsets:
+    """Return subsets in order of their number of columns."""
+    return FoundSubsets(tuple(sorted((objective.list_columns(kept) for kept in subsets), key=len)))

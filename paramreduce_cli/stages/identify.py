@@ -27,8 +27,8 @@ from paramreduce_cli.records import (
     Tell,
     Validation,
 )
-from paramreduce_cli.reduction.models import base_model
-from paramreduce_cli.reduction.noise import joint_noise
+from paramreduce_cli.reduction.models import make_base_model
+from paramreduce_cli.reduction.noise import estimate_joint_noise
 
 _STEPS = 3
 _MOST_SHOWN = 1500
@@ -54,8 +54,8 @@ def identify(
     scale = np.where(np.isfinite(model.nominal_torque), _sizes(training), np.inf)
     deviation = np.where(np.isfinite(scale), 1.0, np.inf)
     if identification.estimator != "ordinary":
-        deviation = joint_noise(factors, scale, n_samples)
-    full, full_fit = _estimate(identification, base_model(model), samples, deviation)
+        deviation = estimate_joint_noise(factors, scale, n_samples)
+    full, full_fit = _estimate(identification, make_base_model(model), samples, deviation)
     tell(Progress("identification", 1, _STEPS, "base parameters"))
     reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
     tell(Progress("identification", 2, _STEPS, "selected parameters"))

@@ -41,11 +41,11 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.best_subset.kept_proofs import KeptProofs
 from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.fitting import Fit
-from paramreduce_cli.reduction.grouping import merged_factor
+from paramreduce_cli.reduction.grouping import merge_factor
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
-from paramreduce_cli.reduction.noise import joint_noise
+from paramreduce_cli.reduction.noise import estimate_joint_noise
 from paramreduce_cli.reduction.objective import Objective
-from paramreduce_cli.reduction.setup import SIZES, effort, selection_columns, selection_problem
+from paramreduce_cli.reduction.setup import SIZES, make_columns, make_effort, make_problem
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
@@ -72,10 +72,10 @@ def reduce(
             "samples of this one, or give no CONFIG."
         )
     weights = _weights(reduction, samples)
-    grouped = selection_columns(reduction, samples)
+    grouped = make_columns(reduction, samples)
     columns = grouped.columns
-    factor = merged_factor(combined_factor(samples.estimation.compute_factors(), weights), columns)
-    problem = selection_problem(factor, model, grouped, samples.values)
+    factor = merge_factor(combined_factor(samples.estimation.compute_factors(), weights), columns)
+    problem = make_problem(factor, model, grouped, samples.values)
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
         raise DataError(
@@ -155,7 +155,7 @@ def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
         weights = standard_deviation(block.tau for block in samples.estimation.iterate_blocks())
     if wanted.weighting == "noise":
         found = samples.estimation
-        weights = joint_noise(found.compute_factors(), weights, found.n_samples)
+        weights = estimate_joint_noise(found.compute_factors(), weights, found.n_samples)
     small, large = SIZES
     good = (weights > small) & (weights < large) | np.isinf(weights)
     if not good.all():
@@ -260,7 +260,7 @@ def _task(
     return SelectionTask(
         objective=objective,
         largest=wanted.stop.parameters,
-        effort=effort(wanted, run),
+        effort=make_effort(wanted, run),
         previous=proven,
         part=items.part,
         incumbents={} if items.part.is_whole else items.kept,

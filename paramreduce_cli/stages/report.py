@@ -36,7 +36,7 @@ from paramreduce_cli.records import (
     Tracking,
     Validation,
 )
-from paramreduce_cli.reduction.models import full_model
+from paramreduce_cli.reduction.models import make_full_model
 from paramreduce_cli.registry import Registry
 from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion, motions
 from paramreduce_cli.report.figures import figures
@@ -140,7 +140,7 @@ def _running(model: Model | None, selected: Selected, what: Exported) -> dict[st
     """The exported code of the full and of the selected model; none where its formulation fails."""
     if model is None:
         return {}
-    models = {"full model": full_model(model), f"{selected.n} parameters": selected.model}
+    models = {"full model": make_full_model(model), f"{selected.n} parameters": selected.model}
     try:
         return {title: RunningModel(model, chosen, what) for title, chosen in models.items()}
     except FormulationError as error:

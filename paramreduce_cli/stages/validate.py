@@ -46,10 +46,10 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
-from paramreduce_cli.reduction.grouping import merged_factor
-from paramreduce_cli.reduction.models import base_model, full_model
+from paramreduce_cli.reduction.grouping import merge_factor
+from paramreduce_cli.reduction.models import make_base_model, make_full_model
 from paramreduce_cli.reduction.problem import SelectionProblem
-from paramreduce_cli.reduction.setup import effort, selection_columns, selection_problem
+from paramreduce_cli.reduction.setup import make_columns, make_effort, make_problem
 from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
@@ -347,8 +347,8 @@ def _full_model(
     model: Model, counted: CountedDynamics, sets: Sequence[AccelerationErrors]
 ) -> dict[str, float]:
     counts = Counts(model, counted)
-    result = _counts_by_name(counts, "", full_model(model))
-    result |= _counts_by_name(counts, "base_", base_model(model))
+    result = _counts_by_name(counts, "", make_full_model(model))
+    result |= _counts_by_name(counts, "base_", make_base_model(model))
     result["mass_matrix_condition"] = float(max(one.condition[-1] for one in sets))
     smallest = min(one.smallest_eigenvalue[-1] for one in sets)
     result["mass_matrix_smallest_eigenvalue"] = float(smallest)
@@ -395,18 +395,18 @@ def _cross_validation(
             "needs at least two trajectories, or folds of a log, to leave one out.",
             ("selected", "cross_validation"),
         )
-    grouped = selection_columns(search, samples)
+    grouped = make_columns(search, samples)
     weights = reduction.nominal_torque
 
     def factor(part: FloatArray) -> FloatArray:
-        return merged_factor(combined_factor(part, weights), grouped.columns)
+        return merge_factor(combined_factor(part, weights), grouped.columns)
 
     folds = [
         (factor(np.delete(factors, k, axis=0)), factor(factors[k : k + 1]))
         for k in range(len(factors))
     ]
-    problem = selection_problem(reduction.factor, model, grouped, samples.values)
-    quick = replace(effort(search, run), kicks=0, node_limit=_FOLD_NODES)
+    problem = make_problem(reduction.factor, model, grouped, samples.values)
+    quick = replace(make_effort(search, run), kicks=0, node_limit=_FOLD_NODES)
     found = {}
     for k, (name, heuristic) in enumerate(methods.items()):
         run.progress(Progress("cross-validation", k, len(methods), name))
@@ -438,14 +438,14 @@ def _stability(
     run: Run,
 ) -> Stability:
     """The selection repeated by torque with each trajectory left out and with fewer samples."""
-    grouped = selection_columns(search, samples)
+    grouped = make_columns(search, samples)
     weights = reduction.nominal_torque
-    problem = selection_problem(reduction.factor, model, grouped, samples.values)
-    quick = replace(effort(search, run), node_limit=_NODES)
+    problem = make_problem(reduction.factor, model, grouped, samples.values)
+    quick = replace(make_effort(search, run), node_limit=_NODES)
     heuristic = SelectionMethod.parse(selected.heuristic).heuristic
 
     def factor(factors: FloatArray) -> FloatArray:
-        return merged_factor(combined_factor(factors, weights), grouped.columns)
+        return merge_factor(combined_factor(factors, weights), grouped.columns)
 
     def chosen(other: SelectionProblem) -> IntArray:
         task = SelectionTask(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)

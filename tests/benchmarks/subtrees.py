@@ -8,7 +8,7 @@ import numpy as np
 
 from paramreduce_cli.records import Part
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
-from paramreduce_cli.reduction.best_subset.search import Search, unit_problem
+from paramreduce_cli.reduction.best_subset.search import Search, normalise_problem
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.task import SelectionTask, run
 from tests.benchmarks.random_columns import autoregressive
@@ -31,11 +31,11 @@ def correlated(seed):
 def jobs_of(seed, n, count):
     """Searches of so many jobs that start from the same."""
     objective = TorqueObjective(problem(*correlated(seed)))
-    scaled = unit_problem(objective.problem)
+    scaled = normalise_problem(objective.problem)
     subset = run("swap", SelectionTask(objective, largest=n)).subsets[n - 1]
     place = {int(column): k for k, column in enumerate(scaled.columns)}
     start = np.array([place[int(c)] for c in subset])
-    error = objective.score(objective.units_of(subset)) ** 2
+    error = objective.score(objective.find_units(subset)) ** 2
 
     def search(log):
         return Search(scaled, n, error, start, log=log)

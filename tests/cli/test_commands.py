@@ -12,7 +12,7 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import Identification, Model, Reduction
-from paramreduce_cli.reduction.models import reduced_model
+from paramreduce_cli.reduction.models import make_reduced_model
 from paramreduce_cli.running.pipeline import list_stages, list_stages_to_run
 
 STAGES = [stage.name for stage in list_stages()]
@@ -214,7 +214,7 @@ def test_relations_are_ordered_by_the_values_that_are_known(invoke, two_link_res
     row = reduction.heuristics["forward-selection"].find_row(2)
     for folder, known in ((two_link_results, model.values), (tmp_path, None)):
         out = invoke("inspect", folder / "reduction.h5", *asked).out
-        wanted = reduced_model(reduction, "forward-selection", row, known).expressions
+        wanted = make_reduced_model(reduction, "forward-selection", row, known).expressions
         assert all(f"  =  {text}" in out for text in wanted)
 
 

@@ -10,7 +10,7 @@ from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.reduction.models import full_model
+from paramreduce_cli.reduction.models import make_full_model
 
 
 @pytest.mark.parametrize("compiled", [True, False])
@@ -19,7 +19,7 @@ def test_torques_are_those_of_plain_recursion(robot, compiled, monkeypatch):
     if not compiled:
         monkeypatch.setattr(running, "load", lambda *_: None)
     _, model = config_and_model(robot)
-    mechanism, chosen = model.mechanism, full_model(model)
+    mechanism, chosen = model.mechanism, make_full_model(model)
     states = random_states(mechanism, 20, np.random.default_rng(0))
     wanted = Dynamics(mechanism).inverse(*states, chosen.standard)
     if mechanism.loops is not None:
@@ -40,7 +40,7 @@ def test_mass_matrix_and_remainder_give_the_same_torques(robot, compiled, monkey
     if not compiled:
         monkeypatch.setattr(running, "load", lambda *_: None)
     _, model = config_and_model(robot)
-    mechanism, chosen = model.mechanism, full_model(model)
+    mechanism, chosen = model.mechanism, make_full_model(model)
     q, dq, ddq = random_states(mechanism, 20, np.random.default_rng(0))
     z = list(mechanism.independent)
     states = {"q": q, "dq": dq, "ddq": ddq}

@@ -6,7 +6,7 @@ import pytest
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.lean import counting
 from paramreduce_cli.records import CountedDynamics, Model, Reduction, Run
-from paramreduce_cli.reduction.models import base_model, full_model
+from paramreduce_cli.reduction.models import make_base_model, make_full_model
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +20,7 @@ def models(two_link_results):
         for name, f in reduction.heuristics.items()
         for k in range(f.n.size)
     ]
-    return model, [*found, full_model(model), base_model(model)]
+    return model, [*found, make_full_model(model), make_base_model(model)]
 
 
 def test_processes_count_what_one_counts(models, monkeypatch):

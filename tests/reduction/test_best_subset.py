@@ -11,11 +11,11 @@ from selecting import Effort, dependent_problem, found, problem
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import WHOLE, Part, ProofStatus
 from paramreduce_cli.reduction.best_subset import kernel, parts
-from paramreduce_cli.reduction.best_subset.merging import joined, merged
+from paramreduce_cli.reduction.best_subset.merging import join_subtrees, merge_proofs
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, unit_problem
-from paramreduce_cli.reduction.best_subset.ties import first_of_ties
+from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, normalise_problem
+from paramreduce_cli.reduction.best_subset.ties import find_first_tie
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.heuristics import swap
 from paramreduce_cli.reduction.task import SelectionTask, run
@@ -59,7 +59,7 @@ def test_exhaustive_search_agrees(part):
     for k in range(100):
         W, chi = case(KINDS[k % len(KINDS)], rng)
         m = W.shape[1]
-        p = unit_problem(problem(W, chi, preference=rng.permutation(m)))
+        p = normalise_problem(problem(W, chi, preference=rng.permutation(m)))
         best = all_best_errors(W, chi)
         for n in range(1, m + 1):
             search = Search(p, n, 1.0, np.zeros(0, np.int64))
@@ -86,7 +86,7 @@ def start(p, n):
 
 
 def test_a_search_can_be_stopped_anywhere_and_continued():
-    p = unit_problem(hard_problem())
+    p = normalise_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     log, error, subset, nodes = np.zeros(0, np.int64), *start(p, 8), 0
@@ -104,7 +104,7 @@ def test_a_search_can_be_stopped_anywhere_and_continued():
 
 @pytest.mark.parametrize("threads", [1, 3])
 def test_parts_of_a_search_find_and_prove_what_it_does_alone_and_can_be_continued(threads):
-    p = unit_problem(hard_problem())
+    p = normalise_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     log, error, subset, nodes = BEGINNING, *start(p, 8), 0
@@ -130,7 +130,7 @@ def test_parts_of_a_search_find_and_prove_what_it_does_alone_and_can_be_continue
 
 def test_a_split_search_leaves_nothing_out():
     """Every part is searched alone for a subset worse than the best: one of them finds the best."""
-    p = unit_problem(hard_problem())
+    p = normalise_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     for ahead in (1, 20, 150):
@@ -151,13 +151,13 @@ def test_subtrees_dealt_to_jobs_leave_nothing_out(monkeypatch, many):
     monkeypatch.setattr(parts, "_SUBTREES", many)
     monkeypatch.setattr(parts, "_MOST_SUBTREES", 200)
     monkeypatch.setattr(parts, "_EASY", 1)
-    p = unit_problem(hard_problem())
+    p = normalise_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     jobs = [PartedSearch(lambda log: Search(p, 8, *start(p, 8), log=log), BEGINNING) for _ in "123"]
     digests = {job.deal(Part(number, 3)) for number, job in enumerate(jobs, 1)}
     assert len(digests) == 1
-    logs = [set(map(bytes, parts.taken_apart(job.log))) - {b""} for job in jobs]
+    logs = [set(map(bytes, parts.split_log(job.log))) - {b""} for job in jobs]
     assert not logs[0] & logs[1] | logs[1] & logs[2] | logs[0] & logs[2]
     for job in jobs:
         while not job.finished:
@@ -186,7 +186,7 @@ def tied_problem(seed):
 @pytest.mark.parametrize("seed", range(4))
 def test_of_subsets_as_good_as_each_other_the_first_is_found_from_any(seed):
     given = tied_problem(seed)
-    own = unit_problem(given)
+    own = normalise_problem(given)
     for n in (2, 4, 5):
         errors = {
             kept: error_by_definition(own.X, own.chi, kept) ** 2
@@ -195,7 +195,7 @@ def test_of_subsets_as_good_as_each_other_the_first_is_found_from_any(seed):
         best = min(errors.values())
         ties = [kept for kept, error in errors.items() if error <= best * (1 + 1e-10)]
         for kept in ties:
-            found_first = first_of_ties(own, np.array(kept), errors[kept])
+            found_first = find_first_tie(own, np.array(kept), errors[kept])
             assert tuple(found_first) == min(ties)
         if n > 2:
             assert len(ties) > 5
@@ -216,7 +216,7 @@ def test_jobs_and_threads_find_the_same_of_subsets_as_good_as_each_other(monkeyp
         return search.record()
 
     whole = proofs()
-    together = joined([proofs(Part(number, 3), subtrees=True) for number in (1, 2, 3)])
+    together = join_subtrees([proofs(Part(number, 3), subtrees=True) for number in (1, 2, 3)])
     for other in (together, proofs(jobs=2)):
         assert [kept.tolist() for kept in other.subsets] == [
             kept.tolist() for kept in whole.subsets
@@ -230,7 +230,7 @@ def test_proofs_of_subtrees_are_one_proof_together_that_can_be_gone_on_with(monk
     given = hard_problem()
     whole = found("best-subset", given).proofs
     shares = list(shares_of(given, 3, node_limit=limit))
-    together = joined(shares)
+    together = join_subtrees(shares)
     assert np.all(together.lower_bound <= whole.torque_error * (1 + 1e-9))
     for one in shares:
         assert np.all(together.torque_error <= one.torque_error * (1 + 1e-9))
@@ -249,7 +249,7 @@ def test_what_some_job_has_not_begun_is_not_proven(monkeypatch):
     given = hard_problem()
     busy = next(shares_of(given, 2, node_limit=40))
     idle = next(shares_of(given, 2, time_limit=0.0))
-    together = joined([busy, idle])
+    together = join_subtrees([busy, idle])
     open_ = [row for row, log in enumerate(busy.logs) if log.size]
     assert open_
     for row in open_:
@@ -292,7 +292,7 @@ def test_jobs_that_split_differently_are_not_put_together(monkeypatch):
     shares = list(shares_of(hard_problem(), 2))
     other = dataclasses.replace(shares[1], dealt=shares[1].dealt + 1)
     with pytest.raises(DataError, match=r"the 2 parts have not split .*subset\.parts: sizes"):
-        joined([shares[0], other])
+        join_subtrees([shares[0], other])
 
 
 def test_jobs_tell_each_other_what_they_find():
@@ -311,7 +311,7 @@ def test_jobs_tell_each_other_what_they_find():
 
 
 def test_a_search_for_less_proves_a_lower_bound():
-    p = unit_problem(hard_problem())
+    p = normalise_problem(hard_problem())
     whole = Search(p, 8, *start(p, 8))
     whole.advance(10**9)
     quick = Search(p, 8, whole.squared_error, whole.subset, factor=0.25)
@@ -367,12 +367,12 @@ def test_a_decomposition_that_does_not_converge_leaves_the_bound_as_it_was(monke
     def diverging(*_, **__):
         raise ValueError("Internal algorithm failed to converge.")
 
-    search = Search(unit_problem(hard_problem()), 3, 1.0, np.zeros(0, np.int64))
+    search = Search(normalise_problem(hard_problem()), 3, 1.0, np.zeros(0, np.int64))
     state = search._state
     sheet, numbers, errors = state.sheets[0], state.numbers[0], state.errors[0].copy()
     before = sheet.copy()
     monkeypatch.setattr(np.linalg, "svd", diverging)
-    kernel._fit_anew.py_func(sheet, numbers, state.errors[0], state, search._data)
+    kernel._refit.py_func(sheet, numbers, state.errors[0], state, search._data)
     assert (
         numbers[kernel.NEAR] == 1
     )  # so nothing is included by force, and the next exclusion tries again
@@ -445,7 +445,7 @@ def test_of_equal_proofs_the_furthest_search_is_kept():
     given = hard_problem()
     limited = [found("best-subset", given, effort=Effort(node_limit=k)).proofs for k in (40, 80)]
     for proofs in (limited, limited[::-1]):
-        together = merged(proofs)
+        together = merge_proofs(proofs)
         for n, log, status in zip(together.n, together.logs, together.status, strict=True):
             if status == "best-found" and np.array_equal(
                 *(one.get_size(n).lower_bound for one in limited)
@@ -464,7 +464,7 @@ def test_jobs_split_a_search_that_an_earlier_artifact_has_begun():
         ).proofs
         for number in (1, 2)
     ]  # fmt: skip
-    together = joined(jobs)
+    together = join_subtrees(jobs)
     alone = found("best-subset", hard_problem()).proofs
     assert together.status == alone.status
     assert np.allclose(together.torque_error, alone.torque_error, rtol=1e-9)

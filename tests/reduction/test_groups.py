@@ -8,7 +8,7 @@ from oracles.selection import all_best_errors, error_by_definition
 from selecting import dependent_problem, found, order, problem, subsets
 
 from paramreduce_cli.reduction.fitting import fit
-from paramreduce_cli.reduction.grouping import Group, grouped_columns
+from paramreduce_cli.reduction.grouping import Group, group_columns
 from paramreduce_cli.reduction.heuristics import heuristics
 
 GROUPS = ([0, 3, 5], [1, 7])
@@ -83,7 +83,7 @@ def test_a_tied_group_is_one_column_with_one_value():
     names = ("m_1", "m_2", "mx_1", "mx_2", "m_3")
     tied = Group("m_all", ("m_1", "m_2", "m_3"), tied=True)
     loose = Group("mx_all", ("mx_1", "mx_2"), tied=False)
-    grouped = grouped_columns(names, np.array([9, 9, 5, 5, 9]), [tied, loose])
+    grouped = group_columns(names, np.array([9, 9, 5, 5, 9]), [tied, loose])
     columns = grouped.columns
     assert columns.names == ("m_all", "mx_1", "mx_2")
     assert [g.tolist() for g in grouped.groups] == [[1, 2]]

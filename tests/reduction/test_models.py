@@ -12,7 +12,12 @@ from paramreduce_cli.records import (
     SelectionMethod,
     Subsets,
 )
-from paramreduce_cli.reduction.models import base_model, full_model, known_choices, reduced_model
+from paramreduce_cli.reduction.models import (
+    list_choices,
+    make_base_model,
+    make_full_model,
+    make_reduced_model,
+)
 from paramreduce_cli.report.summary import _first
 
 
@@ -45,7 +50,7 @@ def test_tied_parameters_have_one_value():
 
 def test_what_is_not_kept_is_zero():
     reduction = grouped_reduction()
-    model = reduced_model(reduction, "swap", 0)
+    model = make_reduced_model(reduction, "swap", 0)
     assert model.position.tolist() == [NOT_KEPT, 0, 0, NOT_KEPT]
     assert model.standard.tolist() == [0.0, 7.0, 7.0, 0.0]
     assert model.kept.tolist() == [1, 2]
@@ -54,7 +59,7 @@ def test_what_is_not_kept_is_zero():
 
 def test_sizes_that_groups_leave_out_are_not_offered():
     reduction = grouped_reduction()
-    assert known_choices(reduction) == ["swap:1|3"]
+    assert list_choices(reduction) == ["swap:1|3"]
     assert ModelChoice.parse("swap:3").find_row(reduction) == 1
     for text in ("swap:2", "swap", "swap:", "swap:x", "qr:1"):
         assert ModelChoice.parse(text).find_row(reduction) is None
@@ -72,7 +77,7 @@ def test_methods_survive_being_written(text):
 
 def test_full_and_base_models_are_the_same_dynamics():
     model = model_of("two_link")
-    full, base = full_model(model), base_model(model)
+    full, base = make_full_model(model), make_base_model(model)
     assert full.n == model.affecting.sum()
     assert np.array_equal(full.standard[model.affecting], model.values[model.affecting])
     assert base.expressions == model.base.expressions

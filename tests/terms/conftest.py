@@ -6,7 +6,7 @@ from conftest import model_of
 from terms.test_search import NOMINAL, states
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.fitting import Budget
 from paramreduce_cli.terms.samples import term_samples
 from paramreduce_cli.terms.searching import LookedAt, Searcher
@@ -31,4 +31,4 @@ def searcher():
 
 @pytest.fixture(scope="module")
 def start():
-    return Start("base", base_model(model_of("two_link")), 0.0, 0)
+    return Start("base", make_base_model(model_of("two_link")), 0.0, 0)

@@ -10,7 +10,7 @@ from conftest import model_of
 from terms.test_search import states
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.descent import Descent, drawn, front, gone_on, leanest, slimmed
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import term_samples
@@ -35,7 +35,7 @@ def samples(model, count, seed):
 
 @pytest.fixture(scope="module")
 def begun(arm):
-    base = base_model(arm)
+    base = make_base_model(arm)
     start = Start("base", base, 0.0, 0)
     program = start.program(LeanModels(arm), direct=False)
     looked_at = samples(arm, 100, 0)

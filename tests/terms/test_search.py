@@ -10,7 +10,7 @@ from conftest import model_of
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block, ReducedModel
-from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
 from paramreduce_cli.terms.samples import term_samples
@@ -34,7 +34,7 @@ def states(model, count, seed):
 
 
 def fitting_of(model, direct, budget, count=60, reduced=None):
-    reduced = reduced or base_model(model)
+    reduced = reduced or make_base_model(model)
     program = Start("base", reduced, 0.0, 0).program(LeanModels(model), direct=direct)
     samples = term_samples(
         model.mechanism, [states(model, count, 0)], NOMINAL, np.array([1.0, 2.0]),
@@ -140,7 +140,7 @@ def test_costs_of_combinations_of_parameters_are_exact(arm):
 @pytest.mark.parametrize("direct", [False, True])
 def test_nothing_leaner_can_be_had_on_a_small_arm(arm, direct):
     """All ways to leave addends out are tried."""
-    base = base_model(arm)
+    base = make_base_model(arm)
     kept = ["Izz_upper", "mx_upper", "Izz_fore", "mx_fore"]
     assert set(kept) <= set(base.names)
     position = np.full(arm.values.size, -1)

@@ -7,7 +7,7 @@ import pytest
 from conftest import model_of
 
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.reduction.models import base_model
+from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.starts import Start, near, promising
 
 
@@ -33,7 +33,7 @@ def test_a_subset_that_is_both_the_leanest_and_the_most_exact_is_one_start():
 @pytest.mark.parametrize("direct", [False, True])
 def test_starts_near_one_are_the_same_function_written_otherwise(direct):
     model = model_of("puma560")
-    lean, base = LeanModels(model), base_model(model)
+    lean, base = LeanModels(model), make_base_model(model)
     one = Start("base", base, 0.0, 0)
     states = np.random.default_rng(0).normal(size=(18, 20))
     inputs = [*np.broadcast_to(base.values[:, None], (base.n, 20)), *states]
@@ -52,7 +52,7 @@ def test_starts_near_one_are_the_same_function_written_otherwise(direct):
 
 def test_another_subset_may_take_the_place_of_one():
     model = model_of("puma560")
-    lean, base = LeanModels(model), base_model(model)
+    lean, base = LeanModels(model), make_base_model(model)
     one, other = (Start(name, base, 0.0, 0) for name in ("one", "other"))
     found = [
         near(one, [other], lean, np.random.default_rng(seed), direct=False).heuristic

@@ -38,7 +38,7 @@ from paramreduce_cli.records import (
     TermReduction,
     Validation,
 )
-from paramreduce_cli.reduction.models import closest_standard
+from paramreduce_cli.reduction.models import find_closest_standard
 
 _FUNCTIONS = {str(Exported.IDM): "inverse", str(Exported.DDM): "direct"}
 """What one function alone is called."""
@@ -191,4 +191,4 @@ def _standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) 
     if text == CONSISTENT:
         consistent: FloatArray = loading[Identification].consistency.standard
         return consistent
-    return closest_standard(loading[Model], chosen)
+    return find_closest_standard(loading[Model], chosen)

@@ -211,19 +211,21 @@ def _beside(file: Path, record: type) -> Any:
 def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
     """A model of a reduction, and what it is worth."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
-    from paramreduce_cli.reduction.models import known_choices, reduced_model
+    from paramreduce_cli.reduction.models import list_choices, make_reduced_model
 
     reduction, _ = load_file(file, Reduction, None, "reduce")
     choice = ModelChoice.parse(chosen)
     row = choice.find_row(reduction)
     if row is None:
-        choices = known_choices(reduction)
+        choices = list_choices(reduction)
         raise ConfigError(
             f"--model {chosen}: there is {', '.join(choices)}.", rejected=chosen, choices=choices
         )
     found = reduction.heuristics[choice.heuristic]
     known = _beside(file.parent / "model.h5", Model)
-    model = reduced_model(reduction, choice.heuristic, row, None if known is None else known.values)
+    model = make_reduced_model(
+        reduction, choice.heuristic, row, None if known is None else known.values
+    )
     flag = ", minimum-norm fit beyond the rank" if found.minimum_norm[row] else ""
     error = f"torque error {found.torque_error[row]:.6g}{flag}"
     return f"{choice.heuristic}, n = {model.n}, {error}", model

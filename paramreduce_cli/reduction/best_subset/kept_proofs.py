@@ -1,4 +1,4 @@
-"""Proofs of the best subsets that are kept as items of ``reduce``, by size or by a job's subtrees."""
+"""Proofs of best subsets that are kept as items of ``reduce``, by size or by a job's subtrees."""
 
 import warnings
 from collections.abc import Sequence
@@ -7,7 +7,7 @@ import numpy as np
 
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.records import FloatArray, Items, ProofItem, Proofs, ProofStatus
-from paramreduce_cli.reduction.best_subset.merging import joined, merged
+from paramreduce_cli.reduction.best_subset.merging import join_subtrees, merge_proofs
 
 _SIZE, _SUBTREES = "n-", "subtrees-"
 """Beginnings of the keys of one size's proof, and of one job's subtrees of all sizes."""
@@ -16,7 +16,7 @@ _UNFINISHED = "-unfinished"
 
 
 class KeptProofs:
-    """Proofs among the items of the stage that hold on the data at hand.
+    """The proofs among the items of the stage that hold on the data at hand.
 
     Args:
         items: Items of the stage.
@@ -34,7 +34,11 @@ class KeptProofs:
         Args:
             sizes: Numbers of parameters that are searched, 1, 2, ... up to the largest.
         """
-        keys = [self._key] if self._by_subtrees else [_size_key(n) for n in self._own(sizes)]
+        keys = (
+            [self._key]
+            if self._by_subtrees
+            else [_make_size_key(n) for n in self._select_sizes(sizes)]
+        )
         return all(key in self._items.kept and self._holds(self._items.kept[key]) for key in keys)
 
     def load(self, earlier: Proofs | None) -> Proofs | None:
@@ -52,14 +56,14 @@ class KeptProofs:
         found: list[Proofs] = []
         if self._by_subtrees:
             kept = self._items.kept.get(self._key) or self._items.kept.get(self._key + _UNFINISHED)
-            found = self._usable([kept])
+            found = self._list_usable([kept])
         else:
             sizes = [key for key in self._items.kept if key.startswith(_SIZE)]
-            found = self._usable([self._items.kept.get(key) for key in sizes])
-            found += self._joined_subtrees() if self._items.part.is_whole else []
+            found = self._list_usable([self._items.kept.get(key) for key in sizes])
+            found += self._join_subtrees() if self._items.part.is_whole else []
         if earlier is not None and not (self._by_subtrees and found):
             found.insert(0, earlier)
-        return merged(found) if found else None
+        return merge_proofs(found) if found else None
 
     def keep(self, proofs: Proofs, sizes: Sequence[int], *, cut_short: bool = False) -> None:
         """Keep what this job has proven.
@@ -73,28 +77,28 @@ class KeptProofs:
             key = self._key + (_UNFINISHED if cut_short else "")
             self._items.kept[key] = ProofItem(self._factor, proofs)
             return
-        for n in self._own(sizes):
+        for n in self._select_sizes(sizes):
             if n not in proofs.n:
-                self._items.kept[_size_key(n)] = None
+                self._items.kept[_make_size_key(n)] = None
                 continue
             own = proofs.get_size(n)
             ended = own.status[0] is not ProofStatus.BEST_FOUND or not cut_short
-            key = _size_key(n) + ("" if ended else _UNFINISHED)
+            key = _make_size_key(n) + ("" if ended else _UNFINISHED)
             self._items.kept[key] = ProofItem(self._factor, own)
 
     def keep_size(self, proofs: Proofs) -> None:
         """Keep the proof of one size whose search has ended, unless it is of one job's subtrees alone."""
         if not self._by_subtrees:
-            self._items.kept[_size_key(int(proofs.n[0]))] = ProofItem(self._factor, proofs)
+            self._items.kept[_make_size_key(int(proofs.n[0]))] = ProofItem(self._factor, proofs)
 
     @property
     def _key(self) -> str:
-        return _subtrees_key(self._items.part.number, self._items.part.count)
+        return _make_subtrees_key(self._items.part.number, self._items.part.count)
 
-    def _own(self, sizes: Sequence[int]) -> list[int]:
+    def _select_sizes(self, sizes: Sequence[int]) -> list[int]:
         return self._items.part.select(sizes)
 
-    def _joined_subtrees(self) -> list[Proofs]:
+    def _join_subtrees(self) -> list[Proofs]:
         """Return the proofs of jobs that have split the searches, joined for every number of jobs that is complete.
 
         Raises:
@@ -106,7 +110,7 @@ class KeptProofs:
         incomplete: DataError | None = None
         for count in counts:
             try:
-                joint += self._joined_jobs(count)
+                joint += self._join_jobs(count)
             except DataError as error:
                 incomplete = error
         if incomplete is not None and not joint:
@@ -119,11 +123,11 @@ class KeptProofs:
             )
         return joint
 
-    def _joined_jobs(self, count: int) -> list[Proofs]:
+    def _join_jobs(self, count: int) -> list[Proofs]:
         """Return the proofs of a number of jobs as one record in a list, which is empty if no job has ended."""
         found: dict[int, ProofItem] = {}
         for number in range(1, count + 1):
-            key = _subtrees_key(number, count)
+            key = _make_subtrees_key(number, count)
             item = self._items.kept.get(key) or self._items.kept.get(key + _UNFINISHED)
             if item is not None:
                 found[number] = item
@@ -133,26 +137,26 @@ class KeptProofs:
                 f"{len(missing)} of the {count} parts of the searches are missing. Do each with --part "
                 f"({', '.join(missing[:5])}{', ...' if len(missing) > 5 else ''}), or do without parts with --force."
             )
-        usable = self._usable(list(found.values()))
+        usable = self._list_usable(list(found.values()))
         if len(usable) < len(found) and any(item.proofs.dealt.any() for item in found.values()):
             raise DataError(
                 f"{count - len(usable)} of the {count} parts are of samples that were added up to other last "
                 "digits, as machines do that calculate differently. Make them again on machines of the kind of this "
                 "one, or do without them with --force."
             )
-        return [joined(usable)] if usable else []
+        return [join_subtrees(usable)] if usable else []
 
     def _holds(self, item: ProofItem | None) -> bool:
         """Whether an item holds on the data at hand; None says that a size has no subset."""
         return item is None or np.array_equal(item.factor, self._factor)
 
-    def _usable(self, found: Sequence[ProofItem | None]) -> list[Proofs]:
+    def _list_usable(self, found: Sequence[ProofItem | None]) -> list[Proofs]:
         return [item.proofs for item in found if item is not None and self._holds(item)]
 
 
-def _size_key(n: int) -> str:
+def _make_size_key(n: int) -> str:
     return f"{_SIZE}{n:04d}"
 
 
-def _subtrees_key(number: int, count: int) -> str:
+def _make_subtrees_key(number: int, count: int) -> str:
     return f"{_SUBTREES}{number:04d}-of-{count:04d}"

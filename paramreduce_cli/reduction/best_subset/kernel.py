@@ -63,7 +63,7 @@ _making_arrays = compiled(within=True)
 
 
 class Data(NamedTuple):
-    """What does not change during a search; columns and chi have unit length."""
+    """A record of what does not change during a search; columns and chi have unit length."""
 
     columns: FloatArray
     """One column of W a row, (n_columns, k)."""
@@ -86,7 +86,7 @@ class Data(NamedTuple):
 
 
 class State(NamedTuple):
-    """Where a search stands; a level is a node on the way from the root, one per branch."""
+    """A state of a search; a level is a node on the path from the root, one per branch."""
 
     sheets: FloatArray
     """(n_levels, 2 n_columns + nullity + 2, n_columns)"""
@@ -113,14 +113,15 @@ class State(NamedTuple):
 
 
 @inlined
-def _copied(given: FloatArray | IntArray, to: FloatArray | IntArray) -> None:
+def _copy_vector(given: FloatArray | IntArray, to: FloatArray | IntArray) -> None:
     """Copy a vector; assigned as a whole it takes Numba seconds to compile that shapes are compared."""
     for i in range(to.size):
         to[i] = given[i]
 
 
 @_within
-def _position(numbers: IntArray, column: int) -> int:
+def _find_position(numbers: IntArray, column: int) -> int:
+    """Return the position of a column among the free columns, or -1."""
     for j in range(numbers[FREE]):
         if numbers[FIRST + j] == column:
             return j
@@ -146,9 +147,9 @@ def _drop(sheet: FloatArray, numbers: IntArray, j: int) -> None:
 
 @_within
 def _sweep(sheet: FloatArray, start: int, row: int, j: int, own: FloatArray) -> None:
-    """Take column j out of the matrix and the vector of one form; its own entries are not used again.
+    """Sweep column j out of the matrix and the vector of one form; its own entries are not used again.
 
-    One row at a time and from a copy of row j, as only then the inner loop becomes vector operations.
+    The loop takes one row at a time, with a copy of row j, as only then the compiler vectorises it.
     """
     n = own.size
     for k in range(n):
@@ -167,8 +168,8 @@ def _sweep(sheet: FloatArray, start: int, row: int, j: int, own: FloatArray) -> 
 
 
 @_within
-def _share(sheet: FloatArray, nullity: int, j: int) -> float:
-    """Squared share of a column in the null space of all included and free columns."""
+def _compute_null_share(sheet: FloatArray, nullity: int, j: int) -> float:
+    """Return the squared share of a column in the null space of all included and free columns."""
     start, share = 2 * sheet.shape[1], 0.0
     for c in range(nullity):
         share += sheet[start + c, j] * sheet[start + c, j]
@@ -179,13 +180,14 @@ def _share(sheet: FloatArray, nullity: int, j: int) -> float:
 def _exclude(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
+    """Exclude a free column, and raise the bound by what the exclusion costs."""
     n, row = sheet.shape[1], sheet.shape[0] - 1
-    share = _share(sheet, numbers[NULLITY], j)
+    share = _compute_null_share(sheet, numbers[NULLITY], j)
     # Round-off may leave nothing of what an exclusion costs where columns are nearly dependent.
     known = share > APART or sheet[n + j, j] > 0
     if numbers[NEAR] == 1 or APART < share < INVOLVED or not known:
         _drop(sheet, numbers, j)
-        _fit_anew(sheet, numbers, errors, s, data)
+        _refit(sheet, numbers, errors, s, data)
         return
     if share > APART:
         _exclude_dependent(sheet, numbers, j, share)
@@ -196,20 +198,18 @@ def _exclude(
 
 
 @_making_arrays
-def _fit_anew(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
-) -> None:
-    """The fit with all included and free columns, from the columns themselves.
+def _refit(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> None:
+    """Fit all included and free columns from the columns themselves.
 
-    Now and then the decomposition of a large matrix does not converge. Then the bound of more columns
-    stays, and the next exclusion begins anew.
+    Rarely the decomposition of a large matrix does not converge: then the bound of more columns stays, and the next
+    exclusion starts again.
     """
     n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
     rows = np.empty((free + count, data.chi.size))
     for j in range(free):
-        _copied(data.columns[numbers[FIRST + j]], rows[j])
+        _copy_vector(data.columns[numbers[FIRST + j]], rows[j])
     for k in range(count):
-        _copied(data.columns[s.included[k]], rows[free + k])
+        _copy_vector(data.columns[s.included[k]], rows[free + k])
     left, values, right = np.empty((0, 0)), np.empty(0), np.empty((0, 0))
     converged = True
     try:
@@ -228,11 +228,11 @@ def _fit_anew(
     own = np.ascontiguousarray(left[:free, :rank])
     inverse = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
     for i in range(free):
-        _copied(inverse[i], sheet[n + i, :free])
+        _copy_vector(inverse[i], sheet[n + i, :free])
     numbers[NULLITY] = min(free + count - rank, sheet.shape[0] - 2 * n - 2)
     for c in range(numbers[NULLITY]):
-        _copied(left[:free, rank + c], sheet[2 * n + c, :free])
-    _copied(own @ (inner / values[:rank]), sheet[sheet.shape[0] - 1, :free])
+        _copy_vector(left[:free, rank + c], sheet[2 * n + c, :free])
+    _copy_vector(own @ (inner / values[:rank]), sheet[sheet.shape[0] - 1, :free])
     ratio = values[rank - 1] / values[0] if rank > 0 else 1.0
     numbers[NEAR] = 1 if ratio < NEARLY else 0
     length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
@@ -268,8 +268,8 @@ def _exclude_dependent(sheet: FloatArray, numbers: IntArray, j: int, share: floa
 
 
 @_making_arrays
-def _left(basis: FloatArray, count: int, column: FloatArray) -> FloatArray:
-    """What is left of a column without its parts along some directions."""
+def _project_out(basis: FloatArray, count: int, column: FloatArray) -> FloatArray:
+    """Return a column without its components along some directions."""
     left: FloatArray = column.copy()
     known = basis[:count]
     for _ in range(2):
@@ -281,11 +281,11 @@ def _left(basis: FloatArray, count: int, column: FloatArray) -> FloatArray:
 def _span(s: State, data: Data, count: int) -> None:
     """Find the directions of the first included columns, as far as they are not known."""
     for k in range(s.progress[SPANNED], count):
-        left = _left(s.basis, k, data.columns[s.included[k]])
+        left = _project_out(s.basis, k, data.columns[s.included[k]])
         length = np.sqrt(np.dot(left, left))
         if DEPENDENT < length < REAL:
             s.progress[DOUBTFUL] += 1
-        _copied(left / length if length > DEPENDENT else 0.0 * left, s.basis[k])
+        _copy_vector(left / length if length > DEPENDENT else 0.0 * left, s.basis[k])
     s.progress[SPANNED] = max(s.progress[SPANNED], count)
 
 
@@ -293,27 +293,28 @@ def _span(s: State, data: Data, count: int) -> None:
 def _include(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
+    """Include a free column, and lower the error by what the column explains."""
     own, row = sheet[j, j], sheet.shape[0] - 2
     if own > SURE:
         errors[INSIDE] -= sheet[row, j] ** 2 / own
         _sweep(sheet, _GRAM, row, j, s.spare[: numbers[FREE]])
     _drop(sheet, numbers, j)
     if GONE < own <= SURE:
-        _calculate_anew(sheet, numbers, errors, s, data)
+        _recompute(sheet, numbers, errors, s, data)
 
 
 @_making_arrays
-def _calculate_anew(
+def _recompute(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
 ) -> None:
-    """What the included columns leave, from the columns themselves."""
+    """Compute from the columns themselves what the included columns leave."""
     free, row = numbers[FREE], sheet.shape[0] - 2
     count = numbers[INCLUDED]
     _span(s, data, count)
-    left = _left(s.basis, count, data.chi)
+    left = _project_out(s.basis, count, data.chi)
     rest = np.empty((free, left.size))
     for j in range(free):
-        _copied(_left(s.basis, count, data.columns[numbers[FIRST + j]]), rest[j])
+        _copy_vector(_project_out(s.basis, count, data.columns[numbers[FIRST + j]]), rest[j])
         sheet[row, j] = np.dot(rest[j], left)
         for i in range(j + 1):
             sheet[i, j] = sheet[j, i] = np.dot(rest[i], rest[j])
@@ -331,7 +332,7 @@ def _decide(
     progress[LOGGED] += 1
     first = data.first[unit]
     for column in range(first, first + data.size[unit]):
-        j = _position(numbers, column)
+        j = _find_position(numbers, column)
         if include:
             s.included[numbers[INCLUDED]] = column
             progress[SPANNED] = min(progress[SPANNED], numbers[INCLUDED])
@@ -343,7 +344,7 @@ def _decide(
 
 @inlined
 def _branch(s: State, data: Data, unit: int) -> None:
-    """Keep the node for later and go on with a copy of it that includes a unit."""
+    """Keep the node for later, and continue with a copy that includes a unit."""
     level = s.progress[LEVEL]
     sheet, numbers = s.sheets[level], s.numbers[level]
     numbers[BRANCH], numbers[MARK] = unit, s.progress[LOGGED]
@@ -367,14 +368,14 @@ def _branch(s: State, data: Data, unit: int) -> None:
 
 
 @_making_arrays
-def _parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
-    """Whether the included columns leave of two others what is parallel to rounding."""
+def _is_parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
+    """Return whether two columns are parallel up to rounding once the included columns are projected out."""
     _span(s, data, count)
-    first = _left(s.basis, count, data.columns[one])
+    first = _project_out(s.basis, count, data.columns[one])
     length = np.dot(first, first)
     if length <= DEPENDENT**2:
         return False
-    second = _left(s.basis, count, data.columns[other])
+    second = _project_out(s.basis, count, data.columns[other])
     rest = second - np.dot(first, second) / length * first
     return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
 
@@ -387,15 +388,15 @@ def _exclude_parallel(
 
     A subset with one of them explains no more than the same with the unit, which is searched.
     """
-    own = _position(numbers, data.first[unit])
+    own = _find_position(numbers, data.first[unit])
     for j in range(numbers[FREE] - 1, -1, -1):
         column = numbers[FIRST + j]
         near = sheet[j, j] * sheet[own, own] - sheet[j, own] ** 2 <= GONE * sheet[own, own]
         if j == own or not near or data.size[data.unit[column]] > 1:
             continue
-        if _parallel(s, data, numbers[INCLUDED], data.first[unit], column):
+        if _is_parallel(s, data, numbers[INCLUDED], data.first[unit], column):
             _decide(sheet, numbers, errors, s, data, data.unit[column], _EXCLUDE)
-            own = _position(numbers, data.first[unit])
+            own = _find_position(numbers, data.first[unit])
 
 
 @inlined
@@ -414,7 +415,7 @@ def _go_back(s: State, data: Data) -> None:
 
 
 @_within
-def _threshold(best: float, factor: float, uncertainty: float) -> float:
+def _compute_threshold(best: float, factor: float, uncertainty: float) -> float:
     wanted: float = best * factor
     return wanted + 2 * np.sqrt(wanted) * uncertainty
 
@@ -426,23 +427,25 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
     It is calculated by orthogonalisation; -1 stands for no column.
     """
     subset = np.full(data.unit.size, -1, np.int64)
-    _copied(s.included[:count], subset[:count])
+    _copy_vector(s.included[:count], subset[:count])
     _span(s, data, count)
     basis = np.empty((count + 2, data.chi.size))
     for k in range(count):
-        _copied(s.basis[k], basis[k])
+        _copy_vector(s.basis[k], basis[k])
     for column in (first, second):
         if column >= 0:
             subset[count] = column
-            direction = _left(basis, count, data.columns[column])
+            direction = _project_out(basis, count, data.columns[column])
             length = np.sqrt(np.dot(direction, direction))
-            _copied(direction / length if length > DEPENDENT else 0.0 * direction, basis[count])
+            _copy_vector(
+                direction / length if length > DEPENDENT else 0.0 * direction, basis[count]
+            )
             count += 1
-    left = _left(basis, count, data.chi)
+    left = _project_out(basis, count, data.chi)
     error = np.dot(left, left)
     if error < s.best[0] * (1 - 1e-12):
         s.best[0] = error
-        _copied(subset, s.subset)
+        _copy_vector(subset, s.subset)
 
 
 @inlined
@@ -453,17 +456,15 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
     bound would pass the threshold are included.
     """
     while True:
-        threshold = _threshold(s.best[0], data.factor, data.uncertainty)
+        threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
         if errors[INSIDE] < threshold + data.slack:
             _offer(s, data, numbers[INCLUDED], _NO_COLUMN, _NO_COLUMN)
-            threshold = _threshold(s.best[0], data.factor, data.uncertainty)
+            threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
         places = data.places - numbers[INCLUDED]
         if errors[BOUND] >= threshold or places == 0 or numbers[FREE] == 0:
             return False
         room = threshold - errors[BOUND]
-        needed, must, useless = _needed_and_useless(
-            sheet, numbers, data.unit, data.size, places, room
-        )
+        needed, must, useless = _count_mandatory(sheet, numbers, data.unit, data.size, places, room)
         if useless >= 0:
             _decide(sheet, numbers, errors, s, data, useless, _EXCLUDE)
         elif needed > places:
@@ -475,29 +476,29 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
 
 
 @_within
-def _needed(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
-    """Whether the bound rises by at least ``room`` when a column is excluded."""
+def _is_mandatory(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
+    """Return whether the bound rises by at least ``room`` if a column is excluded."""
     own = sheet[sheet.shape[0] - 1, j]
     if own * own < room * sheet[sheet.shape[1] + j, j]:
         return False
-    return _share(sheet, nullity, j) <= APART
+    return _compute_null_share(sheet, nullity, j) <= APART
 
 
 @inlined
-def _needed_and_useless(
+def _count_mandatory(
     sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
 ) -> tuple[int, int, int]:
-    """Places of the units that cannot be missed, one of them, and a useless unit; -1 for none."""
+    """Return the columns of mandatory units, one such unit, and an excludable unit; -1 for none."""
     needed, must, nullity = 0, _NO_COLUMN, numbers[NULLITY]
     for j in range(numbers[FREE]):
         own = unit[numbers[FIRST + j]]
         if size[own] > places or (size[own] == 1 and sheet[j, j] <= GONE):
             return needed, must, own
-        if numbers[NEAR] == 0 and _needed(sheet, nullity, j, room):
+        if numbers[NEAR] == 0 and _is_mandatory(sheet, nullity, j, room):
             counted = False
             for i in range(j if size[own] > 1 else 0):
                 same = unit[numbers[FIRST + i]] == own
-                counted = counted or (same and _needed(sheet, nullity, i, room))
+                counted = counted or (same and _is_mandatory(sheet, nullity, i, room))
             if not counted:
                 needed += size[own]
                 must = own
@@ -505,24 +506,26 @@ def _needed_and_useless(
 
 
 @inlined
-def _last_place(sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data) -> None:
+def _fill_last_place(
+    sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
+) -> None:
     """Try every free column in the last place."""
     row = sheet.shape[0] - 2
-    limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+    limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
     for j in range(numbers[FREE]):
         part = abs(sheet[row, j]) + ROUND_OFF
         if part * part > (inside - limit) * (sheet[j, j] - ROUND_OFF):
             _offer(s, data, numbers[INCLUDED], numbers[FIRST + j], _NO_COLUMN)
-            limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+            limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
 @inlined
-def _last_two_places(
+def _fill_last_two_places(
     sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
 ) -> None:
     """Try every pair of free columns, each of its own unit, in the last two places."""
     moments, own = sheet[sheet.shape[0] - 2], s.spare
-    limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+    limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
     for i in range(numbers[FREE]):
         own[i] = sheet[i, i]
         if not own[i] > GONE:  # its pairs are other columns alone
@@ -531,39 +534,43 @@ def _last_two_places(
         left = inside - moments[i] * step
         if left < limit:  # every pair may be dependent
             _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], _NO_COLUMN)
-            limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
-        if _any_explains(sheet[i, :i], own[:i], moments[:i], own[i], step, left - limit):
+            limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+        if _has_explaining(sheet[i, :i], own[:i], moments[:i], own[i], step, left - limit):
             for j in range(i):
-                if _explains(sheet[i, j], own[j], moments[j], own[i], step, left - limit):
+                if _is_explaining(sheet[i, j], own[j], moments[j], own[i], step, left - limit):
                     _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], numbers[FIRST + j])
-                    limit = _threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+                    limit = (
+                        _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
+                    )
 
 
 @_within
-def _explains(
+def _is_explaining(
     shared: float, own: float, moment: float, beside: float, step: float, gap: float
 ) -> bool:
-    """Whether a column explains more than ``gap`` of what another one beside it leaves."""
+    """Return whether a column explains more than ``gap`` of what another column beside it leaves."""
     rest = own - shared * shared / beside
     part = abs(moment - shared * step) + ROUND_OFF
     return bool((rest > GONE) & (part * part > gap * (rest - ROUND_OFF)))
 
 
 @_within
-def _any_explains(
+def _has_explaining(
     shared: FloatArray, own: FloatArray, moments: FloatArray, beside: float, step: float, gap: float
 ) -> bool:
-    """Whether any of some columns does, which is seldom; without branches, for vector operations."""
+    """Return whether any of some columns explains more than ``gap``, which is rare; without branches, so that the loop
+    is vectorised.
+    """
     found = False
     for j in range(shared.size):
-        found |= _explains(shared[j], own[j], moments[j], beside, step, gap)
+        found |= _is_explaining(shared[j], own[j], moments[j], beside, step, gap)
     return found
 
 
 @_within
-def _most_promising(sheet: FloatArray, numbers: IntArray) -> int:
-    """The free column to branch on: that of the largest product of what including it explains and
-    what excluding it costs the bound; by the latter alone an arm's searches take two thirds more nodes.
+def _choose_branching_column(sheet: FloatArray, numbers: IntArray) -> int:
+    """Return the free column to branch on: the column with the largest product of what including it explains and what
+    excluding it costs the bound. By the latter alone an arm's searches take two thirds more nodes.
     """
     n, row = sheet.shape[1], sheet.shape[0] - 2
     best, chosen = -1.0, numbers[FIRST]
@@ -616,12 +623,12 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
         open_ = _settle(sheet, numbers, errors, s, data)
         places = data.places - numbers[INCLUDED]
         if open_ and places == 1:
-            _last_place(sheet, numbers, errors[INSIDE], s, data)
+            _fill_last_place(sheet, numbers, errors[INSIDE], s, data)
             open_ = False
         elif open_ and places == 2 and singles:
-            _last_two_places(sheet, numbers, errors[INSIDE], s, data)
+            _fill_last_two_places(sheet, numbers, errors[INSIDE], s, data)
             open_ = False
         if open_:
-            _branch(s, data, data.unit[_most_promising(sheet, numbers)])
+            _branch(s, data, data.unit[_choose_branching_column(sheet, numbers)])
         else:
             s.progress[GOING_BACK] = 1

@@ -1,4 +1,4 @@
-"""One search in parts, for threads side by side or for several jobs: a branch that waits becomes a search itself."""
+"""One search in parts, for threads or for several jobs: a waiting branch becomes a search of its own."""
 
 import heapq
 import zlib
@@ -30,7 +30,7 @@ class PartedSearch:
     """
 
     def __init__(self, search: Callable[[IntArray], Search], log: IntArray) -> None:
-        self._open = [search(part) for part in taken_apart(log)]
+        self._open = [search(part) for part in split_log(log)]
         self._ended: list[Search] = []
         self._best = self._open[0]
         self._glances = 0
@@ -49,7 +49,7 @@ class PartedSearch:
         self._ended += [part for part in at_once if part.finished]
         self._open = [part for part in self._open if not part.finished]
         for part in self._open:
-            part.learn(self.squared_error, self.subset)
+            part.take_incumbent(self.squared_error, self.subset)
 
     def _split(self) -> Search | None:
         return next((new for part in self._open if (new := part.split()) is not None), None)
@@ -87,13 +87,13 @@ class PartedSearch:
         self._glances = sum(part.nodes for part in cards)
         self._open = job.select(cards)
         self._glances -= sum(part.nodes for part in self._open)
-        self.learn(self.squared_error, self.subset)
+        self.take_incumbent(self.squared_error, self.subset)
         return zlib.crc32(b"".join(part.log.tobytes() for part in cards))
 
-    def learn(self, squared_error: float, subset: IntArray) -> None:
-        """Take over what another search of the same size has found."""
+    def take_incumbent(self, squared_error: float, subset: IntArray) -> None:
+        """Take over a better subset that another search of the same size has found."""
         for part in self._open:
-            part.learn(squared_error, subset)
+            part.take_incumbent(squared_error, subset)
 
     @property
     def finished(self) -> bool:
@@ -103,22 +103,22 @@ class PartedSearch:
     @property
     def nodes(self) -> int:
         """Nodes visited by all parts, and in subtrees that are other jobs'."""
-        return sum(part.nodes for part in self._parts()) + self._glances
+        return sum(part.nodes for part in self._list_parts()) + self._glances
 
     @property
     def squared_error(self) -> float:
-        """Of the best subset found, a share of that of chi."""
+        """Squared error of the best subset found, as a share of that of chi."""
         return self._best.squared_error
 
     @property
     def subset(self) -> IntArray:
-        """The best subset found, numbered as the columns of the problem."""
+        """Best subset found, numbered as the columns of the problem."""
         return self._best.subset
 
     @property
     def is_uncertain(self) -> bool:
         """Whether some part proves nothing; see :attr:`Search.is_uncertain`."""
-        return any(part.is_uncertain for part in self._parts())
+        return any(part.is_uncertain for part in self._list_parts())
 
     @property
     def bound(self) -> float:
@@ -127,23 +127,23 @@ class PartedSearch:
 
     @property
     def log(self) -> IntArray:
-        """Where all open parts stand, to go on from there another time."""
-        return together([part.log for part in self._open])
+        """Positions of all open parts, from which the search can continue later."""
+        return concatenate_logs([part.log for part in self._open])
 
-    def _parts(self) -> list[Search]:
+    def _list_parts(self) -> list[Search]:
         return [*self._open, *self._ended]
 
 
-def together(logs: Sequence[IntArray]) -> IntArray:
-    """Logs of several searches as one; those that are empty are of none."""
+def concatenate_logs(logs: Sequence[IntArray]) -> IntArray:
+    """Return the logs of several searches as one; empty logs are skipped."""
     logs = [log for log in logs if log.size]
     if not logs:
         return np.zeros(0, np.int64)
     return np.concatenate([np.append(log, _NEXT) for log in logs])[:-1]
 
 
-def taken_apart(log: IntArray) -> Iterator[IntArray]:
-    """The logs of several searches that one log holds."""
+def split_log(log: IntArray) -> Iterator[IntArray]:
+    """Yield the logs of the single searches in a log."""
     ends = [-1, *np.flatnonzero(log == _NEXT).tolist(), log.size]
     for before, end in pairwise(ends):
         yield log[before + 1 : end]

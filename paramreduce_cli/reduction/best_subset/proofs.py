@@ -1,4 +1,4 @@
-"""Searches for the best subsets of all sizes, and what they prove."""
+"""Searches for the best subsets of all sizes, and the proofs that they give."""
 
 import contextlib
 import threading
@@ -20,9 +20,9 @@ from paramreduce_cli.reduction.best_subset.search import (
     Search,
     UnitProblem,
     compile_search,
-    unit_problem,
+    normalise_problem,
 )
-from paramreduce_cli.reduction.best_subset.ties import first_of_ties
+from paramreduce_cli.reduction.best_subset.ties import find_first_tie
 from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import FULL_PRECISION
 from paramreduce_cli.reduction.task import SelectionTask
@@ -47,7 +47,7 @@ _SHARE_OF_TIME, _LEAST_TIME = 0.1, 2.0
 
 @dataclass
 class _Proof:
-    """What is known of one size; errors are squared shares of chi."""
+    """The state of the proof of one size; errors are squared shares of chi."""
 
     n: int
     exact: IntArray
@@ -72,38 +72,39 @@ class _Proof:
 
 
 class ProofSearch:
-    """Searches for the sizes one after the other, as many at a time as there are threads.
+    """A search for the best subsets of all sizes, as many sizes at a time as there are threads.
 
     Args:
-        task: What is asked for.
+        task: Task of the heuristic.
         starts: Subsets of columns to start from, one of every size.
     """
 
     def __init__(self, task: SelectionTask, starts: Iterable[IntArray]) -> None:
         self._task = task
         self._objective: Objective = task.objective
-        self._problem: UnitProblem = unit_problem(task.objective.problem)
+        self._problem: UnitProblem = normalise_problem(task.objective.problem)
         self._place = {int(column): k for k, column in enumerate(self._problem.columns)}
         self._proofs: dict[int, _Proof] = {}
         self._spent: dict[int, int] = {}
         self._by_subtrees: bool = task.effort.subtrees and not task.part.is_whole
         for columns in starts:
-            self._start(self._numbered(columns))
+            self._add_start(self._number_columns(columns))
         if task.previous is not None:
             self._remember(task.previous)
-        self._spread()
+        self._share_with_neighbours()
 
-    def _numbered(self, columns: IntArray) -> IntArray:
+    def _number_columns(self, columns: IntArray) -> IntArray:
         return np.array([self._place[int(c)] for c in columns], dtype=np.int64)
 
-    def _squared_error(self, subset: IntArray) -> float:
-        return self._objective.score(self._units(subset)) ** 2
+    def _compute_squared_error(self, subset: IntArray) -> float:
+        return self._objective.score(self._find_units(subset)) ** 2
 
-    def _units(self, subset: IntArray) -> Units:
-        return self._objective.units_of(self._problem.columns[subset])
+    def _find_units(self, subset: IntArray) -> Units:
+        return self._objective.find_units(self._problem.columns[subset])
 
-    def _start(self, subset: IntArray) -> None:
-        error = self._squared_error(subset)
+    def _add_start(self, subset: IntArray) -> None:
+        """Begin the proof of a size from a subset."""
+        error = self._compute_squared_error(subset)
         self._proofs[subset.size] = _Proof(subset.size, subset, subset, error, (error, subset))
 
     def _remember(self, previous: Proofs) -> None:
@@ -115,8 +116,8 @@ class ProofSearch:
             proof = self._proofs.get(n)
             if proof is None:
                 continue
-            subset = self._numbered(previous.subsets[k])
-            error = self._squared_error(subset)
+            subset = self._number_columns(previous.subsets[k])
+            error = self._compute_squared_error(subset)
             if error < proof.squared_error:
                 proof.take(subset, error)
             if previous.dealt[k] and not self._by_subtrees:
@@ -141,7 +142,7 @@ class ProofSearch:
         limit = self._task.effort.node_limit or _UNLIMITED
         with ThreadPoolExecutor(self._task.effort.jobs) as pool:
             try:
-                while time.monotonic() < deadline and self._open():
+                while time.monotonic() < deadline and self._list_open():
                     self._round(pool, min(budget, limit), deadline, stop)
                     if budget >= limit:
                         break
@@ -152,7 +153,7 @@ class ProofSearch:
             except KeyboardInterrupt:
                 stop.set()
                 self._task.interrupted()
-        self._spread()
+        self._share_with_neighbours()
 
     def _compile(self) -> None:
         """Compile the search, and say so where that has not been done on this machine before."""
@@ -170,7 +171,8 @@ class ProofSearch:
         if said.is_set():
             tell(1)
 
-    def _open(self) -> list[_Proof]:
+    def _list_open(self) -> list[_Proof]:
+        """Return the sizes of this job that are not proven yet."""
         sizes = sorted(self._proofs)
         return [
             proof
@@ -183,40 +185,41 @@ class ProofSearch:
         self, pool: ThreadPoolExecutor, budget: int, deadline: float, stop: threading.Event
     ) -> None:
         """Search for every size that is open up to a number of nodes in all."""
-        waiting = self._open()
+        waiting = self._list_open()
 
         def work(proof: _Proof) -> None:
             if stop.is_set() or time.monotonic() > deadline:
                 return  # to deal subtrees alone would take a while
             before = self._spent.get(proof.n, 0)
-            search = self._search(proof)
-            for nodes in self._slices(proof, search, budget - before, deadline, stop):
-                search.advance(nodes, self._threads(len(waiting)))
+            search = self._start_search(proof)
+            for nodes in self._iterate_slices(proof, search, budget - before, deadline, stop):
+                search.advance(nodes, self._count_threads(len(waiting)))
                 self._exchange(proof, search)
             self._spent[proof.n] = before + search.nodes
             self._take_over(proof, search)
             if proof.status != ProofStatus.BEST_FOUND and proof.seconds > _WORTH_KEEPING:
-                self._task.keep(self._record([proof]))
+                self._task.keep(self._make_record([proof]))
             waiting.remove(proof)
 
         shown = -1
-        for future in as_completed([pool.submit(work, proof) for proof in self._open()]):
+        for future in as_completed([pool.submit(work, proof) for proof in self._list_open()]):
             future.result()
-            done = len(self._proofs) - len(self._open())
+            done = len(self._proofs) - len(self._list_open())
             if done != shown:
                 detail = f"{done} of {len(self._proofs)} sizes"
                 self._task.progress(Progress("best-subset", done, len(self._proofs), detail))
                 shown = done
 
-    def _threads(self, waiting: int) -> int:
-        """For one size, when so many are searched or wait for it.
+    def _count_threads(self, waiting: int) -> int:
+        """Return the number of threads for one size, given the number of sizes that wait.
 
-        A limit of nodes is to stop every machine at the same place, so then a size has but one.
+        With a limit of nodes it is one, so that every machine stops at the same node.
         """
         effort = self._task.effort
         return 1 if effort.node_limit else max(1, effort.jobs // waiting)
 
-    def _search(self, proof: _Proof, factor: float = 1.0) -> PartedSearch:
+    def _start_search(self, proof: _Proof, factor: float = 1.0) -> PartedSearch:
+        """Return the search of a size, continued from its log or split into this job's subtrees."""
         dealing = self._by_subtrees and not proof.log.size
         known = proof.start if dealing else (proof.squared_error, proof.subset)
 
@@ -226,7 +229,7 @@ class ProofSearch:
         search = PartedSearch(part, proof.log if factor == 1.0 else BEGINNING)
         if dealing:
             proof.dealt = search.deal(self._task.part)
-            search.learn(proof.squared_error, proof.subset)
+            search.take_incumbent(proof.squared_error, proof.subset)
         return search
 
     def _exchange(self, proof: _Proof, search: PartedSearch) -> None:
@@ -234,19 +237,19 @@ class ProofSearch:
         key = f"incumbent-{proof.n:04d}"
         told = self._task.incumbents.get(key, proof.subset[:0])
         usable = 0 < told.size <= proof.n and set(told.tolist()) <= self._place.keys()
-        subset = self._numbered(told) if usable else proof.subset
-        known = self._squared_error(subset) if usable else proof.squared_error
+        subset = self._number_columns(told) if usable else proof.subset
+        known = self._compute_squared_error(subset) if usable else proof.squared_error
         if known < search.squared_error * (1 - RESOLUTION):
-            search.learn(known, subset)
+            search.take_incumbent(known, subset)
         elif search.squared_error < known * (1 - RESOLUTION):
             with contextlib.suppress(ParamreduceError):  # nothing is lost but time of other jobs
                 self._task.incumbents[key] = self._problem.columns[search.subset]
 
-    def _slices(
+    def _iterate_slices(
         self, proof: _Proof, search: PartedSearch, nodes: int, deadline: float,
         stop: threading.Event,
     ) -> Iterator[int]:  # fmt: skip
-        """Numbers of nodes to go on for, until there is a reason to stop."""
+        """Yield the numbers of nodes to search next, until there is a reason to stop."""
         started = time.perf_counter()
         before = search.nodes
         slice_ = _FIRST_SLICE
@@ -269,16 +272,17 @@ class ProofSearch:
         def work(proof: _Proof) -> None:
             known = np.sqrt(proof.squared_bound / proof.squared_error)
             for share in (share for share in _SHARES if share > known):
-                search = self._search(proof, factor=share**2)
-                for nodes in self._slices(proof, search, _NODES_PER_SHARE, deadline, stop):
+                search = self._start_search(proof, factor=share**2)
+                for nodes in self._iterate_slices(proof, search, _NODES_PER_SHARE, deadline, stop):
                     search.advance(nodes, threads=1)
-                if not search.finished or not self._certain(search):
+                if not search.finished or not self._is_certain(search):
                     return
                 proof.squared_bound = max(proof.squared_bound, search.bound)
 
-        list(pool.map(work, self._open()))
+        list(pool.map(work, self._list_open()))
 
-    def _certain(self, search: PartedSearch) -> bool:
+    def _is_certain(self, search: PartedSearch) -> bool:
+        """Return whether round-off leaves no doubt about what a search proves."""
         clear = self._objective.problem.certifiable and self._problem.certifiable
         return clear and not search.is_uncertain
 
@@ -289,17 +293,18 @@ class ProofSearch:
 
     @cached_property
     def _rank(self) -> int:
+        """Rank of the candidates' columns."""
         problem = self._objective.problem
         return len(independent_columns(problem.W, problem.candidates_by_preference))
 
     def _take_over(self, proof: _Proof, search: PartedSearch) -> None:
         """Note how far a search has come."""
         if search.squared_error < proof.squared_error and search.subset.size:
-            first = first_of_ties(self._problem, search.subset, search.squared_error)
-            better = self._filled(first, proof.n)
-            proof.take(better, self._squared_error(better))
+            first = find_first_tie(self._problem, search.subset, search.squared_error)
+            better = self._fill_up(first, proof.n)
+            proof.take(better, self._compute_squared_error(better))
         proof.nodes += search.nodes
-        certain = self._certain(search)
+        certain = self._is_certain(search)
         if certain:
             proof.squared_bound = max(proof.squared_bound, min(search.bound, proof.squared_error))
         proof.log = search.log
@@ -308,20 +313,20 @@ class ProofSearch:
         if proof.status == ProofStatus.OPTIMAL:
             proof.squared_bound = proof.squared_error
 
-    def _filled(self, subset: IntArray, n: int) -> IntArray:
-        """A subset with further units, as long as there are places."""
-        kept = self._units(subset)
+    def _fill_up(self, subset: IntArray, n: int) -> IntArray:
+        """Return a subset with further units added, as long as columns are left."""
+        kept = self._find_units(subset)
         for unit in range(len(self._objective.units)):
             longer = (*kept, unit)
-            if unit not in kept and self._objective.width(longer) <= n:
+            if unit not in kept and self._objective.count_columns(longer) <= n:
                 kept = longer
-        return self._numbered(self._objective.columns(kept))
+        return self._number_columns(self._objective.list_columns(kept))
 
-    def _spread(self) -> None:
-        """What holds for one size holds for its neighbours.
+    def _share_with_neighbours(self) -> None:
+        """Apply what holds for one size to its neighbours.
 
-        A subset may be used for all larger sizes, a bound for all smaller ones; and where nothing
-        is left to explain there is nothing to prove.
+        A subset may be used for all larger sizes, a bound for all smaller ones; and if nothing is left to explain there
+        is nothing to prove.
         """
         before: _Proof | None = None
         for _, proof in sorted(self._proofs.items()):
@@ -335,15 +340,16 @@ class ProofSearch:
             if not self._by_subtrees:
                 proof.squared_bound = bound = max(bound, proof.squared_bound)
 
-    def subsets(self) -> list[Units]:
-        """The best subset found of just each size, after :meth:`run`."""
-        return [self._units(proof.exact) for proof in self._proofs.values()]
+    def list_subsets(self) -> list[Units]:
+        """Return the best subset found of exactly each size, after :meth:`run`."""
+        return [self._find_units(proof.exact) for proof in self._proofs.values()]
 
     def record(self) -> Proofs:
         """Return all proofs by size."""
-        return self._record([self._proofs[n] for n in sorted(self._proofs)])
+        return self._make_record([self._proofs[n] for n in sorted(self._proofs)])
 
-    def _record(self, proofs: Sequence[_Proof]) -> Proofs:
+    def _make_record(self, proofs: Sequence[_Proof]) -> Proofs:
+        """Return the proofs of some sizes as a record."""
         rank = self._rank
 
         def status(proof: _Proof) -> ProofStatus:

@@ -52,7 +52,7 @@ class UnitProblem:
 
     @cached_property
     def fit(self) -> tuple[FloatArray, FloatArray, FloatArray, float]:
-        """Of all columns: (X'X)^+, a basis of the null space, the solution, and the squared error left."""
+        """Fit of all columns: (X'X)^+, a basis of the null space, the solution, and the squared error left."""
         X, rank = self.X, self.rank
         U, s, Vt = np.linalg.svd(X, full_matrices=True)
         V = Vt[:rank].T
@@ -66,17 +66,20 @@ class UnitProblem:
         return self.condition <= LARGEST_CONDITION and self.nearest >= 1 / LARGEST_CONDITION
 
 
-def unit_problem(problem: SelectionProblem) -> UnitProblem:
+def normalise_problem(problem: SelectionProblem) -> UnitProblem:
     """Scale the candidates' columns and chi to unit length; errors become shares of chi."""
     units, columns = problem.units, problem.columns
     X = problem.X[:, columns]
     s = np.linalg.svd(X, compute_uv=False)
     rank = int(np.sum(s > DEPENDENT * s[0]))
     unit = np.repeat(np.arange(len(units)), [u.size for u in units])
-    return UnitProblem(X, problem.y, columns, unit, float(s[0] / s[rank - 1]), _nearest(X), rank)
+    return UnitProblem(
+        X, problem.y, columns, unit, float(s[0] / s[rank - 1]), _find_smallest_sine(X), rank
+    )
 
 
-def _nearest(X: FloatArray) -> float:
+def _find_smallest_sine(X: FloatArray) -> float:
+    """Return the smallest sine between two columns that are not parallel."""
     sines = [1.0]
     for j in range(1, X.shape[1]):
         other = X[:, :j]
@@ -86,7 +89,7 @@ def _nearest(X: FloatArray) -> float:
 
 
 class Search:
-    """Branch and bound for the best subset of at most so many columns.
+    """A branch-and-bound search for the best subset of at most so many columns.
 
     Args:
         problem: The columns.
@@ -121,14 +124,15 @@ class Search:
             uncertainty=_UPDATES * problem.condition,
             slack=_SLACK,
         )
-        self._state = self._root(problem, places, squared_error, subset)
+        self._state = self._make_root(problem, places, squared_error, subset)
         self.finished = False
         self.nodes = 0
         kernel.search(self._state, self._data, log.astype(np.int64), 0)
 
-    def _root(
+    def _make_root(
         self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
     ) -> State:
+        """Return the state at the root: all columns free."""
         kernel, X, chi = self._kernel, problem.X, problem.chi
         n, levels = X.shape[1], min(places, int(problem.unit[-1]) + 1) + 2
         inverse, null, solution, left = problem.fit
@@ -171,21 +175,21 @@ class Search:
         log, first = self.log, self.depth
         if first is None:
             return None
-        given = self._from(log[: first + 2])
+        given = self._continue_from(log[: first + 2])
         given._state.progress[self._kernel.GOING_BACK] = 1
         given.advance(0)
         # Without its mark the branch is a decision like those before it, and nothing waits there.
-        own = self._from(np.delete(log, first))._state
+        own = self._continue_from(np.delete(log, first))._state
         own.progress[self._kernel.DOUBTFUL] += self._state.progress[self._kernel.DOUBTFUL]
         self._state = own
         return given
 
-    def _from(self, log: IntArray) -> Search:
+    def _continue_from(self, log: IntArray) -> Search:
         places = self._data.places
         return Search(self._problem, places, self.squared_error, self.subset, self._factor, log)
 
-    def learn(self, squared_error: float, subset: IntArray) -> None:
-        """Take over what another search of the same size has found."""
+    def take_incumbent(self, squared_error: float, subset: IntArray) -> None:
+        """Take over a better subset that another search of the same size has found."""
         if squared_error < self.squared_error:
             self._state.best[0] = squared_error
             self._state.subset[:] = -1
@@ -193,12 +197,12 @@ class Search:
 
     @property
     def squared_error(self) -> float:
-        """Of the best subset found, a share of that of chi."""
+        """Squared error of the best subset found, as a share of that of chi."""
         return float(self._state.best[0])
 
     @property
     def subset(self) -> IntArray:
-        """The best subset found, numbered as the columns of the problem."""
+        """Best subset found, numbered as the columns of the problem."""
         found: IntArray = self._state.subset[self._state.subset >= 0]
         return found
 
@@ -210,20 +214,21 @@ class Search:
     @property
     def bound(self) -> float:
         """Squared error that no subset is below, as far as the search has come, less round-off."""
-        bound = self._exact_bound()
+        bound = self._compute_bound()
         return float(max(0.0, np.sqrt(bound) - self._data.uncertainty) ** 2)
 
-    def _exact_bound(self) -> float:
+    def _compute_bound(self) -> float:
+        """Return the squared error that no subset in the unsearched part is below."""
         searched = self.squared_error * self._data.factor
         if self.finished:
             return searched
         state = self._state
         level = max(int(state.progress[self._kernel.LEVEL]), 0)
-        waiting = (self._bound_of_exclusion(k) for k in range(level))
+        waiting = (self._bound_exclusion(k) for k in range(level))
         return min(searched, float(state.errors[level, self._kernel.BOUND]), *waiting)
 
-    def _bound_of_exclusion(self, level: int) -> float:
-        """Of the branch that a level has still to take."""
+    def _bound_exclusion(self, level: int) -> float:
+        """Return the bound of the branch that a level has still to take."""
         kernel, state = self._kernel, self._state
         sheet, numbers = state.sheets[level], state.numbers[level]
         n, nullity = sheet.shape[1], int(numbers[kernel.NULLITY])
@@ -237,7 +242,7 @@ class Search:
 
     @property
     def log(self) -> IntArray:
-        """Where the search stands, to go on from there another time."""
+        """Position of the search, from which it can continue later."""
         log: IntArray = self._state.log[: self._state.progress[self._kernel.LOGGED]].copy()
         return log
 

@@ -1,4 +1,4 @@
-"""Subsets that are as good as each other: one of them is chosen, whichever a search has met first."""
+"""Ties: one of equally good subsets is chosen, whichever a search has met first."""
 
 import numpy as np
 
@@ -7,15 +7,15 @@ from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.reduction.best_subset.search import RESOLUTION, UnitProblem
 
 
-def as_good(squared_errors: FloatArray, best: float) -> BoolArray:
-    """Which errors are no larger than the best one but for what a proof does not resolve."""
+def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:
+    """Return which errors equal the best one up to the resolution of a proof."""
     return squared_errors <= best * (1 + RESOLUTION)
 
 
-def first_of_ties(problem: UnitProblem, subset: IntArray, squared_error: float) -> IntArray:
-    """Of subsets as good as one, the first by its columns' numbers that exchanges of one column lead to.
+def find_first_tie(problem: UnitProblem, subset: IntArray, squared_error: float) -> IntArray:
+    """Return the lexicographically first subset among ties that single swaps lead to.
 
-    Subsets that span the same space are the bases of a matroid, whose first one is reached from any other by exchanges
+    Subsets that span the same space are the bases of a matroid, whose first basis is reached from any other by swaps
     that each make it come earlier.
 
     Args:
@@ -32,8 +32,8 @@ def first_of_ties(problem: UnitProblem, subset: IntArray, squared_error: float) 
     place = 0
     while place < found.size:
         earlier = np.setdiff1d(np.arange(found[place]), found)
-        errors = _errors_with(problem, np.delete(found, place), earlier)
-        ties = earlier[as_good(errors, squared_error)]
+        errors = _compute_errors_with(problem, np.delete(found, place), earlier)
+        ties = earlier[find_ties(errors, squared_error)]
         if ties.size:
             found = np.sort(np.append(np.delete(found, place), ties[0]))
             place = 0
@@ -42,8 +42,8 @@ def first_of_ties(problem: UnitProblem, subset: IntArray, squared_error: float) 
     return found
 
 
-def _errors_with(problem: UnitProblem, kept: IntArray, others: IntArray) -> FloatArray:
-    """Squared errors of a subset with one further column each."""
+def _compute_errors_with(problem: UnitProblem, kept: IntArray, others: IntArray) -> FloatArray:
+    """Return the squared errors of a subset with one further column each."""
     U, s, _ = np.linalg.svd(problem.X[:, kept], full_matrices=False)
     basis = U[:, s > DEPENDENT * s.max(initial=0.0)]
     left = problem.chi - basis @ (basis.T @ problem.chi)

@@ -8,9 +8,9 @@ from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.orthogonal import unit_columns
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
-from paramreduce_cli.reduction.fitting import Fit, fit, relative_error
+from paramreduce_cli.reduction.fitting import Fit, compute_relative_error, fit
 from paramreduce_cli.reduction.inputs import AccelerationData, CriterionInputs
-from paramreduce_cli.reduction.objective import Objective, Units, without
+from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
 from paramreduce_cli.reduction.problem import SelectionProblem
 
 SEARCH_SAMPLES = 200
@@ -41,7 +41,7 @@ class _Point:
 
 
 class _Accelerations:
-    """Fits of the exact acceleration error on one set of samples.
+    """A least-squares problem of the exact acceleration error on one set of samples.
 
     With e = z̈_R - z̈ and M_R z̈_R + δ_R = τ the derivative of z̈_R by the parameters is
     -M_R^-1 K(z, ż, z̈_R), K being the regressor at the predicted accelerations.
@@ -66,12 +66,12 @@ class _Accelerations:
         self._first = (weights @ K).reshape(-1, n)
         self._first_right = np.einsum("sij,sj->si", weights, data.tau).ravel()
 
-    def start(self, columns: IntArray) -> FloatArray:
-        """Parameters to first order, with the reference's mass matrix."""
-        return _least_squares(self._first[:, columns], self._first_right)
+    def estimate_start(self, columns: IntArray) -> FloatArray:
+        """Return the parameters to first order, with the mass matrix of the reference."""
+        return _solve_least_squares(self._first[:, columns], self._first_right)
 
-    def point(self, columns: IntArray, parameters: FloatArray) -> _Point | None:
-        """The accelerations of a model; None where its mass matrix is singular."""
+    def evaluate(self, columns: IntArray, parameters: FloatArray) -> _Point | None:
+        """Return the accelerations of a model, or None if its mass matrix is singular."""
         d = self.data
         M: FloatArray = np.tensordot(parameters, self._A[columns], 1)
         left = d.tau - np.tensordot(parameters, self._B[columns], 1)
@@ -85,21 +85,21 @@ class _Accelerations:
             return None
         return _Point(parameters, error, residual, ddz, M)
 
-    def slope(self, point: _Point, columns: IntArray) -> FloatArray:
-        """Minus the derivative of the residual by the parameters, (n_samples n_dof, n)."""
+    def compute_slope(self, point: _Point, columns: IntArray) -> FloatArray:
+        """Return minus the derivative of the residual by the parameters, (n_samples n_dof, n)."""
         K = (self._A[columns] @ point.ddz[..., None])[..., 0] + self._B[columns]
         slope = np.linalg.inv(point.M) @ np.moveaxis(K, 0, -1) / self.data.nominal[:, None]
         return slope.reshape(-1, columns.size)
 
     def fit(self, columns: IntArray, start: FloatArray) -> _Point | None:
         """Minimise the exact error by Gauss-Newton steps that are halved until they help."""
-        best = self.point(columns, start)
+        best = self.evaluate(columns, start)
         for _ in range(_STEPS if best is not None else 0):
             assert best is not None
-            step = _least_squares(self.slope(best, columns), best.residual.ravel())
+            step = _solve_least_squares(self.compute_slope(best, columns), best.residual.ravel())
             share, found = 1.0, None
             while share > _SMALLEST_STEP:
-                found = self.point(columns, best.parameters + share * step)
+                found = self.evaluate(columns, best.parameters + share * step)
                 if found is not None and found.error < best.error:
                     break
                 share, found = share / 2, None
@@ -111,13 +111,14 @@ class _Accelerations:
                 break
         return best
 
-    def first_order_error(self, columns: IntArray) -> float:
-        """Error to first order."""
-        left = self._first_right - self._first[:, columns] @ self.start(columns)
+    def estimate_error(self, columns: IntArray) -> float:
+        """Return the acceleration error to first order."""
+        left = self._first_right - self._first[:, columns] @ self.estimate_start(columns)
         return float(np.linalg.norm(left)) / self._total
 
 
-def _least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
+def _solve_least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
+    """Return the least-squares solution of X b = y by scaled normal equations."""
     scaled, lengths = unit_columns(X)
     solution = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ y, rcond=1e-13)[0]
     result: FloatArray = solution / lengths
@@ -142,44 +143,47 @@ class AccelerationObjective(Objective):
 
     @property
     def cheap(self) -> Objective:
-        """The torque error of the same subsets."""
+        """Torque error of the same subsets, which is cheap to compute."""
         return self._torque
 
     def score(self, kept: Units) -> float:
-        """Acceleration error of the fit to the accelerations."""
-        return self._fitted(kept)[0]
+        """Return the acceleration error of the fit to the accelerations."""
+        return self._fit_once(kept)[0]
 
-    def _fitted(self, kept: Units) -> tuple[float, _Point | None]:
+    def _fit_once(self, kept: Units) -> tuple[float, _Point | None]:
+        """Return error and fitted point of a subset, kept for the next time; None if the fit is hopeless."""
         key = frozenset(kept)
         if key not in self._known:
-            columns = self._sorted_columns(kept)
-            point = self._search.fit(columns, self._search.start(columns))
+            columns = self._sort_columns(kept)
+            point = self._search.fit(columns, self._search.estimate_start(columns))
             if point is not None and point.error < _HOPELESS:
                 self._known[key] = (point.error, point)
             else:
-                hopeless = _HOPELESS + self._search.first_order_error(columns)
+                hopeless = _HOPELESS + self._search.estimate_error(columns)
                 self._known[key] = (hopeless, None)
         return self._known[key]
 
-    def _sorted_columns(self, kept: Units) -> IntArray:
-        return self.columns(tuple(sorted(kept)))
+    def _sort_columns(self, kept: Units) -> IntArray:
+        return self.list_columns(tuple(sorted(kept)))
 
-    def _linearised(self, kept: Units) -> TorqueObjective:
-        """The least-squares problem of the accelerations around a fitted subset."""
-        point = self._fitted(kept)[1]
+    def _linearise(self, kept: Units) -> TorqueObjective:
+        """Return the least-squares problem of the accelerations around a fitted subset."""
+        point = self._fit_once(kept)[1]
         everything = np.arange(self.problem.W.shape[1])
         if point is None:
             X, y = self._search._first, self._search._first_right
         else:
-            columns = self._sorted_columns(kept)
-            X = self._search.slope(point, everything)
+            columns = self._sort_columns(kept)
+            X = self._search.compute_slope(point, everything)
             y = point.residual.ravel() + X[:, columns] @ point.parameters
         factor: FloatArray = np.linalg.qr(np.column_stack([X, y]), mode="r")  # type: ignore[assignment]
-        return TorqueObjective(self.problem.on(factor))
+        return TorqueObjective(self.problem.replace_data(factor))
 
-    def gains(self, kept: Units) -> FloatArray:
-        """By how much the error falls, for the units that promise most."""
-        promised = self._linearised(kept).gains(kept)
+    def estimate_gains(self, kept: Units) -> FloatArray:
+        """Return the fall of the error per column for the most promising units; -inf for units that are not evaluated,
+        (n_units,).
+        """
+        promised = self._linearise(kept).estimate_gains(kept)
         result = np.full(promised.size, -np.inf)
         now = self.score(kept)
         for unit in np.argsort(-promised, kind="stable")[:_PROPOSALS].tolist():
@@ -187,34 +191,36 @@ class AccelerationObjective(Objective):
                 result[unit] = (now - self.score((*kept, unit))) / self.widths[unit]
         return result
 
-    def losses(self, kept: Units) -> FloatArray:
-        """By how much the error rises, for the units that promise to cost least."""
-        promised = self._linearised(kept).losses(kept)
+    def estimate_losses(self, kept: Units) -> FloatArray:
+        """Return the rise of the error per column for the units that promise to cost least; inf for units that are not
+        evaluated, (n_units,).
+        """
+        promised = self._linearise(kept).estimate_losses(kept)
         result = np.full(promised.size, np.inf)
         now = self.score(kept)
         for unit in np.argsort(promised, kind="stable")[:_PROPOSALS].tolist():
             if promised[unit] < np.inf:
-                rise = self.score(without(kept, unit)) - now if len(kept) > 1 else 0.0
+                rise = self.score(remove_unit(kept, unit)) - now if len(kept) > 1 else 0.0
                 result[unit] = rise / self.widths[unit]
         return result
 
-    def exchanged(self, kept: Units) -> Units:
-        """The best of the exchanges that promise most."""
-        proposals = self._linearised(kept).promising_exchanges(kept, _PROPOSALS)
+    def swap_best(self, kept: Units) -> Units:
+        """Return the best subset among the most promising swaps and the subset itself."""
+        proposals = self._linearise(kept).list_promising_swaps(kept, _PROPOSALS)
         return min([kept, *proposals], key=self.score)
 
     def fit(self, subset: IntArray) -> Fit:
-        """Parameters that minimise the exact acceleration error; beta is that of the torques."""
+        """Fit the parameters that minimise the exact acceleration error; beta is that of the torques."""
         torque = fit(self.problem, subset)
-        point = self._final.fit(subset, self._final.start(subset))
+        point = self._final.fit(subset, self._final.estimate_start(subset))
         if point is None or point.error >= _HOPELESS:
             return torque
-        error = relative_error(self.problem, subset, point.parameters)
+        error = compute_relative_error(self.problem, subset, point.parameters)
         return Fit(point.parameters, torque.beta, error, torque.minimum_norm)
 
 
 def acceleration(problem: SelectionProblem, inputs: CriterionInputs) -> Objective:
-    """The exact error of the accelerations, parameters fitted for it."""
+    """Return the criterion of the exact acceleration error, with parameters fitted to the accelerations."""
     return AccelerationObjective(
         problem, inputs.accelerations(SEARCH_SAMPLES), inputs.accelerations(FIT_SAMPLES)
     )

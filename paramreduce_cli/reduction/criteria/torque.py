@@ -1,4 +1,4 @@
-"""The Euclidean torque error as a criterion, in closed form."""
+"""Criterion of the Euclidean torque error, in closed form."""
 
 from collections.abc import Iterator
 
@@ -7,50 +7,51 @@ import numpy as np
 from paramreduce_cli.multibody.orthogonal import DEPENDENT, Orthogonaliser
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.inputs import CriterionInputs
-from paramreduce_cli.reduction.objective import Objective, Units, without
-from paramreduce_cli.reduction.problem import FULL_PRECISION, SelectionProblem, first_of_the_best
+from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.problem import FULL_PRECISION, SelectionProblem, find_first_best
 
 
 def torque(problem: SelectionProblem, inputs: CriterionInputs) -> Objective:
-    """The Euclidean error of the torques."""
+    """Return the criterion of the Euclidean torque error."""
     return TorqueObjective(problem)
 
 
 class TorqueObjective(Objective):
-    """Least squares of the torques: scores are errors as shares of them."""
+    """The torque error of least-squares fits, as a fraction of the torques."""
 
     def __init__(self, problem: SelectionProblem) -> None:
         super().__init__(problem)
         self._X = problem.X
         self._own = np.ascontiguousarray(problem.X[:, problem.columns])
-        self._taken: tuple[Units, Orthogonaliser] = ((), self._nothing_taken())
+        self._taken: tuple[Units, Orthogonaliser] = ((), self._start_orthogonaliser())
 
-    def _nothing_taken(self) -> Orthogonaliser:
+    def _start_orthogonaliser(self) -> Orthogonaliser:
         return Orthogonaliser(self._own, self.problem.y)
 
     def score(self, kept: Units) -> float:
-        """Torque error of the least-squares fit."""
-        X = self._X[:, self.columns(kept)]
+        """Return the torque error of the least-squares fit."""
+        X = self._X[:, self.list_columns(kept)]
         solution = np.linalg.lstsq(X, self.problem.y, rcond=DEPENDENT)[0]
         return float(np.linalg.norm(self.problem.y - X @ solution))
 
-    def gains(self, kept: Units) -> FloatArray:
-        """By how much the squared error falls; once nothing but round-off is left of the torques,
-        the share of a unit that is independent of the subset.
+    def estimate_gains(self, kept: Units) -> FloatArray:
+        """Return the fall of the squared error per column, (n_units,).
+
+        If only round-off is left of the torques, return the share of each unit that is independent of the subset.
         """
-        rest = self._rest(kept)
+        rest = self._project_out(kept)
         squared = rest.squared_lengths()
         if rest.y @ rest.y <= FULL_PRECISION**2:
-            shares = self.per_unit(squared)
+            shares = self.average_by_unit(squared)
             return np.where(shares > 0, shares, -np.inf)
         dependent = squared == 0
         squared[dependent] = 1.0
         gains = (rest.y @ rest.X) ** 2 / squared
         gains[dependent] = -np.inf
-        return gains if self.single else self._group_gains(rest, gains)
+        return gains if self.single else self._add_group_gains(rest, gains)
 
-    def _group_gains(self, rest: Orthogonaliser, gains: FloatArray) -> FloatArray:
-        """Of units of several columns: what these explain together, per column."""
+    def _add_group_gains(self, rest: Orthogonaliser, gains: FloatArray) -> FloatArray:
+        """Write the gains of units of several columns: what the columns explain together, per column."""
         result = np.full(self.widths.size, -np.inf)
         for unit, width in enumerate(self.widths.tolist()):
             own = np.flatnonzero((self.owner == unit) & (gains > -np.inf))
@@ -62,51 +63,54 @@ class TorqueObjective(Objective):
                 result[unit] = explained @ explained / width
         return result
 
-    def losses(self, kept: Units) -> FloatArray:
-        """By how much the squared error rises. Where removals are free, the squared torques of the
-        free units in the fit of least norm, whose unknowns are the torques that the parameters
-        cause; costs that are round-off are ties.
+    def estimate_losses(self, kept: Units) -> FloatArray:
+        """Return the rise of the squared error per column, (n_units,).
+
+        If removals are free, return the squared torques of the free units in the fit of least norm, whose unknowns are
+        the torques that the parameters cause. Costs that are round-off are ties.
         """
         ordered = sorted(kept)
         result = np.full(len(self.units), np.inf)
-        costs = _removal_costs(self._X, self.problem.y, [self.units[u] for u in ordered])
+        costs = _compute_removal_costs(self._X, self.problem.y, [self.units[u] for u in ordered])
         costs[costs < FULL_PRECISION**2] = 0.0
         result[ordered] = costs
         return result
 
-    def exchanged(self, kept: Units) -> Units:
-        """By the closed form of the error after an exchange; groups one by one."""
+    def swap_best(self, kept: Units) -> Units:
+        """Return the subset after the best swap, by the closed form of its error; groups are tried one by one."""
         if not self.single:
             out, into, error = min(
-                self._one_by_one(kept), key=lambda exchange: exchange[2], default=(-1, -1, np.inf)
+                self._try_one_by_one(kept),
+                key=lambda exchange: exchange[2],
+                default=(-1, -1, np.inf),
             )
-            return (*without(kept, out), into) if error < self.score(kept) else kept
-        improvement = self._improvements(kept)
+            return (*remove_unit(kept, out), into) if error < self.score(kept) else kept
+        improvement = self._compute_improvements(kept)
         if improvement is None or not np.any(improvement > 0):
             return kept
-        best = first_of_the_best(improvement.ravel())
+        best = find_first_best(improvement.ravel())
         place, unit = divmod(best, len(self.units))
-        return (*without(kept, kept[place]), unit)
+        return (*remove_unit(kept, kept[place]), unit)
 
-    def promising_exchanges(self, kept: Units, most: int) -> list[Units]:
-        """The subsets after the exchanges that improve most, or worsen least."""
-        improvement = self._improvements(kept) if self.single else None
+    def list_promising_swaps(self, kept: Units, most: int) -> list[Units]:
+        """Return the subsets after the swaps that improve most, or worsen least."""
+        improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
-            found = sorted(self._one_by_one(kept), key=lambda exchange: exchange[2])[:most]
-            return [(*without(kept, out), into) for out, into, _ in found]
+            found = sorted(self._try_one_by_one(kept), key=lambda exchange: exchange[2])[:most]
+            return [(*remove_unit(kept, out), into) for out, into, _ in found]
         order = np.argsort(-improvement, axis=None, kind="stable")[:most]
         pairs = [divmod(int(k), len(self.units)) for k in order]
         return [
-            (*without(kept, kept[place]), unit)
+            (*remove_unit(kept, kept[place]), unit)
             for place, unit in pairs
             if improvement[place, unit] > -np.inf
         ]
 
-    def exchanges_within(self, kept: Units, limit: float) -> list[tuple[int, int, float]]:
-        """Exchanges that leave at most this error: the unit out, the one in, the error."""
-        improvement = self._improvements(kept) if self.single else None
+    def list_swaps_within(self, kept: Units, limit: float) -> list[tuple[int, int, float]]:
+        """Return the swaps that leave at most some error: the unit removed, the unit added, the error."""
+        improvement = self._compute_improvements(kept) if self.single else None
         if improvement is None:
-            return [exchange for exchange in self._one_by_one(kept) if exchange[2] <= limit]
+            return [exchange for exchange in self._try_one_by_one(kept) if exchange[2] <= limit]
         errors = np.sqrt(np.maximum(self.score(kept) ** 2 - improvement, 0.0))
         places, units = np.nonzero(errors <= limit)
         return [
@@ -114,14 +118,13 @@ class TorqueObjective(Objective):
             for place, unit in zip(places, units, strict=True)
         ]
 
-    def _improvements(self, kept: Units) -> FloatArray | None:
-        """Fall of the squared error for every exchange, (n_kept, n_units); None if dependent.
+    def _compute_improvements(self, kept: Units) -> FloatArray | None:
+        """Return the fall of the squared error for every swap, (n_kept, n_units), or None if the subset is dependent.
 
-        With r and e what the subset leaves of another column and of chi, b the subset's
-        coefficients in either and P = (X'X)^-1: without column i these become r + b_i u and
-        e + b_i u with |u|^2 = 1 / P_ii, orthogonal to r and e.
+        With r and e what the subset leaves of another column and of chi, b the subset's coefficients in either and P =
+        (X'X)^-1: without column i these become r + b_i u and e + b_i u with |u|^2 = 1 / P_ii, orthogonal to r and e.
         """
-        columns = self.columns(kept)
+        columns = self.list_columns(kept)
         if columns.size > self._X.shape[0]:
             return None
         Q, R = np.linalg.qr(self._X[:, columns])
@@ -142,22 +145,22 @@ class TorqueObjective(Objective):
         result: FloatArray = np.where(possible, gains - b[:, -1:] ** 2 / P, -np.inf)
         return result
 
-    def _one_by_one(self, kept: Units) -> Iterator[tuple[int, int, float]]:
-        """For every unit the best of its width in its place, and the error."""
+    def _try_one_by_one(self, kept: Units) -> Iterator[tuple[int, int, float]]:
+        """Yield for every unit the best unit of its width in its place, and the error."""
         for unit in kept:
-            rest = without(kept, unit)
-            gains = self.gains(rest)
+            rest = remove_unit(kept, unit)
+            gains = self.estimate_gains(rest)
             gains[self.widths != self.widths[unit]] = -np.inf
             gains[unit] = -np.inf
             if np.any(gains > -np.inf):
-                into = first_of_the_best(gains)
+                into = find_first_best(gains)
                 yield unit, into, self.score((*rest, into))
 
-    def _rest(self, kept: Units) -> Orthogonaliser:
-        """What is left by a subset; quick where it extends the one asked for before."""
+    def _project_out(self, kept: Units) -> Orthogonaliser:
+        """Return what a subset leaves of all columns; quick if the subset extends the last one."""
         taken, rest = self._taken
         if kept[: len(taken)] != taken:
-            taken, rest = (), self._nothing_taken()
+            taken, rest = (), self._start_orthogonaliser()
         for unit in kept[len(taken) :]:
             for column in [unit] if self.single else np.flatnonzero(self.owner == unit).tolist():
                 rest.take(column)
@@ -165,8 +168,8 @@ class TorqueObjective(Objective):
         return rest
 
 
-def _removal_costs(X: FloatArray, y: FloatArray, units: list[IntArray]) -> FloatArray:
-    """What each unit's removal costs per column, (n_units,); infinite where others are free."""
+def _compute_removal_costs(X: FloatArray, y: FloatArray, units: list[IntArray]) -> FloatArray:
+    """Return the cost of removing each unit per column, (n_units,); infinite where other removals are free."""
     columns = np.concatenate(units)
     sizes = np.array([unit.size for unit in units])
     parts = np.split(np.arange(columns.size), np.cumsum(sizes)[:-1])
@@ -181,7 +184,7 @@ def _removal_costs(X: FloatArray, y: FloatArray, units: list[IntArray]) -> Float
                 float(phi[p] @ phi[p]) if f else np.inf for p, f in zip(parts, free, strict=True)
             ]
             return np.array(own) / sizes
-        return np.array([_rise(X[:, columns], y, part) for part in parts]) / sizes
+        return np.array([_compute_rise(X[:, columns], y, part) for part in parts]) / sizes
     inverse = (Vt.T / s**2) @ Vt
     if (sizes == 1).all():
         alone: FloatArray = phi**2 / np.diag(inverse)
@@ -190,8 +193,8 @@ def _removal_costs(X: FloatArray, y: FloatArray, units: list[IntArray]) -> Float
     return np.array(rises) / sizes
 
 
-def _rise(X: FloatArray, y: FloatArray, part: IntArray) -> float:
-    """Rise of the squared error without some columns, by fitting twice."""
+def _compute_rise(X: FloatArray, y: FloatArray, part: IntArray) -> float:
+    """Return the rise of the squared error without some columns, by fitting twice."""
 
     def squared_error(kept: FloatArray) -> float:
         left = y - kept @ np.linalg.lstsq(kept, y, rcond=DEPENDENT)[0] if kept.size else y

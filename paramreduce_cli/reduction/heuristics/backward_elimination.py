@@ -1,7 +1,7 @@
 """Backward Elimination [Ros2019], Algorithm 1."""
 
-from paramreduce_cli.reduction.objective import Units, without
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, nested
+from paramreduce_cli.reduction.objective import Units, remove_unit
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, make_nested
 
 
 def backward_elimination(task: SelectionTask) -> FoundSubsets:
@@ -14,7 +14,7 @@ def backward_elimination(task: SelectionTask) -> FoundSubsets:
     left: Units = tuple(range(len(task.objective.units)))
     order: Units = ()
     while left:
-        fewer = task.objective.without_least(left)
+        fewer = task.objective.remove_worst(left)
         (gone,) = set(left) - set(fewer)
-        left, order = without(left, gone), (gone, *order)
-    return nested(task, order)
+        left, order = remove_unit(left, gone), (gone, *order)
+    return make_nested(task, order)

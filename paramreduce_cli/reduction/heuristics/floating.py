@@ -2,7 +2,7 @@
 
 from paramreduce_cli.reduction.objective import Units
 from paramreduce_cli.reduction.problem import TIE
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, completed
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, sort_by_size
 
 
 def floating(task: SelectionTask) -> FoundSubsets:
@@ -14,24 +14,25 @@ def floating(task: SelectionTask) -> FoundSubsets:
     objective = task.objective
     best: dict[int, tuple[float, Units]] = {}
     kept: Units = ()
-    while (longer := objective.with_best(kept, task.limit)) != kept:
+    while (longer := objective.add_best(kept, task.limit)) != kept:
         kept = longer
         _keep_if_better(task, best, kept)
         while len(kept) > 2:
-            shorter = objective.without_least(kept)
+            shorter = objective.remove_worst(kept)
             if not _keep_if_better(task, best, shorter):
                 break
             kept = shorter
-        kept = best[objective.width(kept)][1]
-    rest = completed(objective, kept)
+        kept = best[objective.count_columns(kept)][1]
+    rest = append_others(objective, kept)
     for k in range(len(kept) + 1, len(rest) + 1):
-        if objective.width(rest[:k]) <= task.limit:
-            best[objective.width(rest[:k])] = (0.0, rest[:k])
-    return by_size(objective, [units for n, (_, units) in best.items() if n <= task.limit])
+        if objective.count_columns(rest[:k]) <= task.limit:
+            best[objective.count_columns(rest[:k])] = (0.0, rest[:k])
+    return sort_by_size(objective, [units for n, (_, units) in best.items() if n <= task.limit])
 
 
 def _keep_if_better(task: SelectionTask, best: dict[int, tuple[float, Units]], kept: Units) -> bool:
-    n, score = task.objective.width(kept), task.objective.score(kept)
+    """Keep a subset if it is better than the best of its size so far, and return whether it is."""
+    n, score = task.objective.count_columns(kept), task.objective.score(kept)
     if n in best and not score < best[n][0] * (1 - TIE):
         return False
     best[n] = (score, kept)

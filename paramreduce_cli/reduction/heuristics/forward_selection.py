@@ -1,6 +1,6 @@
 """Forward Selection [Ros2019], Algorithm 2."""
 
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, make_nested
 
 
 def forward_selection(task: SelectionTask) -> FoundSubsets:
@@ -14,6 +14,6 @@ def forward_selection(task: SelectionTask) -> FoundSubsets:
     """
     objective = task.objective
     order: tuple[int, ...] = ()
-    while (longer := objective.with_best(order, task.limit)) != order:
+    while (longer := objective.add_best(order, task.limit)) != order:
         order = longer
-    return nested(task, completed(objective, order))
+    return make_nested(task, append_others(objective, order))

@@ -1,7 +1,7 @@
 """Forward Selection with two iterations [Ros2019], Algorithm 3."""
 
-from paramreduce_cli.reduction.objective import without
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, completed
+from paramreduce_cli.reduction.objective import remove_unit
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, sort_by_size
 
 
 def forward_selection_2(task: SelectionTask) -> FoundSubsets:
@@ -11,13 +11,17 @@ def forward_selection_2(task: SelectionTask) -> FoundSubsets:
     its text describes.) Subsets are not nested.
     """
     objective = task.objective
-    kept = objective.with_best((), task.limit)
+    kept = objective.add_best((), task.limit)
     subsets = [kept]
-    while (longer := objective.with_best(kept, task.limit)) != kept:
-        renewed = objective.with_best(without(longer, kept[-1]), task.limit)
+    while (longer := objective.add_best(kept, task.limit)) != kept:
+        renewed = objective.add_best(remove_unit(longer, kept[-1]), task.limit)
         # With groups the parameter that comes back may be wider or narrower.
-        kept = renewed if objective.width(renewed) > objective.width(kept) else longer
+        kept = (
+            renewed if objective.count_columns(renewed) > objective.count_columns(kept) else longer
+        )
         subsets.append(kept)
-    rest = completed(objective, kept)
+    rest = append_others(objective, kept)
     subsets += [rest[:k] for k in range(len(kept) + 1, len(rest) + 1)]
-    return by_size(objective, [s for s in subsets if s and objective.width(s) <= task.limit])
+    return sort_by_size(
+        objective, [s for s in subsets if s and objective.count_columns(s) <= task.limit]
+    )

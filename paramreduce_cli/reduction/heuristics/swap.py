@@ -11,7 +11,7 @@ from paramreduce_cli.reduction.heuristics.forward_selection_2 import forward_sel
 from paramreduce_cli.reduction.heuristics.torque_only.qr import qr
 from paramreduce_cli.reduction.objective import Objective, Units
 from paramreduce_cli.reduction.problem import TIE
-from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, by_size, run
+from paramreduce_cli.reduction.task import Effort, FoundSubsets, SelectionTask, run, sort_by_size
 
 _KICKED = 3
 """Parameters that a random change replaces."""
@@ -25,7 +25,7 @@ def swap(task: SelectionTask) -> FoundSubsets:
     criterion that is costly to evaluate starts from what the swap search finds by torque, and
     from its own forward selection.
     """
-    search = _Exchanges(task.objective, task.smallest, task.limit)
+    search = _SwapSearch(task.objective, task.smallest, task.limit)
     cheap = task.objective.cheap
     if cheap is None:
         for start in (forward_selection, forward_selection_2, backward_elimination, qr):
@@ -33,14 +33,14 @@ def swap(task: SelectionTask) -> FoundSubsets:
     else:
         search.offer_all(run("swap", replace(task, objective=cheap)).subsets)
         search.offer_all(forward_selection(task).subsets)
-    search.neighbours()
+    search.extend_to_neighbours()
     if cheap is None:
         search.kick(task.effort.kicks, np.random.default_rng(task.effort.seed), task.progress)
-    return by_size(task.objective, search.best.values())
+    return sort_by_size(task.objective, search.best.values())
 
 
 @dataclass
-class _Exchanges:
+class _SwapSearch:
     """The best subset of each number of columns so far."""
 
     objective: Objective
@@ -51,27 +51,27 @@ class _Exchanges:
     _seen: set[frozenset[int]] = field(default_factory=set)
 
     def offer_all(self, subsets: tuple[IntArray, ...]) -> None:
-        """Improve subsets of columns and keep the best."""
+        """Improve subsets of columns, and keep the best of each size."""
         for subset in subsets:
             if self.smallest <= len(subset) <= self.limit:
-                self.offer(self.objective.units_of(subset))
+                self.offer(self.objective.find_units(subset))
 
     def offer(self, kept: Units) -> bool:
-        """Improve a subset by exchanges; whether it is better than the best of its size."""
-        n = self.objective.width(kept)
+        """Improve a subset by swaps, and return whether it is better than the best of its size."""
+        n = self.objective.count_columns(kept)
         known = self._scores.get(n, np.inf)
         if known <= self.objective.negligible or frozenset(kept) in self._seen:
             return False
         self._seen.add(frozenset(kept))
-        kept, score = self.objective.improved(kept)
+        kept, score = self.objective.improve(kept)
         self._seen.add(frozenset(kept))
         if n in self.best and not score < known * (1 - TIE):
             return False
         self.best[n], self._scores[n] = kept, score
         return True
 
-    def neighbours(self) -> None:
-        """Add to and take from the subsets of the sizes around until none gets better."""
+    def extend_to_neighbours(self) -> None:
+        """Add a unit to the best subsets or remove one, until no size gets better."""
         while True:
             better = [self._offer_longer(n) for n in sorted(self.best)]
             better += [self._offer_shorter(n) for n in sorted(self.best, reverse=True)]
@@ -79,19 +79,21 @@ class _Exchanges:
                 return
 
     def _offer_longer(self, n: int) -> bool:
-        longer = self.objective.with_best(self.best[n], self.limit)
-        wide = self.objective.width(longer)
+        """Offer the best subset of a size with one unit more."""
+        longer = self.objective.add_best(self.best[n], self.limit)
+        wide = self.objective.count_columns(longer)
         return n < wide <= self.limit and self.offer(longer)
 
     def _offer_shorter(self, n: int) -> bool:
+        """Offer the best subset of a size with one unit less."""
         kept = self.best[n]
         if len(kept) == 1:
             return False
-        shorter = self.objective.without_least(kept)
-        return self.objective.width(shorter) >= self.smallest and self.offer(shorter)
+        shorter = self.objective.remove_worst(kept)
+        return self.objective.count_columns(shorter) >= self.smallest and self.offer(shorter)
 
     def kick(self, times: int, random: np.random.Generator, tell: Tell) -> None:
-        """Replace a few parameters by random ones and improve that."""
+        """Replace a few parameters by random ones, and improve the result."""
         everything = np.arange(len(self.objective.units))
         better = False
         for done, n in enumerate(sorted(self.best)):
@@ -102,8 +104,8 @@ class _Exchanges:
                 count = min(_KICKED, kept.size, rest.size)
                 out = random.choice(kept.size, count, replace=False)
                 kept[out] = random.choice(rest, count, replace=False)
-                same = self.objective.width(tuple(kept.tolist())) == n
+                same = self.objective.count_columns(tuple(kept.tolist())) == n
                 better |= bool(same and self.offer(tuple(kept.tolist())))
         tell(Progress("random changes", len(self.best), len(self.best)))
         if better:
-            self.neighbours()
+            self.extend_to_neighbours()

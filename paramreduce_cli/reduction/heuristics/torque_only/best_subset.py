@@ -1,7 +1,7 @@
 """The best subset of every size by branch and bound."""
 
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, by_size, run
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, run, sort_by_size
 
 
 def best_subset(task: SelectionTask) -> FoundSubsets:
@@ -12,4 +12,6 @@ def best_subset(task: SelectionTask) -> FoundSubsets:
     """
     search = ProofSearch(task, run("swap", task).subsets)
     search.run()
-    return FoundSubsets(by_size(task.objective, search.subsets()).subsets, search.record())
+    return FoundSubsets(
+        sort_by_size(task.objective, search.list_subsets()).subsets, search.record()
+    )

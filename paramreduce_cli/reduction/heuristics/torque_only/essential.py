@@ -4,8 +4,8 @@ import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import independent_columns
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.reduction.objective import Objective, Units, without
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
+from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, make_nested
 
 
 def essential(task: SelectionTask) -> FoundSubsets:
@@ -16,20 +16,20 @@ def essential(task: SelectionTask) -> FoundSubsets:
     """
     objective = task.objective
     everything = tuple(range(len(objective.units)))
-    columns = independent_columns(objective.problem.W, objective.columns(everything))
-    left: Units = tuple(sorted(objective.units_of(np.array(columns))))
-    tail = completed(objective, left)[len(left) :]
+    columns = independent_columns(objective.problem.W, objective.list_columns(everything))
+    left: Units = tuple(sorted(objective.find_units(np.array(columns))))
+    tail = append_others(objective, left)[len(left) :]
     while left:
-        unsure = _relative_deviations(objective, left)
+        unsure = _compute_relative_deviations(objective, left)
         gone = left[len(left) - 1 - int(np.argmax(unsure[::-1]))]  # ties: the least preferred
-        left, tail = without(left, gone), (gone, *tail)
-    return nested(task, tail)
+        left, tail = remove_unit(left, gone), (gone, *tail)
+    return make_nested(task, tail)
 
 
-def _relative_deviations(objective: Objective, kept: Units) -> FloatArray:
-    """Standard deviation over value of each unit, up to a common factor, (n_kept,)."""
+def _compute_relative_deviations(objective: Objective, kept: Units) -> FloatArray:
+    """Return the standard deviation over the value of each unit, up to a common factor, (n_kept,)."""
     problem = objective.problem
-    columns = objective.columns(kept)
+    columns = objective.list_columns(kept)
     X = problem.X[:, columns]
     u, s, vt = np.linalg.svd(X, full_matrices=False)
     s = np.maximum(s, 1e-12 * s[0])

@@ -3,8 +3,8 @@
 import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import Orthogonaliser
-from paramreduce_cli.reduction.problem import first_of_the_best
-from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, completed, nested
+from paramreduce_cli.reduction.problem import find_first_best
+from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, make_nested
 
 
 def qr(task: SelectionTask) -> FoundSubsets:
@@ -17,9 +17,9 @@ def qr(task: SelectionTask) -> FoundSubsets:
     rest = Orthogonaliser(problem.X[:, problem.columns])
     weights = problem.lengths[problem.columns] ** 2
     order: tuple[int, ...] = ()
-    while (left := objective.per_unit(rest.squared_lengths() * weights)).any():
-        unit = first_of_the_best(left)
+    while (left := objective.average_by_unit(rest.squared_lengths() * weights)).any():
+        unit = find_first_best(left)
         for column in np.flatnonzero(objective.owner == unit):
             rest.take(int(column))
         order = (*order, unit)
-    return nested(task, completed(objective, order))
+    return make_nested(task, append_others(objective, order))
