@@ -1,4 +1,4 @@
-"""How a reduced model stands against that of all base parameters, on data that neither has seen."""
+"""Comparison of a reduced model with all base parameters, on held-out data."""
 
 import numpy as np
 
@@ -11,8 +11,8 @@ _SURE = 2.0
 """Standard errors of the mean difference over folds that tell two models apart."""
 
 
-def compared(full: Estimate, reduced: Estimate) -> str:
-    """One sentence on held-out data, one on the parts left out in turn."""
+def compare_held_out(full: Estimate, reduced: Estimate) -> str:
+    """Return a sentence on errors on held-out data, and one on cross-validation."""
     if len(full.names) == len(reduced.names):
         return (
             f"The reduced model has as many parameters as the full one, {len(full.names)}: "

@@ -1,4 +1,4 @@
-"""Standard parameters that a machine can have, from torques that tell only base parameters.
+"""Physically consistent standard parameters from torques that determine only base parameters.
 
 A rigid body exists where its pseudo-inertia matrix is positive definite [Wensing2018], a linear matrix
 inequality; friction, rotor inertia and stiffness are positive. Among what the torques leave open
@@ -30,7 +30,7 @@ _UNKNOWN_RADIUS = 0.1
 
 @dataclass(frozen=True)
 class Physical:
-    """Which parameters make bodies and what must be positive.
+    """The parameters that belong to bodies, and those that must not be negative.
 
     Attributes:
         names: Of bodies and payloads.
@@ -48,8 +48,8 @@ class Physical:
     known: FloatArray
 
 
-def physical_parameters(mechanism: Mechanism, known: FloatArray, factor: FloatArray) -> Physical:
-    """What of a mechanism's parameters must be physical.
+def list_constraints(mechanism: Mechanism, known: FloatArray, factor: FloatArray) -> Physical:
+    """Return which parameters of a mechanism must be physical, and what is known of them.
 
     Args:
         mechanism: The robot.
@@ -65,55 +65,56 @@ def physical_parameters(mechanism: Mechanism, known: FloatArray, factor: FloatAr
     lengths[lengths == 0] = 1.0
     sizes = np.linalg.norm(factor[:, -1]) / lengths
     for row in columns:
-        sizes[row] = _body_sizes(known[row])
+        sizes[row] = _compute_body_scales(known[row])
     return Physical(names, columns, np.array(positive, dtype=np.int64), sizes, known)
 
 
-def _body_sizes(values: FloatArray) -> FloatArray:
+def _compute_body_scales(values: FloatArray) -> FloatArray:
+    """Return the size of a large change of a body's ten parameters, from its mass and radius of gyration."""
     mass = abs(float(values[0])) or _UNKNOWN_MASS
     squared = abs(float(values[[4, 7, 9]].sum())) / (2 * mass)
     radius = np.sqrt(squared) if squared > 0 else _UNKNOWN_RADIUS
     return mass * np.array([1.0, *[radius] * 3, *[radius**2] * 6])
 
 
-def pseudo_inertias(physical: Physical, values: FloatArray) -> FloatArray:
-    """Of every body, (n_bodies, 4, 4)."""
-    return np.array([_matrix(values[row]) for row in physical.columns])
+def compute_pseudo_inertias(physical: Physical, values: FloatArray) -> FloatArray:
+    """Return the pseudo-inertia matrix of every body, (n_bodies, 4, 4)."""
+    return np.array([_build_pseudo_inertia(values[row]) for row in physical.columns])
 
 
-def _matrix(values: FloatArray) -> FloatArray:
+def _build_pseudo_inertia(values: FloatArray) -> FloatArray:
     return compute_pseudo_inertia(dict(zip(INERTIAL, values.tolist(), strict=True)))
 
 
-def smallest_eigenvalues(physical: Physical, values: FloatArray) -> FloatArray:
-    """Of every body's pseudo-inertia matrix, (n_bodies,)."""
-    found = np.linalg.eigvalsh(pseudo_inertias(physical, values))[:, 0]
+def compute_smallest_eigenvalues(physical: Physical, values: FloatArray) -> FloatArray:
+    """Return the smallest eigenvalue of every body's pseudo-inertia matrix, (n_bodies,)."""
+    found = np.linalg.eigvalsh(compute_pseudo_inertias(physical, values))[:, 0]
     return np.asarray(found, dtype=float)
 
 
-def unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
-    """The parameters nearest to the known ones that fit, whether they can be or not, (n_parameters,).
+def fit_unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
+    """Return the parameters nearest to the known ones that fit the data, physical or not, (n_parameters,).
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
         physical: What is known.
     """
-    A, b = _stacked(factor, physical)
+    A, b = _stack_rows(factor, physical)
     solution = np.linalg.lstsq(A, b, rcond=None)[0]
     found: FloatArray = physical.known + physical.sizes * solution
     return found
 
 
-def _stacked(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
-    """Rows of the data and of what is known, in units of the sizes from the known values."""
+def _stack_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
+    """Return the rows of the data and of the known values, in units of the scales."""
     W, tau = factor[:, :-1], factor[:, -1]
     n = physical.known.size
     A = np.vstack([W * physical.sizes, np.eye(n)])
     return A, np.concatenate([tau - W @ physical.known, np.zeros(n)])
 
 
-def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatArray:
-    """The parameters nearest to the data and the known ones that a machine can have, (n_parameters,).
+def fit_consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatArray:
+    """Return the physical parameters nearest to the data and to the known ones, (n_parameters,).
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
@@ -129,14 +130,14 @@ def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatAr
     import cvxpy as cp  # late: an extra, and slow to load
 
     x = cp.Variable(physical.known.size)
-    data, rest = _data_rows(factor, physical)
-    bodies, constraints = _bodies(cp, physical, x)
+    data, rest = _scale_rows(factor, physical)
+    bodies, constraints = _express_bodies(cp, physical, x)
     if physical.positive.size:
         k = physical.positive
         constraints.append(physical.known[k] / physical.sizes[k] + x[k] >= 0)
     cost = cp.sum_squares(data @ x - rest)
     if distance == "entropic":
-        cost += _divergence(cp, physical, bodies)
+        cost += _express_divergence(cp, physical, bodies)
     else:
         cost += cp.sum_squares(x)
     problem = cp.Problem(cp.Minimize(cost), constraints)
@@ -154,24 +155,24 @@ def consistent(factor: FloatArray, physical: Physical, distance: str) -> FloatAr
     return result
 
 
-def _data_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
+def _scale_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
     W, tau = factor[:, :-1], factor[:, -1]
     return W * physical.sizes, tau - W @ physical.known
 
 
-def _scale(physical: Physical, body: int) -> FloatArray:
-    """Units of a body's pseudo-inertia matrix, so that that of a body of its size is near the identity."""
+def _compute_units(physical: Physical, body: int) -> FloatArray:
+    """Return units of a body's pseudo-inertia matrix in which a body of its size is near the identity."""
     mass, second = physical.sizes[physical.columns[body]][[0, 4]]
     return np.diag([1 / np.sqrt(second)] * 3 + [1 / np.sqrt(mass)])
 
 
-def _bodies(cp: Any, physical: Physical, x: Any) -> tuple[list[Any], list[Any]]:
-    """Scaled pseudo-inertia matrices as expressions, and that they are positive definite."""
+def _express_bodies(cp: Any, physical: Physical, x: Any) -> tuple[list[Any], list[Any]]:
+    """Return scaled pseudo-inertia matrices as expressions, and the constraints that they are positive definite."""
     found, constraints = [], []
-    basis = [_matrix(unit) for unit in np.eye(len(INERTIAL))]
+    basis = [_build_pseudo_inertia(unit) for unit in np.eye(len(INERTIAL))]
     for body, row in enumerate(physical.columns):
-        S = _scale(physical, body)
-        whole = S @ _matrix(physical.known[row]) @ S
+        S = _compute_units(physical, body)
+        whole = S @ _build_pseudo_inertia(physical.known[row]) @ S
         terms = [
             (S @ E @ S * physical.sizes[column]) * x[int(column)]
             for E, column in zip(basis, row, strict=True)
@@ -182,11 +183,14 @@ def _bodies(cp: Any, physical: Physical, x: Any) -> tuple[list[Any], list[Any]]:
     return found, constraints
 
 
-def _divergence(cp: Any, physical: Physical, bodies: Sequence[Any]) -> Any:
+def _express_divergence(cp: Any, physical: Physical, bodies: Sequence[Any]) -> Any:
+    """Return the divergence of the bodies from the known ones as an expression, or raise DataError if a known body is
+    not physical.
+    """
     cost = 0
     for body, (name, row) in enumerate(zip(physical.names, physical.columns, strict=True)):
-        S = _scale(physical, body)
-        known = S @ _matrix(physical.known[row]) @ S
+        S = _compute_units(physical, body)
+        known = S @ _build_pseudo_inertia(physical.known[row]) @ S
         if np.linalg.eigvalsh(known)[0] <= _MARGIN:
             raise DataError(
                 f"the known inertia of {name} is not that of any body, so nothing has an entropic distance "

@@ -1,4 +1,4 @@
-"""Values of parameters from measured torques, with standard deviations for coloured noise."""
+"""Parameters identified from measured torques, with standard deviations for coloured noise."""
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -9,11 +9,11 @@ import scipy  # its stats takes a third of a second to load, so only when it is 
 
 from paramreduce_cli.identification.uncertainty import (
     ColouredNoise,
-    autocovariance_of,
-    coloured_noise,
-    corrected,
-    effective_samples,
-    score_covariance,
+    add_lost_noise,
+    compute_score_covariance,
+    count_effective_samples,
+    estimate_autocovariance,
+    fit_noise,
 )
 from paramreduce_cli.multibody.observation import append_rows
 from paramreduce_cli.multibody.orthogonal import least_squares
@@ -35,7 +35,7 @@ _LAGS = 10
 
 @dataclass(frozen=True)
 class Rows:
-    """Rows of W for the columns of one model, with the torques, held in memory.
+    """The rows of W for the columns of one model, with the torques, held in memory.
 
     Attributes:
         X: One array for each uninterrupted part, (n_samples, n_dof, p).
@@ -59,8 +59,8 @@ class Rows:
         return sum(part.shape[0] for part in self.tau)
 
 
-def rows_of(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Rows:
-    """Rows of a model, evenly from all trajectories where there are too many.
+def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -> Rows:
+    """Return the rows of a model, taken evenly from all trajectories if there are too many.
 
     Args:
         blocks: The samples.
@@ -92,10 +92,10 @@ RowMaker = Callable[[], Iterable[tuple[FloatArray, FloatArray]]]
 """Yields the rows of a model and the torques of all samples, block by block, anew with every call."""
 
 
-def robust_fit(
+def fit_robustly(
     make: RowMaker, start: FloatArray, deviation: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Iteratively reweighted least squares with Huber's weights [Huber1964].
+    """Fit parameters by iteratively reweighted least squares with Huber's weights [Huber1964].
 
     Args:
         make: Yields (X, tau) blocks of all samples anew, (n, n_dof, p) and (n, n_dof).
@@ -141,7 +141,7 @@ class LinearFit:
 
     @cached_property
     def weights(self) -> FloatArray:
-        """Of squared residuals, (n_dof,)."""
+        """Weights of squared residuals, (n_dof,)."""
         return 1 / self.deviation**2
 
     @cached_property
@@ -160,8 +160,8 @@ class LinearFit:
         pairs = zip(self.rows.X, self.rows.tau, strict=True)
         return [tau - X @ self.parameters for X, tau in pairs]
 
-    def left_of(self, noise: Sequence[FloatArray]) -> list[FloatArray]:
-        """What a fit leaves of other torques, (n_samples, n_dof) for each part."""
+    def compute_residuals_of(self, noise: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return the residuals of other torques after a fit, (n_samples, n_dof) for each part."""
         score = sum(
             np.einsum("njp,nj->p", X, e * self.weights)
             for X, e in zip(self.rows.X, noise, strict=True)
@@ -171,45 +171,45 @@ class LinearFit:
 
     @cached_property
     def noise(self) -> list[ColouredNoise]:
-        """Of each joint.
+        """Coloured noise of each joint.
 
-        A fit takes slow noise out of its residuals; how much is seen on noise that is drawn and
-        fitted alike, and given back.
+        A fit takes slow noise out of its residuals; the loss is estimated from simulated noise that is fitted alike,
+        and added back.
         """
         n_dof, n = self.deviation.size, self.rows.n_samples
-        seen = [autocovariance_of([e[:, j] for e in self.residuals]) for j in range(n_dof)]
-        models = [coloured_noise(a, n) for a in seen]
+        seen = [estimate_autocovariance([e[:, j] for e in self.residuals]) for j in range(n_dof)]
+        models = [fit_noise(a, n) for a in seen]
         rng = np.random.default_rng(0)
         for _ in range(_ROUNDS):
             lost = [np.zeros_like(a) for a in seen]
             for _ in range(_DRAWS):
                 drawn = [
-                    np.column_stack([model.drawn(e.shape[0], rng) for model in models])
+                    np.column_stack([model.simulate(e.shape[0], rng) for model in models])
                     for e in self.residuals
                 ]
-                left = self.left_of(drawn)
+                left = self.compute_residuals_of(drawn)
                 for j in range(n_dof):
-                    whole = autocovariance_of([e[:, j] for e in drawn])
-                    lost[j] += (whole - autocovariance_of([e[:, j] for e in left])) / _DRAWS
-            models = [coloured_noise(corrected(a, b), n) for a, b in zip(seen, lost, strict=True)]
+                    whole = estimate_autocovariance([e[:, j] for e in drawn])
+                    lost[j] += (whole - estimate_autocovariance([e[:, j] for e in left])) / _DRAWS
+            models = [fit_noise(add_lost_noise(a, b), n) for a, b in zip(seen, lost, strict=True)]
         return models
 
-    def covariance(self) -> FloatArray:
-        """Of the parameters, (p, p)."""
-        scores = score_covariance(self.rows.X, self.noise, self.weights)
+    def compute_covariance(self) -> FloatArray:
+        """Return the covariance of the parameters, (p, p)."""
+        scores = compute_score_covariance(self.rows.X, self.noise, self.weights)
         result: FloatArray = self._inverse @ scores @ self._inverse * self.rows.share
         return result
 
-    def judged_residuals(self, n_samples: int) -> Residuals:
-        """What the residuals are like.
+    def analyse_residuals(self, n_samples: int) -> Residuals:
+        """Return the statistics of the residuals.
 
         Args:
-            n_samples: Of the whole training data.
+            n_samples: Number of samples of the whole training data.
         """
         every = np.concatenate(self.residuals)
         lag_one, white = [], []
         for j in range(self.deviation.size):
-            covariance = autocovariance_of([e[:, j] for e in self.residuals])
+            covariance = estimate_autocovariance([e[:, j] for e in self.residuals])
             correlation = covariance / max(covariance[0], 1e-300)
             lags = np.arange(1, min(_LAGS, covariance.size - 1) + 1)
             n = every.shape[0]
@@ -220,17 +220,17 @@ class LinearFit:
         return Residuals(
             deviation=np.std(every, axis=0) * unknown,
             lag_one=np.array(lag_one) * unknown,
-            effective_samples=np.array([effective_samples(m, n_samples) for m in self.noise])
+            effective_samples=np.array([count_effective_samples(m, n_samples) for m in self.noise])
             * unknown,
             white=np.array(white) * unknown,
         )
 
 
-def weighted_fit(rows: Rows, deviation: FloatArray) -> LinearFit:
-    """Weighted least squares on some rows.
+def fit_weighted(rows: Rows, deviation: FloatArray) -> LinearFit:
+    """Fit a model's parameters by weighted least squares.
 
     Args:
-        rows: Of a model.
+        rows: Rows of the model.
         deviation: That torques of each joint are divided by, (n_dof,); infinite where not measured.
     """
     X = np.concatenate([(x / deviation[:, None]).reshape(-1, x.shape[2]) for x in rows.X])

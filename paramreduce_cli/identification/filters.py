@@ -28,8 +28,8 @@ _DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 
 """Central differences of eighth order."""
 
 
-def low_pass(cutoff: float, rate: float) -> FloatArray:
-    """Coefficients of a symmetric low-pass, (2 k + 1,); a single one where it would change nothing.
+def design_low_pass(cutoff: float, rate: float) -> FloatArray:
+    """Return the coefficients of a symmetric low-pass, (2 k + 1,), or a single one if it would change nothing.
 
     Args:
         cutoff: Frequency at which half of the amplitude passes, Hz; may be infinite.
@@ -42,26 +42,25 @@ def low_pass(cutoff: float, rate: float) -> FloatArray:
     return taps
 
 
-def filtered(x: FloatArray, taps: FloatArray) -> FloatArray:
-    """The signal through a symmetric filter, as long as it was; the signal itself where that changes nothing.
-
-    Beyond its ends it is continued by its point reflection, which keeps values and slopes.
+def apply_filter(x: FloatArray, taps: FloatArray) -> FloatArray:
+    """Return the signal through a symmetric filter, as long as before, or the signal itself if the filter changes
+    nothing. Beyond its ends the signal is continued by its point reflection, which keeps values and slopes.
 
     Args:
-        x: (n_samples, n)
-        taps: (2 k + 1,)
+        x: Signals, (n_samples, n).
+        taps: Coefficients of the filter, (2 k + 1,).
     """
     k = taps.size // 2
     if k == 0:
         return x
     result = np.empty(x.shape)
     for column, out in zip(x.T, result.T, strict=True):  # one at a time: transforms are large
-        out[:] = scipy.signal.oaconvolve(_continued(column, k), taps, mode="valid")
+        out[:] = scipy.signal.oaconvolve(_extend(column, k), taps, mode="valid")
     return result
 
 
-def _continued(x: FloatArray, k: int) -> FloatArray:
-    """A column with k samples more at both ends."""
+def _extend(x: FloatArray, k: int) -> FloatArray:
+    """Return a column with k samples more at both ends."""
     if x.size == 1:
         return np.repeat(x, 2 * k + 1)
     while k > 0:  # in steps where the filter is longer than the signal
@@ -71,20 +70,20 @@ def _continued(x: FloatArray, k: int) -> FloatArray:
     return x
 
 
-def derivative(x: FloatArray, rate: float) -> FloatArray:
-    """Time derivative by central differences of eighth order, as long as the signal."""
-    return filtered(x, _DERIVATIVE[::-1]) * rate
+def differentiate(x: FloatArray, rate: float) -> FloatArray:
+    """Return the time derivative by central differences of eighth order, as long as the signal."""
+    return apply_filter(x, _DERIVATIVE[::-1]) * rate
 
 
-def thinned_low_pass(
+def filter_samples(
     rows: FloatArray, first: int, taps: FloatArray, outputs: np.ndarray
 ) -> FloatArray:
-    """Single samples of a filtered signal.
+    """Return single samples of a filtered signal.
 
     Args:
-        rows: A stretch of the signal, (n_rows, n).
+        rows: Rows of the signal, (n_rows, n).
         first: Number of its first row.
-        taps: Of a symmetric filter, (2 k + 1,).
+        taps: Coefficients of a symmetric filter, (2 k + 1,).
         outputs: Numbers of the wanted samples, whose neighbourhood of k rows must be there.
 
     Returns:
@@ -98,8 +97,8 @@ def thinned_low_pass(
     return result
 
 
-def spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, FloatArray]:
-    """Frequencies (n_frequencies,) in Hz, and power spectral densities (n_frequencies, n) [Welch1967].
+def estimate_spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, FloatArray]:
+    """Return frequencies, (n_frequencies,), Hz, and power spectral densities, (n_frequencies, n) [Welch1967].
 
     Args:
         columns: Signals, (n_samples,) each; one at a time, as segments overlap, and are all there at once.
@@ -116,8 +115,8 @@ def spectrum(columns: Iterable[FloatArray], rate: float) -> tuple[FloatArray, Fl
     return frequency, np.column_stack(densities)
 
 
-def band_of_motion(frequency: FloatArray, density: FloatArray) -> float:
-    """Frequency up to which a signal stands out of its noise, in Hz; of several the highest.
+def find_motion_band(frequency: FloatArray, density: FloatArray) -> float:
+    """Return the highest frequency up to which a signal stands out of its noise, Hz; of several signals the highest.
 
     The noise floor is the median density over the upper half of all frequencies.
     """

@@ -56,24 +56,24 @@ def find_hints(
     consistency: Consistency | None,
     delay: float,
 ) -> list[str]:
-    """Sentences on what looks wrong.
+    """Return hints at likely causes of large errors, the most important first.
 
     Args:
-        model: Of the machine.
-        training: What was learned from.
-        full: All base parameters.
-        fitted: Their fit, with its residuals.
-        consistency: What bodies that can exist explain; None where that is not known.
-        delay: Of the torques, that was taken back already, s.
+        model: Model of the machine.
+        training: Training samples.
+        full: Estimate of all base parameters.
+        fitted: Fit of all base parameters, with its residuals.
+        consistency: Physically consistent parameters; None if they were not computed.
+        delay: Delay of the torques that was already compensated, s.
     """
-    looked_at = _some(model, training)
+    looked_at = _sample_states(model, training)
     gravity = hint_at_gravity(
         looked_at.W, looked_at.pulls, looked_at.tau, fitted.deviation, model.mechanism.gravity
     )
     mechanism = model.mechanism
     names = mechanism.coordinate_names
     wrong = gravity or hint_at_sign(
-        looked_at.exact, looked_at.mirrored(), looked_at.tau, fitted.deviation, names
+        looked_at.exact, looked_at.iterate_mirrored(), looked_at.tau, fitted.deviation, names
     )
     if wrong:  # what else is seen follows from that
         return [*_hint_at_large_errors(full), *wrong]
@@ -83,7 +83,7 @@ def find_hints(
         *find_residual_hints(
             fitted,
             names,
-            _tilts(model, training, fitted),
+            _compute_tilt_torques(model, training, fitted),
             gravity=float(np.linalg.norm(mechanism.gravity)),
             delay=delay,
             sliding=[mechanism.bodies[k].joint == "prismatic" for k in mechanism.independent],
@@ -97,7 +97,7 @@ def find_hints(
 
 
 def _hint_at_large_errors(full: Estimate) -> Iterator[str]:
-    """What errors say as they are."""
+    """Yield hints at a wrong log or robot if errors are large."""
     if full.train > _HARDLY:
         yield (
             f"All base parameters together leave {format_percent(full.train)} of the torques unexplained: is the log of this "
@@ -111,7 +111,7 @@ def _hint_at_large_errors(full: Estimate) -> Iterator[str]:
 
 
 def _hint_at_impossible_bodies(full: Estimate, consistency: Consistency | None) -> Iterator[str]:
-    """What is said where only bodies that cannot exist explain the torques, as with another robot's kinematics."""
+    """Yield a hint if only bodies that cannot exist explain the torques, as with the kinematics of another robot."""
     if consistency is None or full.train > _HARDLY:
         return
     if consistency.train > max(_IMPOSSIBLE * full.train, full.train + _BESIDE):
@@ -123,8 +123,8 @@ def _hint_at_impossible_bodies(full: Estimate, consistency: Consistency | None) 
 
 
 @dataclass(frozen=True)
-class _Looked:
-    """Some samples, evenly from all."""
+class _SampledStates:
+    """A subset of samples, taken evenly from all."""
 
     W: FloatArray
     """(n_samples, n_dof, n_standard)"""
@@ -141,8 +141,8 @@ class _Looked:
         """W of the states, without the low-pass of the torques, (n_samples, n_dof, n_standard)."""
         return self.dynamics.regressor(*self.states)
 
-    def mirrored(self) -> Iterator[FloatArray]:
-        """The same with each joint turned round; none with loops, where joints depend on each other."""
+    def iterate_mirrored(self) -> Iterator[FloatArray]:
+        """Yield the regressor with each joint reversed; nothing with loops, where joints depend on each other."""
         if self.dynamics.mechanism.loops is not None:
             return
         for j in range(self.states[0].shape[1]):
@@ -151,8 +151,8 @@ class _Looked:
             yield self.dynamics.regressor(*(sign * state for state in self.states))
 
 
-def _some(model: Model, training: SampleSet) -> _Looked:
-    """Of what is learned from."""
+def _sample_states(model: Model, training: SampleSet) -> _SampledStates:
+    """Return a subset of the training samples."""
     mechanism = model.mechanism
     every = max(1, training.n_samples * mechanism.n_dof // _ENOUGH)
     still, *along = (
@@ -173,7 +173,7 @@ def _some(model: Model, training: SampleSet) -> _Looked:
                 [d.regressor(q, np.zeros_like(q), np.zeros_like(q)) - weightless for d in along]
             )
     q, dq, ddq = (np.concatenate(parts) for parts in zip(*states, strict=True))
-    return _Looked(
+    return _SampledStates(
         np.concatenate(W),
         np.concatenate(pulls, axis=1),
         np.concatenate(tau),
@@ -182,8 +182,8 @@ def _some(model: Model, training: SampleSet) -> _Looked:
     )
 
 
-def _hint_at_bodies(model: Model, looked_at: _Looked, full: Estimate) -> list[str]:
-    """What is said where the config has values of the bodies, or ratings of the joints."""
+def _hint_at_bodies(model: Model, looked_at: _SampledStates, full: Estimate) -> list[str]:
+    """Return hints that compare torques with the config's values of bodies and ratings of joints."""
     bodies = [k for k, p in enumerate(model.mechanism.parameters) if p.kind in INERTIAL]
     W = looked_at.W[:, :, bodies]
     found = hint_at_unit(W @ model.values[bodies], W @ full.standard[bodies])
@@ -192,8 +192,10 @@ def _hint_at_bodies(model: Model, looked_at: _Looked, full: Estimate) -> list[st
     return hint_at_rating(looked_at.tau, model.nominal_torque, model.mechanism.coordinate_names)
 
 
-def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[FloatArray, ...]]:
-    """Torques of gravity along the base's level axes, of the known masses, where there are any."""
+def _compute_tilt_torques(
+    model: Model, training: SampleSet, fitted: LinearFit
+) -> list[tuple[FloatArray, ...]]:
+    """Return the torques of gravity along the base's horizontal axes, with the known masses."""
     mechanism = model.mechanism
     level = np.abs(mechanism.gravity) <= _ACROSS * np.linalg.norm(mechanism.gravity)
     if (
@@ -217,7 +219,7 @@ def _tilts(model: Model, training: SampleSet, fitted: LinearFit) -> list[tuple[F
 
 
 def _hint_at_friction(model: Model, full: Estimate) -> list[str]:
-    """Of the base parameters those of friction that stand for themselves."""
+    """Return hints at negative friction among the base parameters."""
     kinds = {p.name: p for p in model.mechanism.parameters if p.kind in _FRICTION}
     places = [k for k, name in enumerate(full.names) if name in kinds]
     found = [kinds[full.names[k]] for k in places]

@@ -1,4 +1,4 @@
-"""What looks wrong in recorded motions, before any model is asked."""
+"""Checks of recorded motions, before any model is used."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
@@ -30,13 +30,13 @@ _PER_PERIOD = 20
 def find_log_warnings(
     piece: Signals, rate: float, names: Sequence[str], unmeasured: Collection[str] = ()
 ) -> Iterator[str]:
-    """Sentences on joints that stand still, units, signs and order of columns, and limits.
+    """Yield warnings on joints that stand still, units, signs, the order of columns, and limits.
 
     Args:
-        piece: An uninterrupted motion as recorded.
+        piece: Uninterrupted motion as recorded.
         rate: Samples per second.
-        names: Of the coordinates.
-        unmeasured: Those without torques.
+        names: Names of the coordinates.
+        unmeasured: Names of coordinates without torques.
     """
     if rate < _SLOW:
         unit = next(name for name, step in _STEPS.items() if 1 / rate > step)
@@ -56,47 +56,49 @@ def find_log_warnings(
             continue
         if np.ptp(tau) == 0:
             frozen.append(name)
-        elif _longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:
+        elif _find_longest_run(np.abs(tau) >= np.abs(tau).max() * (1 - 1e-9)) >= _SATURATED:
             limited.append(name)
     if far:
         yield (
-            f"positions of {_listed(far)} go up to {largest:.3g} rad: are they degrees, or of a motor before its "
+            f"positions of {_join_names(far)} go up to {largest:.3g} rad: are they degrees, or of a motor before its "
             "gears? Then say so under units, or transmission."
         )
     if constant:
-        yield f"{_listed(constant)}: positions change, but recorded speeds are constant: are speeds recorded?"
+        yield f"{_join_names(constant)}: positions change, but recorded speeds are constant: are speeds recorded?"
     if frozen:
-        yield f"torques of {_listed(frozen)} are constant: are they recorded?"
+        yield f"torques of {_join_names(frozen)} are constant: are they recorded?"
     if limited:
-        yield f"torques of {_listed(limited)} stay at their largest value: are they at a limit there?"
+        yield f"torques of {_join_names(limited)} stay at their largest value: are they at a limit there?"
     if piece.dz is not None:
-        yield from _speeds_against_positions(piece.z, piece.dz, rate, names)
+        yield from _compare_speeds(piece.z, piece.dz, rate, names)
 
 
-def _listed(names: Sequence[str]) -> str:
+def _join_names(names: Sequence[str]) -> str:
     return f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
 
 
-def _longest_run(flags: np.ndarray) -> int:
+def _find_longest_run(flags: np.ndarray) -> int:
+    """Return the length of the longest run of true flags."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], flags.astype(int), [0]])))
     return int((edges[1::2] - edges[::2]).max(initial=0))
 
 
-def _slow(columns: Iterable[FloatArray], rate: float) -> FloatArray:
-    """What of signals is slow, at as many samples as that needs."""
-    taps = filters.low_pass(_FASTEST, rate)
+def _low_pass(columns: Iterable[FloatArray], rate: float) -> FloatArray:
+    """Return the slow part of signals, at as many samples as that needs."""
+    taps = filters.design_low_pass(_FASTEST, rate)
     slow = []
     for column in columns:
         every = min(int(rate / (_PER_PERIOD * _FASTEST)), column.size // _PER_PERIOD)
-        slow.append(filters.filtered(column[:, None], taps)[:: max(1, every), 0].copy())
+        slow.append(filters.apply_filter(column[:, None], taps)[:: max(1, every), 0].copy())
     return np.column_stack(slow)
 
 
-def _speeds_against_positions(
+def _compare_speeds(
     z: FloatArray, dz: FloatArray, rate: float, names: Sequence[str]
 ) -> Iterator[str]:
-    slopes = _slow((np.gradient(column, 1 / rate) for column in z.T), rate)
-    speeds = _slow(dz.T, rate)
+    """Yield warnings on recorded speeds that are no derivatives of the positions."""
+    slopes = _low_pass((np.gradient(column, 1 / rate) for column in z.T), rate)
+    speeds = _low_pass(dz.T, rate)
     said: dict[str, list[str]] = {}
     for j, name in enumerate(names):
         lengths = np.linalg.norm(speeds[:, j]) * np.linalg.norm(slopes, axis=0)
@@ -122,4 +124,4 @@ def _speeds_against_positions(
                 name
             )
     for what, joints in said.items():
-        yield f"the speed of {_listed(joints)} {what}"
+        yield f"the speed of {_join_names(joints)} {what}"

@@ -1,4 +1,4 @@
-"""Single samples far from their neighbours."""
+"""Outliers: single samples far from their neighbours."""
 
 import numpy as np
 import scipy  # whose ndimage is loaded when it is used
@@ -33,10 +33,10 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
                 away = np.abs(column - scipy.ndimage.median_filter(column, _WINDOW, mode="nearest"))
                 # In smooth signals every peak is far from its neighbours, but never by much.
                 limits = _FAR * np.maximum(
-                    _TO_SIGMA * _around(away), _SMALL * float(np.std(column))
+                    _TO_SIGMA * _smooth_largest(away), _SMALL * float(np.std(column))
                 )
                 far = np.flatnonzero(away > np.repeat(limits, _STRETCH)[: away.size])
-                far = far[_alone(column, far, 0.5 * limits[far // _STRETCH])]
+                far = far[_find_spikes(column, far, 0.5 * limits[far // _STRETCH])]
                 if far.size:
                     found.setdefault((signal, j), []).extend(piece.time[far].tolist())
                     good = np.delete(np.arange(column.size), far)
@@ -44,8 +44,8 @@ def replace_outliers(pieces: list[Signals]) -> dict[tuple[str, int], list[float]
     return found
 
 
-def _around(away: FloatArray) -> FloatArray:
-    """Medians of stretches and their neighbours, the largest: noise varies along a motion."""
+def _smooth_largest(away: FloatArray) -> FloatArray:
+    """Return the largest medians of stretches and their neighbours, as noise varies along a motion."""
     whole = away[: away.size // _STRETCH * _STRETCH].reshape(-1, _STRETCH)
     # Some at a time, as medians are of copies.
     parts = [np.median(whole[k : k + _AT_ONCE], axis=1) for k in range(0, len(whole), _AT_ONCE)]
@@ -55,8 +55,8 @@ def _around(away: FloatArray) -> FloatArray:
     return largest
 
 
-def _alone(column: FloatArray, places: IntArray, least: FloatArray) -> BoolArray:
-    """Which samples stick out from both neighbours to one side; a step's samples do not."""
+def _find_spikes(column: FloatArray, places: IntArray, least: FloatArray) -> BoolArray:
+    """Return which samples stand out from both neighbours on one side; samples of a step do not."""
     before = column[places] - column[np.maximum(places - 1, 0)]
     after = column[places] - column[np.minimum(places + 1, column.size - 1)]
     found: BoolArray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)

@@ -1,4 +1,4 @@
-"""Stretches of motions, and which of their samples are used: to learn from, or held out."""
+"""Pieces of motions, and which of their samples are used for training or held out."""
 
 from dataclasses import dataclass
 
@@ -16,26 +16,26 @@ _SHORTEST = 20
 
 @dataclass(frozen=True)
 class Piece:
-    """A stretch of a motion, and between which times its samples are used."""
+    """A piece of a motion with the times between which it is used."""
 
     signals: Signals
     first: float
     last: float
 
-    def part(self, rows: slice) -> "Piece":
-        """Some of its samples."""
-        return Piece(self.signals.part(rows), self.first, self.last)
+    def slice_rows(self, rows: slice) -> "Piece":
+        """Return some samples of the piece."""
+        return Piece(self.signals.slice_rows(rows), self.first, self.last)
 
     @property
     def used(self) -> slice:
-        """Its samples that are used."""
+        """Samples that are used."""
         time = self.signals.time
         start, stop = np.searchsorted(time, [self.first - _ROUNDING, self.last + _ROUNDING])
         return slice(int(start), int(max(start, stop)))
 
 
-def moving(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
-    """Without what is cut off at the start and the end of a file, which still serves filters."""
+def trim_files(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
+    """Return pieces without the cut-off start and end of a file, which still serve filters."""
     first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
     if wanted.standstill == "cut":
         time = np.concatenate([piece.time for piece in pieces])
@@ -50,8 +50,8 @@ def moving(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
     return [Piece(piece, first, last) for piece in pieces]
 
 
-def split(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
-    """A first share of the used samples, and the rest; pieces that are too short are left out."""
+def split_pieces(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
+    """Return a first share of the used samples, and the rest; pieces that are too short are left out."""
     left = int(share * sum(p.used.stop - p.used.start for p in pieces))
     first, second = [], []
     for piece in pieces:
@@ -62,8 +62,8 @@ def split(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
             second.append(piece)
         else:
             border = piece.used.start + left
-            first.append(piece.part(slice(border)))
-            second.append(piece.part(slice(border, None)))
+            first.append(piece.slice_rows(slice(border)))
+            second.append(piece.slice_rows(slice(border, None)))
         left -= size
     return (
         [p for p in first if p.signals.time.size >= _SHORTEST],

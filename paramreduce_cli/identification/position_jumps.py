@@ -1,4 +1,4 @@
-"""Jumps of recorded positions: rows that belong to no motion, and steps that stay."""
+"""Jumps of recorded positions: rows that belong to no motion, and steps after which the motion goes on."""
 
 import itertools
 from collections.abc import Callable, Iterator, Sequence
@@ -31,7 +31,7 @@ _NAMED = 4
 
 @dataclass(frozen=True)
 class PositionJumps:
-    """Rows of a recording to be cut out, and where the recording is to be parted."""
+    """The rows of a recording to cut out, and the rows at which to split it."""
 
     bad: BoolArray
     """Whether a row belongs to no motion of the robot, (n_rows,)."""
@@ -53,7 +53,7 @@ def find_position_jumps(found: Signals) -> PositionJumps:
     Raises:
         DataError: Too many rows are bad.
     """
-    speed, slack = _largest_speeds(found), _SMALL * _ranges(found.z)
+    speed, slack = _find_largest_speeds(found), _SMALL * _compute_ranges(found.z)
     bad = np.zeros(found.time.size, bool)
     edges = [0, *(_find_jumps(found, speed, slack) + 1).tolist(), found.time.size]
     if len(edges) == _UNBROKEN:
@@ -114,7 +114,7 @@ def _follow_stretches(
 
 
 def _find_jumps(found: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
-    """Rows after which a position goes farther than its joint can, (n_jumps,)."""
+    """Return the rows after which a position moves farther than its joint can, (n_jumps,)."""
     duration = np.diff(found.time)
     jumps = np.zeros(duration.size, bool)
     for j, column in enumerate(found.z.T):  # one after the other, as there may be gigabytes
@@ -129,8 +129,8 @@ def _is_frozen(found: Signals, rows: slice) -> bool:
     )
 
 
-def _largest_speeds(found: Signals) -> FloatArray:
-    """Largest speeds that joints keep for some samples, recorded or by their positions, (n_dof,)."""
+def _find_largest_speeds(found: Signals) -> FloatArray:
+    """Return the largest speeds that joints keep for some samples, recorded or from positions, (n_dof,)."""
     speeds = []
     for j in range(found.z.shape[1]):
         smooth = scipy.ndimage.median_filter(found.z[:, j], _WINDOW, mode="nearest")
@@ -146,8 +146,8 @@ def _largest_speeds(found: Signals) -> FloatArray:
     return np.array(speeds)
 
 
-def _ranges(z: FloatArray) -> FloatArray:
-    """Ranges of positions without single rows far away, (n_dof,)."""
+def _compute_ranges(z: FloatArray) -> FloatArray:
+    """Return the ranges of positions without single outlying rows, (n_dof,)."""
     smooth = (scipy.ndimage.median_filter(column, _WINDOW, mode="nearest") for column in z.T)
     return np.array([np.ptp(column) for column in smooth])
 

@@ -1,4 +1,4 @@
-"""Logs made ready: cleaned, low-passed, differentiated, split into what is learned from and held out."""
+"""Processing of logs: cleaning, low-pass, differentiation, split into training and held-out motions."""
 
 import itertools
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -11,16 +11,16 @@ from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.log_checks import find_log_warnings
 from paramreduce_cli.identification.outliers import replace_outliers
-from paramreduce_cli.identification.pieces import Piece, moving, split
+from paramreduce_cli.identification.pieces import Piece, split_pieces, trim_files
 from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
 from paramreduce_cli.identification.shown import (
     Outliers,
-    place_to_show,
-    recorded_to_show,
-    shown,
-    speeds,
+    collect_signals,
+    decimate_recorded,
+    find_longest,
+    iterate_speeds,
 )
-from paramreduce_cli.identification.signals import Signals, evened, signals
+from paramreduce_cli.identification.signals import Signals, read_signals, resample_evenly
 from paramreduce_cli.records import (
     FloatArray,
     IntArray,
@@ -52,6 +52,8 @@ _WORK = ("clean", "spectra", "low-pass and differentiate", "look at them")
 
 @dataclass(frozen=True)
 class _Cutoffs:
+    """The cut-off frequencies of states and torques, Hz."""
+
     state: float
     torque: float
 
@@ -59,20 +61,20 @@ class _Cutoffs:
 _TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut off less."
 
 
-def processed(
+def process_logs(
     logs: RawLogs,
     wanted: LogSection,
     names: Sequence[str],
     tell: Tell = lambda _: None,
     unmeasured: Collection[str] = (),
 ) -> MeasuredLog:
-    """Make logs ready to identify from.
+    """Process logs for identification.
 
     Args:
-        logs: As recorded.
-        wanted: What is where, and what is to be done.
-        names: Of the independent coordinates.
-        tell: Told how far it is.
+        logs: Logs as recorded.
+        wanted: Settings of the section for logs.
+        names: Names of the independent coordinates.
+        tell: Called with the progress.
         unmeasured: Coordinates without torques.
 
     Raises:
@@ -85,8 +87,8 @@ def processed(
 
     steps: list[str] = []
     begin(0)
-    files = _read(logs.training, wanted, names, unmeasured, steps)
-    others = _read(logs.held_out, wanted, names, unmeasured, steps)
+    files = _read_files(logs.training, wanted, names, unmeasured, steps)
+    others = _read_files(logs.held_out, wanted, names, unmeasured, steps)
     training, held_out, rate = files.motions, others.motions, files.rate
     if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
         raise DataError(
@@ -105,31 +107,31 @@ def processed(
             ),
         ]
     )
-    learned_from, tested_on = _parts(training, held_out, wanted)
+    learned_from, tested_on = _split_files(training, held_out, wanted)
     _check_left(learned_from, files.sources, wanted)
     raw = [piece for part in learned_from for piece in part]
     tested_raw = [piece for part in tested_on for piece in part]
-    place = place_to_show(learned_from, [] if held_out else tested_on, rate)
+    place = find_longest(learned_from, [] if held_out else tested_on, rate)
     longest = raw[place.learned].signals
-    before = recorded_to_show(place.of(raw, tested_raw), rate)
+    before = decimate_recorded(place.get_pieces(raw, tested_raw), rate)
     begin(1)
-    spectra = _spectra(longest, rate)
-    cutoffs = _cutoffs(wanted, spectra, rate, steps)
-    thin = _thinning(wanted, cutoffs, rate)
+    spectra = _estimate_spectra(longest, rate)
+    cutoffs = _choose_cutoffs(wanted, spectra, rate, steps)
+    thin = _choose_decimation(wanted, cutoffs, rate)
 
     def ready(pieces: list[Piece]) -> list[Piece]:
         """Nothing of one piece is in another: they are low-passed apart."""
-        return [_ready(piece, rate, cutoffs, thin) for piece in pieces]
+        return [_process_piece(piece, rate, cutoffs, thin) for piece in pieces]
 
-    steps.append(_said_of_states(longest, thin, rate / thin))
+    steps.append(_describe_states(longest, thin, rate / thin))
     begin(2)
     made = ready(raw)
     made_tested = ready(tested_raw)
-    learned, tested = _motions(made, wanted.folds), _motions(made_tested, 1)
+    learned, tested = _join_pieces(made, wanted.folds), _join_pieces(made_tested, 1)
     _check_enough(learned, tested)
-    steps.append(_said_ofsplit(learned, tested, wanted, rate / thin))
+    steps.append(_describe_split(learned, tested, wanted, rate / thin))
     begin(3)
-    noise = _noise(learned, cutoffs, rate / thin)
+    noise = _estimate_noise(learned, cutoffs, rate / thin)
     used = learned.fold != UNUSED
     power = sum(float(np.mean(tau[used] ** 2)) for tau in learned.tau.T)
     found = MeasuredLog(
@@ -139,13 +141,13 @@ def processed(
         recorded_rate=rate,
         state_cutoff=cutoffs.state,
         torque_cutoff=cutoffs.torque,
-        output_rate=_output_rate(wanted, cutoffs, rate / thin),
+        output_rate=_choose_output_rate(wanted, cutoffs, rate / thin),
         delay=wanted.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / power)),
-        shown=shown(
+        shown=collect_signals(
             before,
-            place.of(made, made_tested),
+            place.get_pieces(made, made_tested),
             cutoffs.torque,
             rate / thin,
             files.outliers[place.file],
@@ -160,7 +162,7 @@ def processed(
 
 @dataclass
 class _Files:
-    """What was read, file by file."""
+    """The signals of files, file by file."""
 
     motions: list[list[Signals]] = field(default_factory=list)
     sources: list[str] = field(default_factory=list)
@@ -171,32 +173,33 @@ class _Files:
     """Samples per second of them all."""
 
 
-def _read(
+def _read_files(
     logs: Iterable[RawLog],
     wanted: LogSection,
     names: Sequence[str],
     unmeasured: Collection[str],
     steps: list[str],
 ) -> _Files:
+    """Return the signals of log files, with jumps cut out, outliers replaced and even time steps."""
     files = _Files()
     for log in logs:
         source = log.source
-        recorded = signals(log, wanted, names, unmeasured)
+        recorded = read_signals(log, wanted, names, unmeasured)
         rows, first_line = recorded.time.size, log.first_line
         del log  # the next one is read while this name would hold it
         try:
             recorded, parted, jumps = _cut_out_jumps(recorded, wanted, names, first_line)
             files.warnings += [f"{source}: {text}" for text in jumps]
             if wanted.delay:
-                _undelay(recorded, wanted.delay, source)
-            pieces, rate, said = evened(recorded, parted)
+                _compensate_delay(recorded, wanted.delay, source)
+            pieces, rate, said = resample_evenly(recorded, parted)
         except DataError as error:
             raise DataError(f"{source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
         steps.append(f"{source}: {rows} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
         outliers = replace_outliers(pieces) if wanted.outliers == "replace" else {}
-        steps += _said_of_outliers(outliers, names)
+        steps += _describe_outliers(outliers, names)
         if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
             raise DataError(
                 f"{source}: is recorded at {rate:.6g} Hz, {files.sources[0]} at {files.rate:.6g} Hz. Bring "
@@ -237,7 +240,7 @@ def _cut_out_jumps(
             f"positions jump to and fro, so {bad.size} of {jumps.bad.size} rows are cut out "
             f"({name_rows(bad, first_line)}): dropouts, or a second publisher?"
         )
-        recorded = recorded.part(~jumps.bad)
+        recorded = recorded.slice_rows(~jumps.bad)
     if jumps.steps.size:
         said.append(
             f"positions jump and do not come back ({name_rows(jumps.steps, first_line)}), so the log is parted there: "
@@ -247,8 +250,8 @@ def _cut_out_jumps(
     return recorded, parted.tolist(), said
 
 
-def _undelay(recorded: Signals, delay: float, source: str) -> None:
-    """Torques at the times at which they acted, in place.
+def _compensate_delay(recorded: Signals, delay: float, source: str) -> None:
+    """Shift torques to the times at which they acted, in place.
 
     Raises:
         ConfigError: None of them was recorded then.
@@ -263,25 +266,29 @@ def _undelay(recorded: Signals, delay: float, source: str) -> None:
         tau[:] = np.interp(time + delay, time, tau)
 
 
-def _parts(
+def _split_files(
     training: list[list[Signals]], held_out: list[list[Signals]], wanted: LogSection
 ) -> tuple[list[list[Piece]], list[list[Piece]]]:
-    """What is learned from and what is held out, by file."""
-    moved = [moving(pieces, wanted) for pieces in training]
+    """Return the training and the held-out pieces, by file."""
+    moved = [trim_files(pieces, wanted) for pieces in training]
     if held_out:
-        return moved, [moving(pieces, wanted) for pieces in held_out]
-    halves = [split(pieces, 1 - wanted.held_out_share) for pieces in moved]
+        return moved, [trim_files(pieces, wanted) for pieces in held_out]
+    halves = [split_pieces(pieces, 1 - wanted.held_out_share) for pieces in moved]
     return [one for one, _ in halves], [two for _, two in halves]
 
 
-def _spectra(piece: Signals, rate: float) -> Spectra:
-    frequency, velocity = filters.spectrum(speeds(piece, rate), rate)
-    _, torque = filters.spectrum(piece.tau.T, rate)
+def _estimate_spectra(piece: Signals, rate: float) -> Spectra:
+    """Return the spectra of speeds and torques."""
+    frequency, velocity = filters.estimate_spectrum(iterate_speeds(piece, rate), rate)
+    _, torque = filters.estimate_spectrum(piece.tau.T, rate)
     return Spectra(frequency[1:], velocity[1:], torque[1:])
 
 
-def _cutoffs(wanted: LogSection, spectra: Spectra, rate: float, steps: list[str]) -> _Cutoffs:
-    band = filters.band_of_motion(spectra.frequency, spectra.velocity)
+def _choose_cutoffs(
+    wanted: LogSection, spectra: Spectra, rate: float, steps: list[str]
+) -> _Cutoffs:
+    """Return the cut-off frequencies that the config gives, or that the spectra suggest."""
+    band = filters.find_motion_band(spectra.frequency, spectra.velocity)
 
     def chosen(given: Frequency, automatic: float, key: str) -> float:
         if given == "none":
@@ -299,20 +306,20 @@ def _cutoffs(wanted: LogSection, spectra: Spectra, rate: float, steps: list[str]
     state = chosen(wanted.state_cutoff, band, "state_cutoff")
     torque = chosen(wanted.torque_cutoff, band, "torque_cutoff")
     steps.append(
-        f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_low_pass(state)}; "
-        f"torques and observation matrix: {_low_pass(torque)}."
+        f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_describe_low_pass(state)}; "
+        f"torques and observation matrix: {_describe_low_pass(torque)}."
     )
     return _Cutoffs(state, torque)
 
 
-def _low_pass(cutoff: float) -> str:
+def _describe_low_pass(cutoff: float) -> str:
     if np.isinf(cutoff):
         return "as recorded"
     return f"zero-phase low-pass at {cutoff:.3g} Hz"
 
 
-def _thinning(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
-    """Every how many samples of the log motions are kept."""
+def _choose_decimation(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
+    """Return the decimation factor of the motions: one of how many samples of the log is kept."""
     if np.isfinite(cutoffs.torque):
         needed = _PER_TORQUE_CUTOFF * cutoffs.torque
         if np.isfinite(cutoffs.state):
@@ -322,7 +329,8 @@ def _thinning(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
     return max(1, int(rate / needed + 1e-9))
 
 
-def _output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
+def _choose_output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
+    """Return the rate of the samples that are used, Hz."""
     usual = rate if np.isinf(cutoffs.torque) else _USED_PER_CUTOFF * cutoffs.torque
     return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
 
@@ -336,40 +344,40 @@ def _check_left(parts: list[list[Piece]], sources: list[str], wanted: LogSection
             )
 
 
-def _ready(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
-    """Low-passed, differentiated, thinned; joint by joint, as whole signals may be gigabytes."""
+def _process_piece(piece: Piece, rate: float, cutoffs: _Cutoffs, thin: int) -> Piece:
+    """Return a piece low-passed, differentiated and decimated, joint by joint, as whole signals may be gigabytes."""
     s = piece.signals
-    state = filters.low_pass(cutoffs.state, rate)
+    state = filters.design_low_pass(cutoffs.state, rate)
     torque = np.ones(1)
     if thin > 1 and np.isfinite(cutoffs.torque):
-        torque = filters.low_pass(_ANTI_ALIAS * rate / thin, rate)
+        torque = filters.design_low_pass(_ANTI_ALIAS * rate / thin, rate)
     known = s.dz is not None and s.ddz is not None
     if known and thin == state.size == torque.size == 1:
         return piece
     time = s.time[::thin]
     z, dz, ddz, tau = (allocate_matrix(time.size, s.z.shape[1]) for _ in range(4))
     for j in range(s.z.shape[1]):
-        made = _joint_ready(s.joint(j), rate, state, torque)
+        made = _process_joint(s.get_joint(j), rate, state, torque)
         for whole, values in zip((z, dz, ddz, tau), made, strict=True):
             whole[:, j] = values[::thin, 0]
     return Piece(Signals(time, z, dz, ddz, tau), piece.first, piece.last)
 
 
-def _joint_ready(
+def _process_joint(
     s: Signals, rate: float, state: FloatArray, torque: FloatArray
 ) -> tuple[FloatArray, ...]:
-    """z, dz, ddz and tau of one joint, (n_samples, 1) each, through the filters of states and torques."""
+    """Return z, dz, ddz and tau of one joint, (n_samples, 1) each, through the filters of states and torques."""
     if np.ptp(s.z) == 0:  # round-off of filters would be taken for a motion
         still = np.zeros_like(s.z)
-        return s.z, still, still, filters.filtered(s.tau, torque)
-    z = filters.filtered(s.z, state)
-    dz = filters.derivative(z, rate) if s.dz is None else filters.filtered(s.dz, state)
-    ddz = filters.derivative(dz, rate) if s.ddz is None else filters.filtered(s.ddz, state)
-    return z, dz, ddz, filters.filtered(s.tau, torque)
+        return s.z, still, still, filters.apply_filter(s.tau, torque)
+    z = filters.apply_filter(s.z, state)
+    dz = filters.differentiate(z, rate) if s.dz is None else filters.apply_filter(s.dz, state)
+    ddz = filters.differentiate(dz, rate) if s.ddz is None else filters.apply_filter(s.ddz, state)
+    return z, dz, ddz, filters.apply_filter(s.tau, torque)
 
 
-def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
-    """One after the other, folds parts in time of equal size."""
+def _join_pieces(pieces: list[Piece], folds: int) -> MeasuredMotions:
+    """Return the pieces as one record, with folds of equal duration."""
     pieces = [piece for piece in pieces if piece.used.stop > piece.used.start]
     if not pieces:
         raise DataError(_TOO_SHORT.format("held out"))
@@ -391,7 +399,8 @@ def _motions(pieces: list[Piece], folds: int) -> MeasuredMotions:
     return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
 
 
-def _said_of_outliers(found: Outliers, names: Sequence[str]) -> Iterator[str]:
+def _describe_outliers(found: Outliers, names: Sequence[str]) -> Iterator[str]:
+    """Yield a sentence on replaced outliers, if there are any."""
     if not found:
         return
     listed = ", ".join(
@@ -408,7 +417,8 @@ def _check_enough(learned: MeasuredMotions, tested: MeasuredMotions) -> None:
             raise DataError(_TOO_SHORT.format(what))
 
 
-def _said_of_states(piece: Signals, thin: int, rate: float) -> str:
+def _describe_states(piece: Signals, thin: int, rate: float) -> str:
+    """Return a sentence on differentiation and decimation."""
     made = [
         *([] if piece.dz is not None else ["speeds"]),
         *([] if piece.ddz is not None else ["accelerations"]),
@@ -418,9 +428,10 @@ def _said_of_states(piece: Signals, thin: int, rate: float) -> str:
     return f"{text}{kept}, {rate:.5g} Hz."
 
 
-def _said_ofsplit(
+def _describe_split(
     learned: MeasuredMotions, tested: MeasuredMotions, wanted: LogSection, rate: float
 ) -> str:
+    """Return a sentence on the durations of training and held-out motions."""
     one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))
     cut = (learned.time.size + tested.time.size) / rate - one - two
     how = (
@@ -432,17 +443,17 @@ def _said_ofsplit(
     return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
 
 
-def _noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArray:
-    """What of the torques lies above the band that a model is asked for."""
+def _estimate_noise(learned: MeasuredMotions, cutoffs: _Cutoffs, rate: float) -> FloatArray:
+    """Return the standard deviation of the torques above the band of the model, (n_dof,)."""
     cutoff = cutoffs.torque if np.isfinite(cutoffs.torque) else cutoffs.state
-    taps = filters.low_pass(cutoff, rate)
+    taps = filters.design_low_pass(cutoff, rate)
     borders = np.searchsorted(learned.piece, np.arange(learned.piece[-1] + 2)).tolist()
     used = learned.fold != UNUSED
     noise = []
     for tau in learned.tau.T:
         above = np.concatenate(
             [
-                tau[a:b] - filters.filtered(tau[a:b, None], taps)[:, 0]
+                tau[a:b] - filters.apply_filter(tau[a:b, None], taps)[:, 0]
                 for a, b in itertools.pairwise(borders)
             ]
         )

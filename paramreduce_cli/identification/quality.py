@@ -1,4 +1,4 @@
-"""What a log is good for: how many parameters its motion tells, and which it does not."""
+"""Quality of a log: the parameters that its motion determines."""
 
 from dataclasses import dataclass
 
@@ -22,7 +22,7 @@ _DEPENDENT = 1e-6
 
 @dataclass(frozen=True)
 class LogQuality:
-    """How well a log excites a robot."""
+    """A measure of how well a log excites a robot."""
 
     n_base: int
     """Base parameters that motions can tell."""
@@ -34,12 +34,12 @@ class LogQuality:
     """Base parameters that can hardly be told from the others."""
 
 
-def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQuality:
-    """How well the part of a log to learn from excites a robot's base parameters.
+def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQuality:
+    """Return how well the training part of a log excites a robot's base parameters.
 
     Args:
-        mechanism: The robot.
-        log: Made ready.
+        mechanism: Mechanism of the robot.
+        log: Processed log.
         measured: Coordinates whose torques are measured, (n_dof,).
     """
     dynamics = Dynamics(mechanism, once=True)
@@ -58,7 +58,7 @@ def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQ
     sizes = np.linalg.svd(X, compute_uv=False)
     rank = int(np.sum(sizes > _DEPENDENT * sizes[0]))
     names = [mechanism.parameter_names[k] for k in base.columns]
-    left = _independent_shares(X, lengths)
+    left = _compute_independent_shares(X, lengths)
     order = np.argsort(left)
     return LogQuality(
         n_base=base.columns.size,
@@ -68,8 +68,8 @@ def quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray) -> LogQ
     )
 
 
-def _independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
-    """What of each column of unit length the others leave, (n,)."""
+def _compute_independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
+    """Return the share of each column of unit length that the others do not explain, (n,)."""
     inverse = np.linalg.pinv(X.T @ X, rcond=_DEPENDENT**2, hermitian=True)
     diagonal = np.diag(inverse)
     hidden = 1 - np.diag(inverse @ (X.T @ X))  # columns that others make up altogether
@@ -77,11 +77,11 @@ def _independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
     return np.where((lengths > 0) & (np.abs(hidden) < 1e-3), np.minimum(shares, 1.0), 0.0)
 
 
-def noise_floor(log: MeasuredLog, nominal: FloatArray) -> float:
-    """Torque error that noise alone leaves, if it is as dense in the band of the model as it is above.
+def estimate_noise_floor(log: MeasuredLog, nominal: FloatArray) -> float:
+    """Return the torque error that noise alone leaves, assuming the same density in the band of the model as above it.
 
     Args:
-        log: Made ready.
+        log: Processed log.
         nominal: Torques that errors of joints are divided by, infinite where none is measured, (n_dof,).
 
     Returns:

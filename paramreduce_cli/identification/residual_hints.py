@@ -1,9 +1,8 @@
-"""What residuals suggest is wrong or missing, in the model or in the log.
+"""Hints at what is wrong or missing in the model or the log, from the residuals of a fit.
 
-Each hint rests on a signal that the residuals would contain if it were true. Of a signal what the
-parameters cannot take up counts; it is suggested where the residuals contain it beyond
-what noise as coloured as theirs explains, the strongest first, each judged with those before it
-accounted for.
+Each hint rests on a signal that the residuals would contain if it were true. Only the part of a signal that the
+parameters cannot explain counts. A hint is given if the residuals contain the signal beyond what noise of their colour
+explains, the strongest first, each tested with those before it accounted for.
 """
 
 from collections.abc import Callable, Collection, Iterator, Sequence
@@ -12,8 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
-from paramreduce_cli.identification.estimation import LinearFit, weighted_fit
-from paramreduce_cli.identification.uncertainty import score_covariance
+from paramreduce_cli.identification.estimation import LinearFit, fit_weighted
+from paramreduce_cli.identification.uncertainty import compute_score_covariance
 from paramreduce_cli.multibody.orthogonal import least_squares
 from paramreduce_cli.records import FloatArray
 
@@ -60,11 +59,11 @@ def find_residual_hints(
     sliding: Sequence[bool] = (),
     modelled: Collection[str] = (),
 ) -> list[str]:
-    """Sentences on what the residuals suggest, the strongest first.
+    """Return hints that the residuals suggest, the strongest first.
 
     Args:
-        fitted: The model of all base parameters on the training data.
-        names: Of the coordinates.
+        fitted: Fit of all base parameters on the training data.
+        names: Names of the coordinates.
         tilts: Torques that gravity of one unit along each horizontal axis would cause, (n_samples, n_dof)
             for each part of the rows.
         gravity: m/s^2
@@ -72,7 +71,7 @@ def find_residual_hints(
         sliding: Whether coordinates are lengths; none if left out.
         modelled: Keys of drives that are in the model, such as ``drives.q1.coulomb``.
     """
-    mistaken = list(_mistaken_columns(fitted, names))
+    mistaken = list(_find_mistaken_columns(fitted, names))
     if mistaken:
         return mistaken
     found: list[str] = []
@@ -81,11 +80,11 @@ def find_residual_hints(
     candidates = list(_list_signals(fitted, names, tilts, gravity, delay, slides, modelled))
     while len(found) < _MOST:
         judged = [
-            (*_judged(fitted, candidate), k)
+            (*_test_signal(fitted, candidate), k)
             for k, candidate in enumerate(candidates)
             if k not in tried
         ]
-        good = [entry for entry in judged if _convincing(*entry[:3])]
+        good = [entry for entry in judged if _is_convincing(*entry[:3])]
         if not good:
             break
         _, share, coefficient, k = max(good, key=lambda entry: entry[1])
@@ -98,18 +97,19 @@ def find_residual_hints(
             candidates[k].joint is None
         ):  # all joints are wrong in it, and what else is seen follows from that
             break
-        fitted = _with(fitted, candidates[k].signal)
+        fitted = _add_column(fitted, candidates[k].signal)
     return found
 
 
-def _convincing(sureness: float, share: float, coefficient: float) -> bool:
+def _is_convincing(sureness: float, share: float, coefficient: float) -> bool:
+    """Return whether a signal is significant and explains enough of the residuals."""
     sure = abs(sureness) > _SURE and share > _SHARE
     return sure or (abs(sureness) > _OBVIOUSLY_SURE and share > _OBVIOUS)
 
 
-def _judged(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]:
-    """How many standard deviations from zero, share of the residuals, and coefficient."""
-    left = fitted.left_of(candidate.signal)
+def _test_signal(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]:
+    """Return the standard deviations from zero, the share of the residuals, and the coefficient of a signal."""
+    left = fitted.compute_residuals_of(candidate.signal)
     weights = fitted.weights
     size = sum(float(np.sum(u**2 * weights)) for u in left)
     whole = sum(float(np.sum(u**2 * weights)) for u in candidate.signal)
@@ -117,23 +117,23 @@ def _judged(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]
         return 0.0, 0.0, 0.0
     pairs = list(zip(left, fitted.residuals, strict=True))
     score = sum(float(np.sum(u * e * weights)) for u, e in pairs)
-    spread = score_covariance([u[..., None] for u in left], fitted.noise, weights)[0, 0]
+    spread = compute_score_covariance([u[..., None] for u in left], fitted.noise, weights)[0, 0]
     picked = slice(None) if candidate.joint is None else candidate.joint
     own = sum(float(np.sum((e**2 * weights)[:, picked])) for e in fitted.residuals)
     return score / np.sqrt(max(spread, 1e-300)), score**2 / (size * max(own, 1e-300)), score / size
 
 
-def _with(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
-    """The fit with one more column."""
+def _add_column(fitted: LinearFit, signal: Sequence[FloatArray]) -> LinearFit:
+    """Return the fit with one more column."""
     rows = fitted.rows
     X = tuple(
         np.concatenate([x, u[..., None]], axis=2) for x, u in zip(rows.X, signal, strict=True)
     )
-    return weighted_fit(replace(rows, X=X), fitted.deviation)
+    return fit_weighted(replace(rows, X=X), fitted.deviation)
 
 
-def _alone(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
-    """Signals of one joint, zero for the others."""
+def _restrict_to_joint(values: Sequence[FloatArray], joint: int) -> tuple[FloatArray, ...]:
+    """Return signals of one joint, zero for the others."""
     found = []
     for part in values:
         signal = np.zeros_like(part)
@@ -151,8 +151,10 @@ def _list_signals(
     sliding: Sequence[bool],
     modelled: Collection[str],
 ) -> Iterator[_Signal]:
+    """Yield the signals that residuals may contain, joint by joint."""
+
     def _missing(name: str, what: str, unit: str, key: str) -> Callable[[float, float], str]:
-        return _follows(what, unit, name, f"drives.{name}.{key}", modelled)
+        return _make_missing_hint(what, unit, name, f"drives.{name}.{key}", modelled)
 
     rows = fitted.rows
     fastest = np.max([np.abs(v).max(axis=0) for v in rows.dz], axis=0)
@@ -166,32 +168,40 @@ def _list_signals(
         smooth = [np.tanh(v / (_SMOOTH * fastest)) for v in rows.dz]
         constant = [np.ones_like(v) for v in rows.dz]
         yield _Signal(
-            j, _alone(signs, j), _missing(name, "the sign of its speed", force, "coulomb")
+            j,
+            _restrict_to_joint(signs, j),
+            _missing(name, "the sign of its speed", force, "coulomb"),
         )
-        yield _Signal(j, _alone(smooth, j), _smoother(name, _SMOOTH * fastest[j]))
+        yield _Signal(
+            j, _restrict_to_joint(smooth, j), _make_smoothing_hint(name, _SMOOTH * fastest[j])
+        )
         yield _Signal(
             j,
-            _alone(rows.dz, j),
+            _restrict_to_joint(rows.dz, j),
             _missing(name, "its speed", "N s/m" if sliding[j] else "N m s/rad", "viscous"),
         )
         yield _Signal(
             j,
-            _alone(rows.ddz, j),
+            _restrict_to_joint(rows.ddz, j),
             _missing(name, "its acceleration", "kg" if sliding[j] else "kg m^2", "inertia"),
         )
-        yield _Signal(j, _alone(constant, j), _missing(name, "a constant", force, "offset"))
-        yield _Signal(j, _alone(model, j), _scaled(name))
+        yield _Signal(
+            j, _restrict_to_joint(constant, j), _missing(name, "a constant", force, "offset")
+        )
+        yield _Signal(j, _restrict_to_joint(model, j), _make_scale_hint(name))
     slopes = tuple(
         np.gradient(t, rows.step, axis=0) if len(t) > 1 else np.zeros_like(t) for t in model
     )
-    yield _Signal(None, slopes, _delayed(rows.step, delay))
+    yield _Signal(None, slopes, _make_delay_hint(rows.step, delay))
     for axis, signal in zip("xy", tilts, strict=False):
-        yield _Signal(None, signal, _tilted(axis, gravity))
+        yield _Signal(None, signal, _make_tilt_hint(axis, gravity))
 
 
-def _follows(
+def _make_missing_hint(
     what: str, unit: str, name: str, key: str, modelled: Collection[str]
 ) -> Callable[[float, float], str]:
+    """Return a function that words the hint at a missing term."""
+
     def said(coefficient: float, share: float) -> str:
         return (
             f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * share:.0f} % of them): "
@@ -201,7 +211,9 @@ def _follows(
     return said
 
 
-def _smoother(name: str, speed: float) -> Callable[[float, float], str | None]:
+def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], str | None]:
+    """Return a function that words the hint at smooth friction."""
+
     def said(coefficient: float, share: float) -> str:
         return (
             f"Residuals of {name} follow a smooth sign of its speed ({100 * share:.0f} % of them): friction that "
@@ -211,7 +223,9 @@ def _smoother(name: str, speed: float) -> Callable[[float, float], str | None]:
     return said
 
 
-def _scaled(name: str) -> Callable[[float, float], str | None]:
+def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
+    """Return a function that words the hint at a wrong scale of torques, or None for small errors."""
+
     def said(coefficient: float, share: float) -> str | None:
         if abs(coefficient) < _GAIN:
             return None
@@ -223,7 +237,9 @@ def _scaled(name: str) -> Callable[[float, float], str | None]:
     return said
 
 
-def _delayed(step: float, known: float) -> Callable[[float, float], str | None]:
+def _make_delay_hint(step: float, known: float) -> Callable[[float, float], str | None]:
+    """Return a function that words the hint at a delay of torques."""
+
     def said(coefficient: float, share: float) -> str | None:
         if abs(coefficient) < _DELAY * step:
             return None
@@ -236,7 +252,9 @@ def _delayed(step: float, known: float) -> Callable[[float, float], str | None]:
     return said
 
 
-def _tilted(axis: str, gravity: float) -> Callable[[float, float], str | None]:
+def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str | None]:
+    """Return a function that words the hint at a tilted base."""
+
     def said(coefficient: float, share: float) -> str | None:
         angle = float(np.degrees(np.arctan2(abs(coefficient), gravity)))
         if angle < _TILT:
@@ -252,11 +270,11 @@ def _tilted(axis: str, gravity: float) -> Callable[[float, float], str | None]:
 def hint_at_negative_friction(
     names: Sequence[str], owners: Sequence[str], values: FloatArray, deviations: FloatArray
 ) -> list[str]:
-    """A sentence where friction surely drives the machine, as with the wrong sign of torques or speeds.
+    """Return a hint if friction surely drives the machine, as with the wrong sign of torques or speeds.
 
     Args:
-        names: Of friction parameters, (n,).
-        owners: Joints that they are of, (n,).
+        names: Names of the friction parameters, (n,).
+        owners: Joints of the friction parameters, (n,).
         values: (n,)
         deviations: Standard deviations, (n,).
     """
@@ -276,8 +294,8 @@ def hint_at_negative_friction(
     ]
 
 
-def _mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
-    """Torques with the wrong sign, or of another joint: with them right the residuals collapse."""
+def _find_mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[str]:
+    """Yield hints at torques with the wrong sign or of another joint: with them corrected the residuals collapse."""
     rows = fitted.rows
     n_dof, p = len(names), fitted.parameters.size
     tau = np.concatenate(rows.tau)

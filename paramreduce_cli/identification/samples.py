@@ -1,4 +1,4 @@
-"""Measured motions as a sample set: torques and observation matrix through one low-pass."""
+"""Measured motions as a sample set: torques and observation matrix pass one low-pass."""
 
 from bisect import bisect_left
 from collections.abc import Iterator
@@ -28,7 +28,7 @@ _STATES = ("time", "z", "dz", "ddz", "q", "dq", "ddq")
 
 @dataclass(frozen=True)
 class _Stretch:
-    """An uninterrupted motion: where it stands, and what is taken of it."""
+    """A stretch of uninterrupted motion, and the samples that are taken from it."""
 
     first: int
     """Number of its first sample among all."""
@@ -39,15 +39,15 @@ class _Stretch:
     """First sample of each fold in it."""
     folds: IntArray
 
-    def fold_of(self, samples: IntArray) -> IntArray:
-        """Folds of some of its samples."""
+    def find_folds(self, samples: IntArray) -> IntArray:
+        """Return the folds of some samples."""
         found: IntArray = self.folds[np.searchsorted(self.edges, samples, side="right") - 1]
         return found
 
 
-def _stretches(motions: MeasuredMotions, k: int, every: int) -> Iterator[_Stretch]:
-    """The uninterrupted motions, for a low-pass of 2 k + 1 taps of which every so many samples are taken."""
-    starts, pieces, folds = _runs(motions)
+def _iterate_stretches(motions: MeasuredMotions, k: int, every: int) -> Iterator[_Stretch]:
+    """Yield the uninterrupted motions, for a low-pass of 2 k + 1 taps and a decimation factor."""
+    starts, pieces, folds = _find_runs(motions)
     for piece in np.unique(pieces):
         own = np.flatnonzero(pieces == piece)
         first, stop = int(starts[own[0]]), int(starts[own[-1] + 1])
@@ -60,8 +60,8 @@ def _stretches(motions: MeasuredMotions, k: int, every: int) -> Iterator[_Stretc
         yield _Stretch(first, stop - first, outputs, starts[own] - first, folds[own])
 
 
-def _runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
-    """Where samples of another piece or fold begin, and the end; and pieces and folds there."""
+def _find_runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
+    """Return where samples of another piece or fold begin, with the end; and pieces and folds there."""
     total = motions.time.size
     starts, pieces, folds = [0], [], []
     for begin in range(0, total, _LOOKED_AT):
@@ -76,19 +76,18 @@ def _runs(motions: MeasuredMotions) -> tuple[IntArray, IntArray, IntArray]:
     return np.array([*starts, total]), np.array(pieces), np.array(folds)
 
 
-def _ends(edges: IntArray, outputs: range) -> list[int]:
-    """A sample of every fold that has any among some samples."""
+def _find_last_samples(edges: IntArray, outputs: range) -> list[int]:
+    """Return a sample of every fold that has any among some samples."""
     later = [bisect_left(outputs, int(edge)) for edge in edges]
     return sorted({outputs[k] for k in (*later, len(outputs) - 1) if 0 <= k < len(outputs)})
 
 
 @dataclass
 class LoggedSet:
-    """Samples of measured motions, computed as they are read; folds are their trajectories.
+    """A set of measured samples, computed as they are read; its folds are its trajectories.
 
-    Where torques pass a low-pass, every column of the observation matrix passes the same one, so that
-    the model stays linear and exact [Gautier1997]; states are those at the sample's own time. Of the
-    motions only slices are read.
+    If torques pass a low-pass, every column of the observation matrix passes the same one, so that the model stays
+    linear and exact [Gautier1997]; states are those at the sample's own time. Only slices of the motions are read.
     """
 
     motions: MeasuredMotions
@@ -101,17 +100,19 @@ class LoggedSet:
     """Joints whose torques are measured, the others' are zero, (n_dof,); all if left out."""
 
     def __post_init__(self) -> None:
-        self._taps = filters.low_pass(self.log.torque_cutoff, self.log.rate)
+        self._taps = filters.design_low_pass(self.log.torque_cutoff, self.log.rate)
         every = round(self.log.rate / self.log.output_rate)
-        self._stretches = list(_stretches(self.motions, self._taps.size // 2, every))
-        ends = [s.fold_of(np.array(_ends(s.edges, s.outputs))) for s in self._stretches]
+        self._stretches = list(_iterate_stretches(self.motions, self._taps.size // 2, every))
+        ends = [
+            s.find_folds(np.array(_find_last_samples(s.edges, s.outputs))) for s in self._stretches
+        ]
         # Folds of which the low-pass leaves nothing are none.
         numbers = np.unique(np.concatenate([np.zeros(0, np.int64), *ends]))
         self._folds = {int(fold): k for k, fold in enumerate(numbers)}
 
     @property
     def n_samples(self) -> int:
-        """How many samples it yields in all."""
+        """Number of samples."""
         return sum(len(stretch.outputs) for stretch in self._stretches)
 
     @property
@@ -119,18 +120,18 @@ class LoggedSet:
         """Not what passed a low-pass."""
         return self._taps.size == 1
 
-    def _torques(self, rows: slice) -> FloatArray:
+    def _get_torques(self, rows: slice) -> FloatArray:
         tau = self.motions.tau[rows]
         return tau if self.measured is None else np.where(self.measured, tau, 0.0)
 
     def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         observed = ObservedSet(
-            spans([stretch.size for stretch in self._stretches]), self._states_at, self.dynamics,
+            spans([stretch.size for stretch in self._stretches]), self._read_states, self.dynamics,
             np.zeros(self.dynamics.mechanism.n_parameters), self.source,
         )  # fmt: skip
         for number, blocks in groupby(observed.iterate_blocks(), attrgetter("trajectory")):
-            yield from self._low_passed(self._stretches[number], blocks)
+            yield from self._filter_blocks(self._stretches[number], blocks)
 
     def iterate_states(self) -> Iterator[StateBlock]:
         """Yield states and low-passed torques of the samples alone."""
@@ -140,24 +141,24 @@ class LoggedSet:
             for start in range(0, len(stretch.outputs), BLOCK_SAMPLES):
                 some = np.array(stretch.outputs[start : start + BLOCK_SAMPLES])
                 needed = slice(int(some[0]) - k, int(some[-1]) + k + 1)
-                rows = self._torques(
+                rows = self._get_torques(
                     slice(stretch.first + needed.start, stretch.first + needed.stop)
                 )
-                tau = filters.thinned_low_pass(rows, needed.start, self._taps, some)
+                tau = filters.filter_samples(rows, needed.start, self._taps, some)
                 part = slice(stretch.first + int(some[0]), stretch.first + int(some[-1]) + 1)
                 own = some - some[0]
                 z, dz, ddz = m.z[part][own], m.dz[part][own], m.ddz[part][own]
                 yield StateBlock(number, m.time[part][own], z, dz, ddz, tau)
 
-    def _states_at(self, span: Span) -> StateBlock:
-        """States, also those that only serve the low-pass, and torques as measured."""
+    def _read_states(self, span: Span) -> StateBlock:
+        """Return states and measured torques, also those that only serve the low-pass."""
         m, first = self.motions, self._stretches[span.trajectory].first
         part = slice(first + span.start, first + span.stop)
         states = m.time[part], m.z[part], m.dz[part], m.ddz[part]
-        return StateBlock(span.trajectory, *states, self._torques(part))
+        return StateBlock(span.trajectory, *states, self._get_torques(part))
 
-    def _low_passed(self, stretch: _Stretch, blocks: Iterator[Block]) -> Iterator[Block]:
-        """Blocks of the samples that are used; only what the low-pass still needs is held."""
+    def _filter_blocks(self, stretch: _Stretch, blocks: Iterator[Block]) -> Iterator[Block]:
+        """Yield blocks of the used samples; only rows that the low-pass still needs are held."""
         waiting = stretch.outputs
         k = self._taps.size // 2
         held: list[Block] = []
@@ -168,14 +169,16 @@ class LoggedSet:
             end += block.time.size
             count = bisect_left(waiting, end - k)
             ready, waiting = np.array(waiting[:count], dtype=np.int64), waiting[count:]
-            fold = stretch.fold_of(ready)
+            fold = stretch.find_folds(ready)
             for number in np.unique(fold).tolist():
-                yield self._made(held, first, ready[fold == number], self._folds[number])
+                yield self._make_block(held, first, ready[fold == number], self._folds[number])
             needed = waiting[0] - k if waiting else end
             while held and first + held[0].time.size <= needed:
                 first += held.pop(0).time.size
 
-    def _made(self, held: list[Block], first: int, outputs: IntArray, fold: int) -> Block:
+    def _make_block(self, held: list[Block], first: int, outputs: IntArray, fold: int) -> Block:
+        """Return the block of some output samples from the held rows."""
+
         def joined(key: str) -> FloatArray:
             return np.concatenate([getattr(block, key) for block in held])
 
@@ -186,10 +189,10 @@ class LoggedSet:
         if self._taps.size == 1:
             W, tau = W[outputs - first], tau[outputs - first]
         else:
-            W = filters.thinned_low_pass(W, first, self._taps, outputs)
-            tau = filters.thinned_low_pass(tau, first, self._taps, outputs)
+            W = filters.filter_samples(W, first, self._taps, outputs)
+            tau = filters.filter_samples(tau, first, self._taps, outputs)
         return Block(trajectory=fold, tau=tau, W=W.reshape(outputs.size * n_dof, -1), **states)
 
     def compute_factors(self) -> FloatArray:
-        """Triangular factors per fold and joint."""
+        """Return the triangular factors by fold and joint."""
         return joint_factors(self.iterate_blocks())

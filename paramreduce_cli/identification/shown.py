@@ -1,4 +1,4 @@
-"""What figures show of a log: its longest motion, before and after."""
+"""Signals of a log that figures show: its longest motion, before and after processing."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ Outliers = Mapping[tuple[str, int], Sequence[float]]
 
 @dataclass(frozen=True)
 class Place:
-    """Where the motion that is shown is among all motions."""
+    """A place of the shown motion among all motions."""
 
     file: int
     learned: int
@@ -29,16 +29,16 @@ class Place:
     held_out: int | None
     """Among those held out the one that goes on where it ends; None if there is none."""
 
-    def of(self, learned: Sequence[Piece], held_out: Sequence[Piece]) -> list[Piece]:
-        """The motions that are shown, of all."""
+    def get_pieces(self, learned: Sequence[Piece], held_out: Sequence[Piece]) -> list[Piece]:
+        """Return the shown motions."""
         return [
             learned[self.learned],
             *([] if self.held_out is None else [held_out[self.held_out]]),
         ]
 
 
-def place_to_show(learned: list[list[Piece]], held_out: list[list[Piece]], rate: float) -> Place:
-    """The longest motion that is learned from, both by file.
+def find_longest(learned: list[list[Piece]], held_out: list[list[Piece]], rate: float) -> Place:
+    """Return the longest training motion, with the held-out part of the same motion.
 
     Args:
         learned: At least one motion.
@@ -59,39 +59,41 @@ def place_to_show(learned: list[list[Piece]], held_out: list[list[Piece]], rate:
     return Place(file, place, sum(map(len, held_out[:file])) if gap < 1.5 / rate else None)
 
 
-def speeds(piece: Signals, rate: float) -> Iterator[FloatArray]:
-    """As recorded, or differences of positions, joint by joint."""
+def iterate_speeds(piece: Signals, rate: float) -> Iterator[FloatArray]:
+    """Return the speeds as recorded, or differences of positions, joint by joint."""
     if piece.dz is not None:
         return iter(piece.dz.T)
     # Plain differences: noise that is white in the positions rises to the end of the spectrum.
     return (np.diff(z, append=z[-1:]) * rate for z in piece.z.T)
 
 
-def recorded_to_show(pieces: Sequence[Piece], rate: float) -> list[FloatArray]:
-    """Times, positions, speeds and torques of motions that follow each other, thinned."""
-    return _joined([_thinned(p.signals, speeds(p.signals, rate), iter(p.signals.tau.T)) for p in pieces])  # fmt: skip
+def decimate_recorded(pieces: Sequence[Piece], rate: float) -> list[FloatArray]:
+    """Return times, positions, speeds and torques of motions that follow each other, decimated."""
+    return _concatenate([_decimate(p.signals, iterate_speeds(p.signals, rate), iter(p.signals.tau.T)) for p in pieces])  # fmt: skip
 
 
-def shown(
+def collect_signals(
     recorded: Sequence[FloatArray],
     ready: Sequence[Piece],
     torque_cutoff: float,
     rate: float,
     outliers: Outliers,
 ) -> ShownSignals:
-    """Put together what is shown.
+    """Return the signals that figures show.
 
     Args:
         recorded: Times, positions, speeds and torques as recorded.
-        ready: What is learned from, and what is held out of the same motion if anything is.
+        ready: Processed training motion, with the held-out part of the same motion if there is one.
         torque_cutoff: Of the low-pass that torques have still to pass, Hz.
         rate: Samples per second of what is ready.
         outliers: Of the file.
     """
-    taps = filters.low_pass(torque_cutoff, rate)
+    taps = filters.design_low_pass(torque_cutoff, rate)
     raw_time, raw_z, raw_dz, raw_tau = recorded
-    time, z, dz, ddz, tau = _joined([_states_and_torques(piece.signals, taps) for piece in ready])
-    bounds = [*map(_bounds, ready), np.full(2, np.nan)]
+    time, z, dz, ddz, tau = _concatenate(
+        [_decimate_processed(piece.signals, taps) for piece in ready]
+    )
+    bounds = [*map(_find_bounds, ready), np.full(2, np.nan)]
     replaced = [
         (_OUTLYING.index(signal), j, time_of)
         for (signal, j), times in outliers.items()
@@ -104,26 +106,27 @@ def shown(
     )  # fmt: skip
 
 
-def _states_and_torques(s: Signals, taps: FloatArray) -> list[FloatArray]:
+def _decimate_processed(s: Signals, taps: FloatArray) -> list[FloatArray]:
+    """Return times, states and filtered torques of a processed motion, decimated."""
     assert s.dz is not None, "made ready"
     assert s.ddz is not None, "made ready"
-    torques = (filters.filtered(s.tau[:, j : j + 1], taps)[:, 0] for j in range(s.tau.shape[1]))
-    return _thinned(s, iter(s.dz.T), iter(s.ddz.T), torques)
+    torques = (filters.apply_filter(s.tau[:, j : j + 1], taps)[:, 0] for j in range(s.tau.shape[1]))
+    return _decimate(s, iter(s.dz.T), iter(s.ddz.T), torques)
 
 
-def _bounds(piece: Piece) -> FloatArray:
-    """Between which times samples are used; not numbers where none are."""
+def _find_bounds(piece: Piece) -> FloatArray:
+    """Return the times between which samples are used; NaN if none are."""
     used = piece.signals.time[piece.used]
     return np.array([used[0], used[-1]]) if used.size else np.full(2, np.nan)
 
 
-def _thinned(piece: Signals, *others: Iterator[FloatArray]) -> list[FloatArray]:
-    """Times, positions and others, copied so that the rest may be forgotten."""
+def _decimate(piece: Signals, *others: Iterator[FloatArray]) -> list[FloatArray]:
+    """Return times, positions and others decimated, as copies, so that the rest can be freed."""
     every = slice(None, None, max(1, piece.time.size // _MOST_SHOWN))
     columns = (iter(piece.z.T), *others)
     made = (np.column_stack([column[every] for column in joints]) for joints in columns)
     return [piece.time[every].copy(), *made]
 
 
-def _joined(parts: Sequence[Sequence[FloatArray]]) -> list[FloatArray]:
+def _concatenate(parts: Sequence[Sequence[FloatArray]]) -> list[FloatArray]:
     return [np.concatenate(signal) for signal in zip(*parts, strict=True)]

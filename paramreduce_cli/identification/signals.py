@@ -1,4 +1,4 @@
-"""Recorded columns as the signals of a robot's joints, in SI units, even in time; or what is wrong."""
+"""Signals of a robot's joints in SI units at an even rate, from recorded columns."""
 
 import itertools
 from collections.abc import Collection, Sequence
@@ -50,28 +50,28 @@ class Signals:
     turns: tuple[int, ...] = ()
     """Number of whole turns that were added to each position, empty where not known, (n_dof,)."""
 
-    def part(self, rows: slice | BoolArray) -> "Signals":
-        """Some of its samples."""
+    def slice_rows(self, rows: slice | BoolArray) -> "Signals":
+        """Return some samples."""
         dz = None if self.dz is None else self.dz[rows]
         ddz = None if self.ddz is None else self.ddz[rows]
         return Signals(self.time[rows], self.z[rows], dz, ddz, self.tau[rows])
 
-    def joint(self, j: int) -> "Signals":
-        """Of one joint, (n_samples, 1) each."""
+    def get_joint(self, j: int) -> "Signals":
+        """Return the signals of one joint, (n_samples, 1) each."""
         dz = None if self.dz is None else self.dz[:, j : j + 1]
         ddz = None if self.ddz is None else self.ddz[:, j : j + 1]
         return Signals(self.time, self.z[:, j : j + 1], dz, ddz, self.tau[:, j : j + 1])
 
 
-def signals(
+def read_signals(
     log: RawLog, wanted: LogSection, names: Sequence[str], unmeasured: Collection[str] = ()
 ) -> Signals:
-    """The signals of a file, row by row.
+    """Return the signals of a file, row by row.
 
     Args:
-        log: The file.
+        log: Log file.
         wanted: What is where in it.
-        names: Of the coordinates.
+        names: Names of the coordinates.
         unmeasured: Those without torques, for which zeros stand; columns may lack, or hold anything.
 
     Raises:
@@ -79,14 +79,14 @@ def signals(
         ConfigError: Signs, gears and the like do not fit the robot.
     """
     columns, units = wanted.columns, wanted.units
-    time = _column(log, columns.time) * TIMES[units.time]
+    time = _read_column(log, columns.time) * TIMES[units.time]
 
     def matrix(key: str, factor: float) -> FloatArray | None:
         where = getattr(columns, key)
         if where is None:
             return None
         left_out = unmeasured if key == "torque" else ()
-        values = _matrix(log, where, names, key, columns.time, left_out)
+        values = _read_matrix(log, where, names, key, columns.time, left_out)
         values *= factor
         return values
 
@@ -98,16 +98,16 @@ def signals(
     assert tau is not None
     _check_time(log, columns.time, time)
     turns = unwrap_positions(z) if wanted.outliers == "replace" else ()
-    return _of_joints(Signals(time, z, dz, ddz, tau, turns), wanted, len(names))
+    return _convert_to_joints(Signals(time, z, dz, ddz, tau, turns), wanted, len(names))
 
 
-def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
-    """From motors to joints; in place, as there may be gigabytes."""
-    sign = _each(wanted.apart.motion, "signs", n_dof)
+def _convert_to_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
+    """Convert signals of motors to signals of joints, in place, as there may be gigabytes."""
+    sign = _expand_per_joint(wanted.apart.motion, "signs", n_dof)
     tau = found.tau
-    tau *= _each(wanted.apart.torque, "signs", n_dof)
+    tau *= _expand_per_joint(wanted.apart.torque, "signs", n_dof)
     if wanted.torque_constants is not None:
-        tau *= _each(wanted.torque_constants, "torque_constants", n_dof)
+        tau *= _expand_per_joint(wanted.torque_constants, "torque_constants", n_dof)
     motion = [found.z, found.dz, found.ddz]
     for values in motion:
         if values is not None:
@@ -120,21 +120,21 @@ def _of_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
         inverse = np.asarray(np.linalg.inv(gears), dtype=np.float64)
         for values in motion:
             if values is not None:
-                _multiply(values, inverse.T)
-        _multiply(tau, gears)
+                _multiply_in_place(values, inverse.T)
+        _multiply_in_place(tau, gears)
     z, dz, ddz = motion
     assert z is not None
-    z += _each(wanted.offsets, "offsets", n_dof)
+    z += _expand_per_joint(wanted.offsets, "offsets", n_dof)
     return Signals(found.time, z, dz, ddz, tau, found.turns)
 
 
-def _multiply(values: FloatArray, factors: FloatArray) -> None:
-    """Values times factors, in place."""
+def _multiply_in_place(values: FloatArray, factors: FloatArray) -> None:
+    """Multiply values by factors, in place."""
     for start in range(0, len(values), _AT_ONCE):
         values[start : start + _AT_ONCE] = values[start : start + _AT_ONCE] @ factors
 
 
-def _each(values: list[float], key: str, n_dof: int) -> FloatArray:
+def _expand_per_joint(values: list[float], key: str, n_dof: int) -> FloatArray:
     """Return a value for each joint; raise ConfigError for another number of values."""
     if len(values) not in (1, n_dof):
         raise ConfigError(
@@ -144,7 +144,7 @@ def _each(values: list[float], key: str, n_dof: int) -> FloatArray:
     return expand_per_joint(values, n_dof)
 
 
-def _matrix(
+def _read_matrix(
     log: RawLog,
     names: Names,
     joints: Sequence[str],
@@ -152,6 +152,7 @@ def _matrix(
     times: str,
     left_out: Collection[str],
 ) -> FloatArray:
+    """Return the columns of a quantity, one for each joint, or raise DataError if some are missing."""
     n_dof = len(joints)
     if isinstance(names, str):
         if NUMBER in names and names.replace(NUMBER, str(n_dof + 1)) in log.columns:
@@ -176,7 +177,7 @@ def _matrix(
     reference = log.columns.get(times)
     nothing = np.zeros(0 if reference is None else reference.size)
     found = [
-        nothing if joint in left_out else _column(log, name)
+        nothing if joint in left_out else _read_column(log, name)
         for joint, name in zip(joints, listed, strict=True)
     ]
     for name, column in zip(listed, found, strict=True):
@@ -188,7 +189,8 @@ def _matrix(
     return stack_columns(found)
 
 
-def _column(log: RawLog, name: str) -> FloatArray:
+def _read_column(log: RawLog, name: str) -> FloatArray:
+    """Return a column of numbers, or raise DataError if there is none."""
     column = log.columns.get(name)
     if column is None and name in log.others:
         raise DataError(f"{log.source}: column {name} holds {log.others[name]}; bring numbers.")
@@ -217,6 +219,7 @@ def _column(log: RawLog, name: str) -> FloatArray:
 
 
 def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
+    """Raise DataError unless time increases from row to row."""
     steps = np.diff(time)
     wrong = np.flatnonzero(steps <= 0)
     if wrong.size:
@@ -229,10 +232,12 @@ def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
         )
 
 
-def evened(found: Signals, steps: Collection[int] = ()) -> tuple[list[Signals], float, list[str]]:
-    """Part a recording into uninterrupted motions at an even rate.
+def resample_evenly(
+    found: Signals, steps: Collection[int] = ()
+) -> tuple[list[Signals], float, list[str]]:
+    """Split a recording into uninterrupted motions at an even rate.
 
-    Uneven time is resampled by cubic splines; gaps part motions.
+    Uneven time is resampled by cubic splines; gaps separate motions.
 
     Args:
         found: The recording.
@@ -247,7 +252,7 @@ def evened(found: Signals, steps: Collection[int] = ()) -> tuple[list[Signals], 
     step = float(np.median(np.diff(found.time)))
     gaps = np.flatnonzero(np.diff(found.time) > _GAP * step)
     edges = sorted({0, *(gaps + 1).tolist(), *steps, found.time.size})
-    pieces = [found.part(slice(a, b)) for a, b in itertools.pairwise(edges)]
+    pieces = [found.slice_rows(slice(a, b)) for a, b in itertools.pairwise(edges)]
     kept = [piece for piece in pieces if piece.time.size >= _FEWEST]
     if not kept:
         raise DataError(
@@ -262,7 +267,7 @@ def evened(found: Signals, steps: Collection[int] = ()) -> tuple[list[Signals], 
         )
     uneven = max(float(np.abs(np.diff(p.time) - step).max()) for p in kept) / step
     if uneven > _EVEN:
-        kept = [_resampled(piece, step) for piece in kept]
+        kept = [_resample(piece, step) for piece in kept]
         said.append(
             f"Time steps differ by up to {100 * uneven:.3g} %; resampled to {1 / step:.6g} Hz by cubic "
             "splines."
@@ -270,7 +275,8 @@ def evened(found: Signals, steps: Collection[int] = ()) -> tuple[list[Signals], 
     return kept, 1 / step, said
 
 
-def _resampled(found: Signals, step: float) -> Signals:
+def _resample(found: Signals, step: float) -> Signals:
+    """Return signals at an even time step, by cubic splines."""
     time = found.time[0] + step * np.arange(int((found.time[-1] - found.time[0]) / step) + 1)
 
     def at(values: FloatArray) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What measured torques look like beside the config's values, and with gravity or joints the other way.
+"""Hints from torques beside those that the config's values give, and with gravity or joints reversed.
 
 Base parameters take up a common factor of all torques, and most of what another direction of gravity or the other sign of
 a joint does: residuals alone do not show what it is.
@@ -26,7 +26,7 @@ _NEAR = 0.1
 
 
 def hint_at_unit(expected: FloatArray, found: FloatArray) -> list[str]:
-    """A sentence where the bodies' torques are those of the config's values but for a large factor.
+    """Return a hint if the bodies' torques are those of the config's values except for a large factor.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).
@@ -53,12 +53,12 @@ def hint_at_unit(expected: FloatArray, found: FloatArray) -> list[str]:
 
 
 def hint_at_rating(tau: FloatArray, rating: FloatArray, names: Sequence[str]) -> list[str]:
-    """A sentence where torques are far from what joints are made for.
+    """Return a hint if torques are far from the ratings of the joints.
 
     Args:
         tau: (n_samples, n_dof)
         rating: Nominal torques, (n_dof,); infinite where none is measured.
-        names: Of the coordinates.
+        names: Names of the coordinates.
     """
     shares = np.abs(tau).max(axis=0) / rating
     j = int(shares.argmax())
@@ -78,14 +78,14 @@ def hint_at_sign(
     deviation: FloatArray,
     names: Sequence[str],
 ) -> list[str]:
-    """A sentence where a joint that counts the other way fits far better.
+    """Return a hint if the fit is far better with one joint reversed.
 
     Args:
         usual: Observation matrix, (n_samples, n_dof, n).
         mirrored: The same with each joint's motion turned round in turn; or none.
         tau: (n_samples, n_dof)
         deviation: Standard deviations of the torques, (n_dof,).
-        names: Of the coordinates.
+        names: Names of the coordinates.
     """
     found: list[tuple[float, str]] = []
     for j, W in enumerate(mirrored):
@@ -95,13 +95,13 @@ def hint_at_sign(
                 f"With positions and speeds of {names[j]} counted the other way, {what}, the residuals are far "
                 "smaller: are the signs under sampling.log right?"
             )
-            found.append((_left(W, torques, deviation), text))
+            found.append((_compute_misfit(W, torques, deviation), text))
     left, text = min(found, default=(np.inf, ""))
-    return [text] if left < _FAR_LESS * _left(usual, tau, deviation) else []
+    return [text] if left < _FAR_LESS * _compute_misfit(usual, tau, deviation) else []
 
 
-def _left(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
-    """Squared residuals of the best fit, over the deviations."""
+def _compute_misfit(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> float:
+    """Return the squared residuals of the best fit, over the deviations."""
     weighted = np.concatenate([W, tau[..., None]], axis=2) / deviation[:, None]
     rows: FloatArray = weighted.reshape(-1, weighted.shape[2])
     # A triangular factor first: rows are many, and columns depend on each other.
@@ -125,7 +125,7 @@ def hint_at_gravity(
 
     def left(assumed: FloatArray) -> float:
         added = np.tensordot(assumed - gravity, pulls, axes=1)
-        return _left(W + added, tau, deviation)
+        return _compute_misfit(W + added, tau, deviation)
 
     if size == 0:
         return []

@@ -1,4 +1,4 @@
-"""Whole turns by which recorded angles jump where a sensor begins anew."""
+"""Whole turns by which recorded angles jump where a sensor wraps around."""
 
 import numpy as np
 
@@ -28,7 +28,7 @@ def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
         large = np.flatnonzero(np.abs(steps) > np.pi)
         if not large.size:
             continue
-        usual = _usual_steps(steps, large)
+        usual = _find_usual_steps(steps, large)
         turns = np.round((usual - steps[large]) / turn)
         whole = np.abs(steps[large] + turns * turn - usual) < _OFF_A_TURN
         turns[~whole] = 0
@@ -39,8 +39,8 @@ def unwrap_positions(z: FloatArray) -> tuple[int, ...]:
     return tuple(counts)
 
 
-def _usual_steps(steps: FloatArray, large: IntArray) -> FloatArray:
-    """Median of the steps around large ones that are not large themselves, (n_large,); zero where there are none."""
+def _find_usual_steps(steps: FloatArray, large: IntArray) -> FloatArray:
+    """Return the median of the small steps around large ones, (n_large,); zero if there are none."""
     small = np.abs(steps) <= np.pi
     found = np.zeros(large.size)
     for k, place in enumerate(large.tolist()):

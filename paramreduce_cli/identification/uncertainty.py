@@ -1,4 +1,4 @@
-"""How sure estimated parameters are when the noise of the torques is coloured.
+"""Uncertainty of estimated parameters if the noise of the torques is coloured.
 
 Residuals of a fast log follow one another closely, so that many samples say little more than a
 few; standard deviations for white noise are then several times too small. The noise of each
@@ -25,29 +25,29 @@ _SETTLING = 1000
 
 @dataclass(frozen=True)
 class ColouredNoise:
-    """Autoregressive noise: e_k = sum_i coefficients_i e_{k-i} + white noise."""
+    """An autoregressive noise: e_k = sum_i coefficients_i e_{k-i} + white noise."""
 
     coefficients: FloatArray
     """(order,)"""
     variance: float
     """Of the white noise that drives it."""
 
-    def spectrum(self, n: int) -> FloatArray:
-        """Power at the n // 2 + 1 frequencies of a real Fourier transform of length n."""
+    def compute_spectrum(self, n: int) -> FloatArray:
+        """Return the power at the n // 2 + 1 frequencies of a real Fourier transform of length n."""
         response = fft.rfft(np.concatenate([[1.0], -self.coefficients]), n)
         power: FloatArray = self.variance / np.abs(response) ** 2
         return power
 
-    def drawn(self, n: int, rng: np.random.Generator) -> FloatArray:
-        """Some of it, (n,)."""
+    def simulate(self, n: int, rng: np.random.Generator) -> FloatArray:
+        """Return simulated noise, (n,)."""
         white = np.sqrt(self.variance) * rng.standard_normal(n + _SETTLING)
         denominator = np.concatenate([[1.0], -self.coefficients])
         result: FloatArray = scipy.signal.lfilter([1.0], denominator, white)[_SETTLING:]
         return result
 
 
-def autocovariance_of(segments: Sequence[FloatArray]) -> FloatArray:
-    """Autocovariances of a joint's residuals over all segments, (n_lags,)."""
+def estimate_autocovariance(segments: Sequence[FloatArray]) -> FloatArray:
+    """Return the autocovariances of a joint's residuals over all segments, (n_lags,)."""
     n = sum(r.size for r in segments)
     most = max(0, min(_ORDERS[-1], max(r.size for r in segments) // 4))
     sums = [
@@ -57,12 +57,12 @@ def autocovariance_of(segments: Sequence[FloatArray]) -> FloatArray:
     return np.array(sums) / n
 
 
-def corrected(seen: FloatArray, lost: FloatArray) -> FloatArray:
-    """Autocovariances with what a fit took out of them given back, as far as they stay some.
+def add_lost_noise(seen: FloatArray, lost: FloatArray) -> FloatArray:
+    """Return autocovariances with the noise added that a fit has taken out, as far as they stay positive definite.
 
     Args:
-        seen: Of residuals, (n_lags,).
-        lost: What is to be added.
+        seen: Autocovariances of residuals, (n_lags,).
+        lost: Autocovariances to add.
     """
     for _ in range(_HALVINGS):
         result: FloatArray = seen + lost
@@ -72,8 +72,8 @@ def corrected(seen: FloatArray, lost: FloatArray) -> FloatArray:
     return seen
 
 
-def coloured_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
-    """The autoregressive model of residuals, by the Yule-Walker equations [Stoica2005], Sec. 3.4.
+def fit_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
+    """Return the autoregressive model of residuals, by the Yule-Walker equations [Stoica2005], Sec. 3.4.
 
     Args:
         autocovariance: (n_lags,)
@@ -98,10 +98,10 @@ def coloured_noise(autocovariance: FloatArray, n: int) -> ColouredNoise:
     return best[1]
 
 
-def score_covariance(
+def compute_score_covariance(
     segments: Iterable[FloatArray], noise: Sequence[ColouredNoise], weights: FloatArray
 ) -> FloatArray:
-    """X' V X of the weighted rows, with V the covariance of the weighted noise, (p, p).
+    """Return X' V X of the weighted rows, with V the covariance of the weighted noise, (p, p).
 
     Args:
         segments: Columns of uninterrupted motions, (n_samples, n_dof, p) each.
@@ -116,7 +116,7 @@ def score_covariance(
             if weights[j] == 0:
                 continue
             transformed = fft.rfft(X[:, j], n, axis=0)
-            power = model.spectrum(n) * weights[j] ** 2
+            power = model.compute_spectrum(n) * weights[j] ** 2
             twice = np.full(power.size, 2.0)  # frequencies and their mirror images
             twice[0] = 1.0
             if n % 2 == 0:
@@ -128,16 +128,16 @@ def score_covariance(
     return total
 
 
-def effective_samples(noise: ColouredNoise, n_samples: int) -> float:
-    """White samples that tell as much of a constant as these coloured ones."""
+def count_effective_samples(noise: ColouredNoise, n_samples: int) -> float:
+    """Return the number of white samples that determine a constant as well as these coloured ones."""
     order = noise.coefficients
-    variance = noise_variance(noise)
+    variance = compute_variance(noise)
     at_rest = noise.variance / max(1e-12, (1 - float(np.sum(order))) ** 2)
     return n_samples * variance / at_rest
 
 
-def noise_variance(noise: ColouredNoise) -> float:
-    """Variance of the noise itself."""
+def compute_variance(noise: ColouredNoise) -> float:
+    """Return the variance of the noise."""
     n = 8192
-    power = noise.spectrum(n)
+    power = noise.compute_spectrum(n)
     return float((2 * power.sum() - power[0] - power[-1]) / n)

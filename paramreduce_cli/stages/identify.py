@@ -7,8 +7,8 @@ import numpy as np
 from paramreduce_cli.config.identification import IdentificationSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.identification import consistency as physics
-from paramreduce_cli.identification.comparison import compared
-from paramreduce_cli.identification.estimation import LinearFit, robust_fit, rows_of
+from paramreduce_cli.identification.comparison import compare_held_out
+from paramreduce_cli.identification.estimation import LinearFit, collect_rows, fit_robustly
 from paramreduce_cli.identification.hints import find_hints
 from paramreduce_cli.multibody.observation import combined_factor
 from paramreduce_cli.multibody.orthogonal import least_squares
@@ -72,10 +72,10 @@ def identify(
         torque_size=_sizes(held_out),
         full=full,
         reduced=reduced,
-        residuals=full_fit.judged_residuals(n_samples),
+        residuals=full_fit.analyse_residuals(n_samples),
         consistency=consistency,
         hints=tuple(hints),
-        comparison=compared(full, reduced),
+        comparison=compare_held_out(full, reduced),
         shown_time=np.concatenate([block.time for block in shown]),
         shown_measured=np.concatenate([block.tau for block in shown]),
         shown_full=_predicted(shown, full.standard),
@@ -104,7 +104,7 @@ def _estimate(
     factors = _merged(training.compute_factors(), columns)
     values = least_squares(combined_factor(factors, deviation))
     if wanted.estimator == "robust":
-        values, deviation = robust_fit(
+        values, deviation = fit_robustly(
             lambda: (
                 ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau)
                 for b in training.iterate_blocks()
@@ -112,13 +112,13 @@ def _estimate(
             values,
             deviation,
         )
-    rows = rows_of(training.iterate_blocks(), columns, training.n_samples)
+    rows = collect_rows(training.iterate_blocks(), columns, training.n_samples)
     fitted = LinearFit(rows, values, deviation)
     own, other = (_errors(part, columns @ values, deviation) for part in (training, held_out))
     estimate = Estimate(
         names=chosen.names,
         values=values,
-        deviations=np.sqrt(np.maximum(0.0, np.diag(fitted.covariance()))),
+        deviations=np.sqrt(np.maximum(0.0, np.diag(fitted.compute_covariance()))),
         standard=columns @ values,
         train=own[0],
         held_out=other[0],
@@ -169,9 +169,9 @@ def _consistency(
     held_out = samples.validation
     assert held_out is not None
     factor = combined_factor(samples.estimation.compute_factors(), deviation)
-    known = physics.physical_parameters(model.mechanism, model.values, factor)
+    known = physics.list_constraints(model.mechanism, model.values, factor)
     try:
-        standard = physics.consistent(factor, known, wanted.consistency)
+        standard = physics.fit_consistent(factor, known, wanted.consistency)
     except DataError as error:
         warnings.warn(
             f"{str(error).rstrip('.')}; going on without", ParamreduceWarning, stacklevel=2
@@ -190,9 +190,9 @@ def _consistency(
         standard=standard,
         train=_errors(samples.estimation, standard, deviation)[0],
         held_out=_errors(held_out, standard, deviation)[0],
-        smallest_eigenvalues=physics.smallest_eigenvalues(known, standard),
-        unconstrained_eigenvalues=physics.smallest_eigenvalues(
-            known, physics.unconstrained(factor, known)
+        smallest_eigenvalues=physics.compute_smallest_eigenvalues(known, standard),
+        unconstrained_eigenvalues=physics.compute_smallest_eigenvalues(
+            known, physics.fit_unconstrained(factor, known)
         ),
         bodies=known.names,
         smallest_drive=float(drives.min()) if drives.size else np.inf,

@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.identification.processing import processed
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
 
 
@@ -32,7 +32,7 @@ def process_log(
     unmeasured = [
         name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
     ]
-    found = processed(logs, log, names, tell, unmeasured)
+    found = process_logs(logs, log, names, tell, unmeasured)
     for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

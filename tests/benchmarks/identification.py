@@ -8,7 +8,7 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.identification.estimation import Rows, weighted_fit
+from paramreduce_cli.identification.estimation import Rows, fit_weighted
 from paramreduce_cli.identification.residual_hints import find_residual_hints
 from paramreduce_cli.identification.torque_hints import hint_at_gravity, hint_at_unit
 from paramreduce_cli.multibody.orthogonal import least_squares
@@ -39,9 +39,9 @@ def fitted(log, tau, X):
     rows = Rows((X,), (tau,), (log.dz,), (log.ddz,), 1 / RATE, 1.0)
     deviation = np.std(tau, axis=0)
     for _ in range(4):
-        left = weighted_fit(rows, deviation).residuals[0]
+        left = fit_weighted(rows, deviation).residuals[0]
         deviation = np.maximum(np.std(left, axis=0), 1e-9)
-    return weighted_fit(rows, deviation)
+    return fit_weighted(rows, deviation)
 
 
 def noisy(log, tau, pole, seed):
@@ -54,7 +54,7 @@ def coverage(pole, count):
     for seed in range(count):
         log = simulated(seed)
         found = fitted(log, noisy(log, log.tau, pole, seed), log.X)
-        deviations = np.sqrt(np.diag(found.covariance()))
+        deviations = np.sqrt(np.diag(found.compute_covariance()))
         hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
     return np.mean(hits), np.mean(hits, axis=0).min(), np.mean(hits, axis=0).max()
 

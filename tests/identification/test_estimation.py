@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from simulated_logs import RATE, coloured, simulated
 
-from paramreduce_cli.identification.estimation import LinearFit, Rows, robust_fit, weighted_fit
+from paramreduce_cli.identification.estimation import LinearFit, Rows, fit_robustly, fit_weighted
 from paramreduce_cli.identification.residual_hints import (
     find_residual_hints,
     hint_at_negative_friction,
 )
-from paramreduce_cli.identification.uncertainty import ColouredNoise, score_covariance
+from paramreduce_cli.identification.uncertainty import ColouredNoise, compute_score_covariance
 
 
 def rows_of(log, tau, X=None):
@@ -20,14 +20,14 @@ def fitted(log, tau, X=None):
     """Weighted by what is left, as a user would have it."""
     rows, deviation = rows_of(log, tau, X), np.std(tau, axis=0)
     for _ in range(4):
-        left = weighted_fit(rows, deviation).residuals[0]
+        left = fit_weighted(rows, deviation).residuals[0]
         deviation = np.maximum(np.std(left, axis=0), 1e-9)
-    return weighted_fit(rows, deviation)
+    return fit_weighted(rows, deviation)
 
 
 def test_exact_torques_give_exact_values():
     log = simulated(0)
-    found = weighted_fit(rows_of(log, log.tau), np.std(log.tau, axis=0))
+    found = fit_weighted(rows_of(log, log.tau), np.std(log.tau, axis=0))
     assert np.allclose(
         found.parameters, log.values, rtol=1e-7, atol=1e-8 * np.abs(log.values).max()
     )
@@ -41,7 +41,7 @@ def test_the_covariance_of_scores_by_brute_force():
     lags = np.abs(np.subtract.outer(np.arange(60), np.arange(60)))
     V = [1.5 / (1 - pole**2) * pole**lags, 0.3 * np.eye(60)]
     expected = sum(weights[j] ** 2 * X[:, j].T @ V[j] @ X[:, j] for j in range(2))
-    assert np.allclose(score_covariance([X], noise, weights), expected, rtol=1e-9)
+    assert np.allclose(compute_score_covariance([X], noise, weights), expected, rtol=1e-9)
 
 
 @pytest.mark.parametrize("pole", [0.0, 0.9])
@@ -52,7 +52,7 @@ def test_intervals_hold_the_truth(pole):
         log = simulated(seed)
         tau = log.tau + coloured(log.tau.shape, 0.05 * np.std(log.tau, axis=0), pole, seed)
         found = fitted(log, tau)
-        deviations = np.sqrt(np.diag(found.covariance()))
+        deviations = np.sqrt(np.diag(found.compute_covariance()))
         hits.append(np.abs(found.parameters - log.values) < 1.96 * deviations)
     assert 0.90 < np.mean(hits) < 0.985
 
@@ -63,15 +63,15 @@ def test_deviations_for_white_noise_would_be_far_too_small():
     found = fitted(log, log.tau + coloured(log.tau.shape, size, 0.9, 3))
     X = (log.X / found.deviation[:, None]).reshape(-1, log.X.shape[2])
     white = np.sqrt(np.diag(np.linalg.inv(X.T @ X)))
-    assert np.median(np.sqrt(np.diag(found.covariance())) / white) > 2
-    assert np.all(found.judged_residuals(log.time.size).white < 1e-6)
+    assert np.median(np.sqrt(np.diag(found.compute_covariance())) / white) > 2
+    assert np.all(found.analyse_residuals(log.time.size).white < 1e-6)
 
 
 def test_white_residuals_are_called_white():
     log = simulated(4)
     size = 0.05 * np.std(log.tau, axis=0)
     found = fitted(log, log.tau + coloured(log.tau.shape, size, 0.0, 4))
-    judged = found.judged_residuals(log.time.size)
+    judged = found.analyse_residuals(log.time.size)
     assert np.all(judged.white > 1e-3)
     assert np.allclose(judged.deviation, size, rtol=0.1)
 
@@ -84,7 +84,7 @@ def test_robust_values_withstand_outliers():
     bad = rng.random(tau.shape) < 0.05
     tau += bad * 60 * size * rng.normal(size=tau.shape)
     plain = fitted(log, tau)
-    values, _ = robust_fit(lambda: [(log.X, tau)], plain.parameters, plain.deviation)
+    values, _ = fit_robustly(lambda: [(log.X, tau)], plain.parameters, plain.deviation)
     scale = np.linalg.norm(log.X.reshape(-1, log.X.shape[2]), axis=0)
 
     def miss(found):
@@ -100,10 +100,10 @@ def test_joints_without_torques_do_not_count():
     tau = log.tau.copy()
     tau[:, 2] = 0.0
     found = LinearFit(
-        rows_of(log, tau), weighted_fit(rows_of(log, tau), deviation).parameters, deviation
+        rows_of(log, tau), fit_weighted(rows_of(log, tau), deviation).parameters, deviation
     )
-    assert np.isnan(found.judged_residuals(10).deviation[2])
-    assert np.all(np.isfinite(np.diag(found.covariance())))
+    assert np.isnan(found.analyse_residuals(10).deviation[2])
+    assert np.all(np.isfinite(np.diag(found.compute_covariance())))
 
 
 def late(log, seconds):

@@ -9,8 +9,8 @@ from simulated_logs import two_link_log
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification.pieces import Piece
-from paramreduce_cli.identification.processing import UNUSED, processed
-from paramreduce_cli.identification.shown import Place, place_to_show
+from paramreduce_cli.identification.processing import UNUSED, process_logs
+from paramreduce_cli.identification.shown import Place, find_longest
 from paramreduce_cli.identification.signals import Signals
 from paramreduce_cli.records import RawLog, RawLogs
 
@@ -21,7 +21,7 @@ COLUMNS = {"velocity": "dq{}"}
 def made(log, other=None, **keys):
     logs = RawLogs((RawLog("log.csv", log, 2),), () if other is None else (other,))
     keys.setdefault("columns", COLUMNS)
-    return processed(logs, LogSection(files=["log.csv"], **keys), NAMES)
+    return process_logs(logs, LogSection(files=["log.csv"], **keys), NAMES)
 
 
 def used(motions):
@@ -41,7 +41,7 @@ def test_the_last_share_is_held_out_and_folds_are_equal_parts_in_time():
 def test_it_tells_how_far_it_is():
     told = []
     logs = RawLogs((RawLog("log.csv", two_link_log(), 2),), ())
-    processed(logs, LogSection(files=["log.csv"], columns=COLUMNS), NAMES, told.append)
+    process_logs(logs, LogSection(files=["log.csv"], columns=COLUMNS), NAMES, told.append)
     assert [(p.done, p.total) for p in told] == [(k, 4) for k in range(5)]
     assert all(p.detail for p in told[:-1])
 
@@ -93,7 +93,7 @@ def test_files_are_read_one_at_a_time():
                 yield yielded.pop()
 
     names = [f"{seed}.csv" for seed in range(3)]
-    found = processed(RawLogs(Files(), ()), LogSection(files=names, columns=COLUMNS), NAMES)
+    found = process_logs(RawLogs(Files(), ()), LogSection(files=names, columns=COLUMNS), NAMES)
     assert found.training.piece[-1] == 2
     assert [any(name in step for step in found.steps) for name in names] == [True] * 3
 
@@ -201,10 +201,10 @@ def test_the_longest_motion_is_shown_with_what_goes_on_from_it():
 
     learned = [[motion(0, 30)], [motion(0, 20), motion(5, 50)]]
     held_out = [[motion(3, 40)], [motion(10, 25), motion(20, 60)]]
-    assert place_to_show(learned, held_out, 10.0) == Place(file=1, learned=2, held_out=1)
-    assert place_to_show(learned, [[], [motion(11, 25)]], 10.0).held_out is None
-    assert place_to_show(learned, [], 10.0).held_out is None
-    assert place_to_show([[motion(0, 60), motion(9, 5)]], [[motion(6, 5)]], 10.0).held_out is None
+    assert find_longest(learned, held_out, 10.0) == Place(file=1, learned=2, held_out=1)
+    assert find_longest(learned, [[], [motion(11, 25)]], 10.0).held_out is None
+    assert find_longest(learned, [], 10.0).held_out is None
+    assert find_longest([[motion(0, 60), motion(9, 5)]], [[motion(6, 5)]], 10.0).held_out is None
 
 
 def test_steps_of_friction_are_no_outliers():

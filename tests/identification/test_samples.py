@@ -7,7 +7,7 @@ from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.identification import samples
-from paramreduce_cli.identification.processing import UNUSED, processed
+from paramreduce_cli.identification.processing import UNUSED, process_logs
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import combined_factor
@@ -26,7 +26,7 @@ def arm(tmp_path_factory):
 def made(log, **keys):
     section = LogSection(files=["log.csv"], columns={"velocity": "dq{}"}, **keys)
     logs = RawLogs((RawLog("log.csv", log, 2),), ())
-    return processed(logs, section, ("upper", "fore"))
+    return process_logs(logs, section, ("upper", "fore"))
 
 
 def gathered(sample_set):
@@ -44,7 +44,7 @@ def test_torques_and_columns_pass_the_same_filter(arm):
     K = arm.regressor(m.z, m.dz, m.ddz)
     from paramreduce_cli.identification import filters
 
-    taps = filters.low_pass(5, log.rate)
+    taps = filters.design_low_pass(5, log.rate)
     rows = np.searchsorted(m.time, found["time"])
     tau = np.column_stack([np.convolve(t, taps, "same") for t in m.tau.T])
     W = np.apply_along_axis(np.convolve, 0, K.reshape(m.time.size, -1), taps, "same")

@@ -13,7 +13,7 @@ from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
-from paramreduce_cli.identification.signals import evened, signals
+from paramreduce_cli.identification.signals import read_signals, resample_evenly
 from paramreduce_cli.records import RawLog
 
 NAMES = ("upper", "fore")
@@ -91,7 +91,7 @@ def test_joint_states_of_a_bag(tmp_path, gripper):
         "velocity": "/joint_states/velocity/{name}",
         "torque": "/joint_states/effort/{name}",
     }
-    found = signals(log, section(columns=columns), NAMES)
+    found = read_signals(log, section(columns=columns), NAMES)
     assert np.allclose(found.time, LOG["t"], atol=1e-6)
     assert np.allclose(found.z[:, 0], LOG["q1"])
     assert np.allclose(found.tau[:, 1], LOG["tau2"])
@@ -105,7 +105,7 @@ def test_files_that_are_no_logs(name, content, tmp_path):
     if content is not None:
         (tmp_path / name).write_bytes(content)
     with pytest.raises((ArtifactError, DataError), match=name):
-        signals(load_log(tmp_path / name), section(), NAMES)
+        read_signals(load_log(tmp_path / name), section(), NAMES)
 
 
 def test_units_signs_offsets_motors():
@@ -122,7 +122,7 @@ def test_units_signs_offsets_motors():
         units={"time": "ms", "position": "deg", "torque": "mA"},
         torque_constants=[0.5, 0.25], signs=[1, -1], transmission=N.tolist(), offsets=[0.1, -0.2],
     )  # fmt: skip
-    found = signals(RawLog("log.csv", recorded, 2), wanted, NAMES)
+    found = read_signals(RawLog("log.csv", recorded, 2), wanted, NAMES)
     assert np.allclose(found.time, LOG["t"])
     assert np.allclose(found.z, np.column_stack([LOG["q1"], LOG["q2"]]))
     assert np.allclose(found.tau, tau)
@@ -159,12 +159,14 @@ def with_at(values, row, value):
 )
 def test_what_cannot_be_is_said_with_row_and_column(changes, said):
     with pytest.raises(DataError, match=said):
-        signals(raw(**changes), section(), NAMES)
+        read_signals(raw(**changes), section(), NAMES)
 
 
 def test_missing_columns_are_listed():
     with pytest.raises(DataError, match=r"no column tau1; there are t, q1.*sampling\.log\.columns"):
-        signals(RawLog("x", {k: v for k, v in LOG.items() if "tau" not in k}, 2), section(), NAMES)
+        read_signals(
+            RawLog("x", {k: v for k, v in LOG.items() if "tau" not in k}, 2), section(), NAMES
+        )
 
 
 @pytest.mark.parametrize(
@@ -178,7 +180,7 @@ def test_missing_columns_are_listed():
 )
 def test_settings_that_do_not_fit_the_robot(keys, said):
     with pytest.raises(ConfigError, match=said):
-        signals(raw(), section(**keys), NAMES)
+        read_signals(raw(), section(**keys), NAMES)
 
 
 def test_uneven_time_is_resampled():
@@ -187,7 +189,7 @@ def test_uneven_time_is_resampled():
     time = np.sort(LOG["t"] + 0.001 * rng.uniform(-1, 1, LOG["t"].size))
     uneven = {key: np.interp(time, LOG["t"], values) for key, values in LOG.items()} | {"t": time}
     uneven["q1"] = np.sin(3 * time)
-    pieces, rate, said = evened(signals(RawLog("x", uneven, 2), section(), NAMES))
+    pieces, rate, said = resample_evenly(read_signals(RawLog("x", uneven, 2), section(), NAMES))
     assert len(pieces) == 1
     assert rate == pytest.approx(200, rel=0.01)
     assert "resampled" in said[0]
@@ -198,7 +200,7 @@ def test_uneven_time_is_resampled():
 def test_gaps_part_a_log():
     kept = np.r_[0:150, 230:390]
     log = RawLog("x", {key: values[kept] for key, values in LOG.items()}, 2)
-    pieces, _, said = evened(signals(log, section(), NAMES))
+    pieces, _, said = resample_evenly(read_signals(log, section(), NAMES))
     assert [piece.time.size for piece in pieces] == [150, 160]
     assert "1 gaps in time, the longest of 0.405 s" in said[0]
 
@@ -206,9 +208,9 @@ def test_gaps_part_a_log():
 def test_signals_of_different_length_are_named():
     log = RawLog("x", {**LOG, "tau2": LOG["tau2"][:-3]}, None)
     with pytest.raises(DataError, match="column tau2 has 397 rows, t has 400"):
-        signals(log, section(), NAMES)
+        read_signals(log, section(), NAMES)
     unused = RawLog("x", {"calibration": np.ones(3), **LOG}, None)
-    assert signals(unused, section(), NAMES).time.size == 400
+    assert read_signals(unused, section(), NAMES).time.size == 400
 
 
 def test_text_and_objects_that_nobody_asks_for(tmp_path):
@@ -299,11 +301,11 @@ def test_torques_that_are_not_measured_need_no_column(torque, change):
     if change == "absent":
         del columns["tau2"]
     wanted = section(columns={"torque": torque})
-    found = signals(RawLog("x.csv", columns, 2), wanted, NAMES, unmeasured=[NAMES[1]])
+    found = read_signals(RawLog("x.csv", columns, 2), wanted, NAMES, unmeasured=[NAMES[1]])
     np.testing.assert_array_equal(found.tau[:, 0], LOG["tau1"])
     assert not found.tau[:, 1].any()
     with pytest.raises((DataError, ConfigError)):
-        signals(RawLog("x.csv", columns, 2), wanted, NAMES)
+        read_signals(RawLog("x.csv", columns, 2), wanted, NAMES)
 
 
 @pytest.mark.parametrize(
@@ -353,7 +355,7 @@ def test_cells_that_are_empty_are_missing_numbers_and_no_text(tmp_path):
     log = load_log(path)
     assert list(log.columns) == ["t", "q1", "tau1"]
     with pytest.raises(DataError, match="line 2, column tau1: is empty or not a finite number"):
-        signals(log, LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
+        read_signals(log, LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
 
 
 @pytest.mark.parametrize(
@@ -372,7 +374,7 @@ def test_tables_that_cannot_be_read_say_why(tmp_path, text, says):
 def test_speeds_without_any_number_are_to_be_left_out():
     log = RawLog("x.csv", {**LOG, "dq1": np.full(LOG["t"].size, np.nan)}, 2)
     with pytest.raises(DataError, match=r"column dq1 holds no number at all\. Leave it out"):
-        signals(log, section(columns={"velocity": "dq{}"}), NAMES)
+        read_signals(log, section(columns={"velocity": "dq{}"}), NAMES)
 
 
 def test_joints_in_rows_are_told_by_the_time(tmp_path):
@@ -404,7 +406,7 @@ def test_columns_that_hold_no_numbers_are_named(tmp_path, values, held, kind):
             for name, array in arrays.items():
                 file[name] = array
     with pytest.raises(DataError, match=f"column tau1 holds {held}"):
-        signals(load_log(path), LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
+        read_signals(load_log(path), LogSection(files=["x"], columns={"torque": "tau{}"}), ["a"])
 
 
 def test_a_column_of_one_joint_is_not_that_of_another():

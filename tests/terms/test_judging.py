@@ -35,7 +35,7 @@ def judge(robot, z, dz, ddz, nominal, constraints=(), **more):
     tau = Dynamics(model.mechanism).inverse(q, dq, ddq, model.values)
     unused = np.zeros((z.size, model.values.size))
     block = Block(0, np.arange(len(z)), z, dz, ddz, tau, q, dq, ddq, unused)
-    part = SimpleNamespace(blocks=lambda: iter([block]), n_samples=len(z))
+    part = SimpleNamespace(iterate_blocks=lambda: iter([block]), n_samples=len(z))
     samples = SimpleNamespace(
         estimation=part, validation=None, nominal_acceleration=np.ones(z.shape[1])
     )

@@ -15,7 +15,7 @@ from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.logs import LogSection
 from paramreduce_cli.errors import ParamreduceError
-from paramreduce_cli.identification.processing import processed
+from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.records import RawLogs
 from tests.simulated_logs import two_link_log, write_log
 from tests.torture import CONFIG
@@ -169,7 +169,7 @@ def try_data(folder, count, seed=0):
 
     def processed_log(text):
         log.write_bytes(text.encode("utf-8", "surrogatepass"))
-        processed(RawLogs((load_log(log),), ()), section, _JOINTS)
+        process_logs(RawLogs((load_log(log),), ()), section, _JOINTS)
         return "a log"
 
     def recorded(text):

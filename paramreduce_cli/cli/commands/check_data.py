@@ -37,8 +37,8 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     """
     # Late: these load all numerics.
     from paramreduce_cli.artifacts.log_files import load_log
-    from paramreduce_cli.identification.processing import processed
-    from paramreduce_cli.identification.quality import quality
+    from paramreduce_cli.identification.processing import process_logs
+    from paramreduce_cli.identification.quality import measure_quality
     from paramreduce_cli.records import RawLogs
 
     if file.suffix in (".yaml", ".yml"):
@@ -59,10 +59,10 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     section = section.model_copy(update={"held_out": usual} if section.held_out_files else {})
     with locate_errors(config, overrides):
         unmeasured = [] if loaded is None else loaded.unmeasured
-        log = processed(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
+        log = process_logs(RawLogs((raw,), ()), section, joints, unmeasured=unmeasured)
         found = None
         if mechanism is not None and loaded is not None:
-            found = quality(mechanism, log, loaded.find_measured())
+            found = measure_quality(mechanism, log, loaded.find_measured())
     for text in log.steps:
         say(text)
     table = rich.table.Table(box=rich.box.SIMPLE, pad_edge=False, collapse_padding=True)

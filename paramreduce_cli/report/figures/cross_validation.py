@@ -2,7 +2,7 @@
 
 from matplotlib.figure import Figure
 
-from paramreduce_cli.identification.quality import noise_floor
+from paramreduce_cli.identification.quality import estimate_noise_floor
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import legend_beside, mark_selected, new_figure
@@ -30,7 +30,9 @@ def cross_validation(data: ReportData) -> Figure | None:
     k = int(own.mean.argmin())
     limit = 100 * float(own.mean[k] + own.standard_error[k])
     axes.axhline(limit, color="#0b62c4", linewidth=0.8, linestyle=":")
-    floor = 0.0 if data.log is None else noise_floor(data.log, data.reduction.nominal_torque)
+    floor = (
+        0.0 if data.log is None else estimate_noise_floor(data.log, data.reduction.nominal_torque)
+    )
     if floor > 0:
         label = f"noise alone: {100 * floor:.2g} %"
         axes.axhline(100 * floor, color="#57606a", linewidth=1.0, linestyle="--", label=label)
