@@ -205,7 +205,9 @@ def test_new_limits_are_judged_without_measuring_again(two_link_copy, monkeypatc
     def measured_again(*_):
         raise AssertionError("measured again")
 
-    monkeypatch.setattr("paramreduce_cli.stages.validate.compute_acceleration_errors", measured_again)
+    monkeypatch.setattr(
+        "paramreduce_cli.stages.validate.compute_acceleration_errors", measured_again
+    )
     stage, store = STAGES["validate"], Store(two_link_copy)
     before, _ = load_file(store.get_path(stage.output), stage.output, None, "")
     config = config_of("two_link", "validation.accept.torque_error_validation=1e-6")

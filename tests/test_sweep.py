@@ -133,7 +133,9 @@ def test_a_script_for_slurm_submits_phases_that_wait_for_each_other(tmp_path):
 def test_more_commands_than_an_array_may_have_tasks_are_dealt_to_them(tmp_path, monkeypatch):
     monkeypatch.setattr(workflow, "_MOST_TASKS", 2)
     monkeypatch.setattr(
-        Sweep, "list_phases", lambda *_: [[f"echo {k} >> done" if k != 1 else "false" for k in range(5)]]
+        Sweep,
+        "list_phases",
+        lambda *_: [[f"echo {k} >> done" if k != 1 else "false" for k in range(5)]],
     )
     monkeypatch.chdir(tmp_path)
     path = listed(tmp_path, f"robots: [{TWO_LINK}]\nresults: r s\n")

@@ -11,7 +11,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.next_step import next_steps
+from paramreduce_cli.cli.next_step import describe_next_steps
 from paramreduce_cli.cli.suggestions import (
     Call,
     UnknownCommandError,
@@ -43,7 +43,7 @@ def main() -> None:
     warnings.simplefilter("once", ParamreduceWarning)
     warnings.showwarning = show_warning
     try:
-        code = _called()
+        code = _call_command()
     except ParamreduceError as error:
         show_errors(describe_error(error, _call()))
         if further := _suggest(suggest_after_error, error):
@@ -90,8 +90,8 @@ def _call() -> Call:
     return Call(cli.words, cli.get_command(click.Context(cli), name))
 
 
-def _called() -> object:
-    """What the command returns.
+def _call_command() -> object:
+    """Call the command and return what it returns.
 
     Raises:
         KeyboardInterrupt: Also where it was raised into a library, which then failed with an error of its own.
@@ -104,7 +104,7 @@ def _called() -> object:
 
 
 class _Commands(click.Group):
-    """The stages and the other commands, each imported when it is called."""
+    """The group of all commands, each imported when it is called."""
 
     words: Sequence[str] = ()
     """Words of the call after the name of the program."""
@@ -121,25 +121,25 @@ class _Commands(click.Group):
         return super().make_context(info_name, args, parent, **extra)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names, in alphabetical order."""
+        """Return the names in alphabetical order."""
         return sorted((*stages, *commands))
 
     def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
-        """The command with a name; None if there is none."""
+        """Return the command with a name, or None if there is none."""
         if name not in commands and name not in stages:
             return None
         with show_start(name):
             if name in commands:
                 command: click.Command = commands[name]
                 return command
-            from paramreduce_cli.cli.stage_command import stage_command
+            from paramreduce_cli.cli.stage_command import make_stage_command
 
-            return stage_command(name)
+            return make_stage_command(name)
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command that is asked for, or the one that was meant."""
+        """Return the command that is asked for, or raise an error that names the one that is meant."""
         if args and not args[0].startswith("-") and self.get_command(ctx, args[0]) is None:
             raise UnknownCommandError(args[0], self.list_commands(ctx), ctx)
         return super().resolve_command(ctx, args)
@@ -168,4 +168,4 @@ def cli(context: click.Context) -> None:
     command it says what to do next in this folder.
     """
     if context.invoked_subcommand is None:
-        say("\n".join(next_steps(Path())))
+        say("\n".join(describe_next_steps(Path())))

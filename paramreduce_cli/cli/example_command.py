@@ -1,4 +1,4 @@
-"""Commands that show how they are called."""
+"""Commands that show an example call in their help and after errors."""
 
 import inspect
 import shlex
@@ -9,7 +9,12 @@ from typing import Any
 
 import click
 
-from paramreduce_cli.cli.project_state import configs_in, has_report, results_in, results_of
+from paramreduce_cli.cli.project_state import (
+    get_results_path,
+    has_report,
+    list_configs,
+    list_results,
+)
 
 
 class ExampleCommand(click.Command):
@@ -46,7 +51,7 @@ class ExampleCommand(click.Command):
             words: Words of the call, whose configs come first.
         """
         names = {name for _, name, _, _ in Formatter().parse(self._example) if name}
-        configs, results = _here(words)
+        configs, results = _list_projects(words)
         if names and not configs and not results:
             return f"{self._fill({})}\nFirst: paramreduce init --example {self._robot} writes its config."
         paths = {"config": configs[:1], "results": results[:1], "results_2": results[1:2]}
@@ -60,9 +65,9 @@ class ExampleCommand(click.Command):
         return f"{self._fill(found)}\nFirst: paramreduce run {first} makes results."
 
 
-def _here(words: Sequence[str]) -> tuple[list[Path], list[Path]]:
+def _list_projects(words: Sequence[str]) -> tuple[list[Path], list[Path]]:
     """Return configs and results of this folder, those of the call first."""
     own = [path for path in map(Path, words) if path.suffix in (".yaml", ".yml") and path.is_file()]
-    configs = list(dict.fromkeys([*own, *configs_in(Path())]))
-    finished = [results for results in map(results_of, own) if has_report(results)]
-    return configs, list(dict.fromkeys([*finished, *results_in(Path())]))
+    configs = list(dict.fromkeys([*own, *list_configs(Path())]))
+    finished = [results for results in map(get_results_path, own) if has_report(results)]
+    return configs, list(dict.fromkeys([*finished, *list_results(Path())]))

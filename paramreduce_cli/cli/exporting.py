@@ -1,4 +1,4 @@
-"""What commands that export have in common."""
+"""Functions that several export commands share."""
 
 from typing import Any
 
@@ -9,8 +9,8 @@ from paramreduce_cli.running.pipeline import find_maker
 from paramreduce_cli.running.runner import Runner
 
 
-def up_to_date(config: Config | None, store: Store, record: type) -> Any:
-    """A record that fits the config, if there is one: what goes onto a controller had better be up to date.
+def load_current(config: Config | None, store: Store, record: type) -> Any:
+    """Return a record if it fits the config, as code for a controller must be of the current config.
 
     Raises:
         ArtifactError: It is missing, or was made from something else.

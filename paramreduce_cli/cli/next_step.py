@@ -1,9 +1,14 @@
-"""What to do next in a folder, for who calls paramreduce without a command."""
+"""Next steps in a folder, for calls of paramreduce without a command."""
 
 import shlex
 from pathlib import Path
 
-from paramreduce_cli.cli.project_state import configs_in, has_report, project_above, results_of
+from paramreduce_cli.cli.project_state import (
+    find_project_above,
+    get_results_path,
+    has_report,
+    list_configs,
+)
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.texts import format_percent, format_percent_range
 
@@ -11,17 +16,17 @@ _MOST = 8
 """Robots that are listed."""
 
 
-def next_steps(folder: Path) -> list[str]:
-    """Lines that say what there is and what to type.
+def describe_next_steps(folder: Path) -> list[str]:
+    """Return lines that say what the folder holds and what to type next.
 
     Args:
-        folder: Where the user is.
+        folder: Folder in which the command is called.
     """
-    configs = configs_in(folder)
+    configs = list_configs(folder)
     if not configs:
         return (
-            _in_results(folder)
-            or _above(folder)
+            _describe_results(folder)
+            or _describe_parent(folder)
             or [
                 "There is no robot here yet. Begin with one of these:",
                 "  paramreduce init my_robot.urdf        a robot from its URDF or MJCF",
@@ -31,18 +36,18 @@ def next_steps(folder: Path) -> list[str]:
                 "paramreduce --help lists all commands.",
             ]
         )
-    lines = [line for path in configs[:_MOST] for line in _robot(folder, path)]
+    lines = [line for path in configs[:_MOST] for line in _describe_robot(folder, path)]
     if len(configs) > _MOST:
         lines.append(f"and {len(configs) - _MOST} more")
     return [*lines, "", "paramreduce --help lists all commands."]
 
 
-def _in_results(folder: Path) -> list[str]:
-    """For who is in the folder of a run."""
+def _describe_results(folder: Path) -> list[str]:
+    """Return lines for a folder of results."""
     if not has_report(folder):
         return []
     return [
-        f"{_said_of(folder)}: what a run has left.",
+        f"{_describe_selected(folder)}: what a run has left.",
         "  paramreduce open .       its report",
         "  paramreduce inspect .    the selected model",
         "",
@@ -50,9 +55,9 @@ def _in_results(folder: Path) -> list[str]:
     ]
 
 
-def _above(folder: Path) -> list[str]:
-    """For who has gone down from where the configs are."""
-    above = project_above(folder)
+def _describe_parent(folder: Path) -> list[str]:
+    """Return lines for a folder below the one with the configs."""
+    above = find_project_above(folder)
     if above is None:
         return []
     return [
@@ -60,23 +65,23 @@ def _above(folder: Path) -> list[str]:
     ]
 
 
-def _robot(folder: Path, path: Path) -> list[str]:
-    """What was made of a robot, and the next command."""
-    results, shown = results_of(folder / path), shlex.quote(str(path))
+def _describe_robot(folder: Path, path: Path) -> list[str]:
+    """Return the state of a robot's results, and the next command."""
+    results, shown = get_results_path(folder / path), shlex.quote(str(path))
     if not has_report(folder / results):
         made = sorted(file.name for file in (folder / results).glob("*.h5"))
         state = f"begun ({', '.join(made)}); go on" if made else "not run yet"
         return [f"{path}: {state}: paramreduce run {shown}"]
     return [
-        f"{path}: {_said_of(folder / results)}",
+        f"{path}: {_describe_selected(folder / results)}",
         f"  paramreduce open {shlex.quote(str(results))}    its report",
         f"  paramreduce export {shown}    its code",
         f"  paramreduce run {shown}    again, if the config has changed",
     ]
 
 
-def _said_of(results: Path) -> str:
-    """The selected model of a finished run."""
+def _describe_selected(results: Path) -> str:
+    """Return a line on the selected model of a finished run."""
     from paramreduce_cli.artifacts.report_files import list_newer_artifacts, load_summary  # HDF5
 
     try:

@@ -1,4 +1,4 @@
-"""Options that several commands take, and what they stand for."""
+"""Options that several commands share."""
 
 import os
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from paramreduce_cli.running.runner import Callbacks
 
 
 class FilePath(click.Path):
-    """Path of a file; an error of click knows the path that it rejects."""
+    """A path of a file; click's error knows the path that it rejects."""
 
     def __init__(self) -> None:
         super().__init__(path_type=Path, dir_okay=False)
@@ -73,13 +73,13 @@ WAIT = click.option(
 )  # fmt: skip
 
 
-def cores() -> int:
-    """Cores that this process may use."""
+def count_cores() -> int:
+    """Return the number of cores that this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def results_store(config: Config | None, results: Path | None) -> Store:
-    """The folder that results go to."""
+def make_store(config: Config | None, results: Path | None) -> Store:
+    """Return the results folder of a config, or the folder that the call names."""
     if results is not None:
         return Store(results)
     if config is None:
@@ -90,6 +90,6 @@ def results_store(config: Config | None, results: Path | None) -> Store:
     return Store(Path("results") / config.robot)
 
 
-def callbacks(progress: Callable[[Progress], None]) -> Callbacks:
-    """Return what a run calls at the terminal."""
+def make_callbacks(progress: Callable[[Progress], None]) -> Callbacks:
+    """Return the functions that a run calls at the terminal."""
     return Callbacks(progress, warn_user, interruption.heeded, interruption.check)

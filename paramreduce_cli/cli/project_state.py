@@ -1,4 +1,4 @@
-"""What is in a folder: configs of robots, and their results; told without reading more than beginnings."""
+"""Configs and results in a folder, found without reading whole files."""
 
 import re
 import shlex
@@ -15,18 +15,20 @@ _UP = 4
 _CONFIGS, _RESULTS = Path("configs"), Path("results")
 
 
-def configs_in(folder: Path) -> list[Path]:
-    """Configs in a folder or in its ``configs``, as seen from there; those with results first."""
+def list_configs(folder: Path) -> list[Path]:
+    """Return the configs in a folder or in its ``configs``, relative to the folder; those with results first."""
     found = [*sorted(folder.glob("*.yaml")), *sorted((folder / _CONFIGS).glob("*.yaml"))]
     configs = [path.relative_to(folder) for path in found if _is_config(path)]
-    return sorted(configs, key=lambda path: not has_report(folder / results_of(folder / path)))
+    return sorted(
+        configs, key=lambda path: not has_report(folder / get_results_path(folder / path))
+    )
 
 
-def project_above(folder: Path) -> Path | None:
-    """The nearest folder above with configs, as seen from there; None if there is none."""
+def find_project_above(folder: Path) -> Path | None:
+    """Return the nearest folder above that has configs, relative to the given one, or None."""
     for k in range(1, _UP + 1):
         above = Path("/".join([".."] * k))
-        if (folder / above / _CONFIGS).is_dir() and configs_in(folder / above):
+        if (folder / above / _CONFIGS).is_dir() and list_configs(folder / above):
             return above
     return None
 
@@ -44,8 +46,8 @@ def _is_config(path: Path) -> bool:
     return "robot" in keys and len(keys) > 1
 
 
-def results_of(config: Path) -> Path:
-    """Where the results of a config go, from where commands are called."""
+def get_results_path(config: Path) -> Path:
+    """Return the results folder of a config, relative to the working folder."""
     text = config.read_text(encoding="utf-8", errors="replace")
     named = re.search(r"^robot:\s*[\"']?([\w.-]+)", text, re.MULTILINE)
     return _RESULTS / (named[1] if named else config.stem)
@@ -63,8 +65,8 @@ def _is(path: Path, kind: Callable[[Path], bool]) -> bool:
         return False
 
 
-def results_in(folder: Path) -> list[Path]:
-    """Folders of finished runs in ``results`` of a folder, or in itself."""
+def list_results(folder: Path) -> list[Path]:
+    """Return the folders of finished runs in ``results`` of a folder, or in the folder itself."""
     return [
         path
         for place in (folder / _RESULTS, folder)
@@ -73,40 +75,40 @@ def results_in(folder: Path) -> list[Path]:
     ]
 
 
-def config_meant(word: str) -> Path | None:
-    """The config of what may be the name of a robot, its results or something in these."""
-    found = _CONFIGS / f"{_robot(word)}.yaml"
+def guess_config(word: str) -> Path | None:
+    """Return the config of a word that may be a robot's name, its results or a file in them, or None."""
+    found = _CONFIGS / f"{_guess_robot(word)}.yaml"
     return found if _is(found, Path.is_file) else None
 
 
-def results_meant(word: str) -> Path | None:
-    """Results of what may be the name of a robot, its config or something in its results."""
-    found = _RESULTS / _robot(word)
+def guess_results(word: str) -> Path | None:
+    """Return the results of a word that may be a robot's name, its config or a file in its results, or None."""
+    found = _RESULTS / _guess_robot(word)
     made = _is(found, Path.is_dir) and found != _RESULTS and any(found.glob("*.h5"))
     return found if made else None
 
 
-def _robot(word: str) -> str:
-    """Whose config, results or name it is."""
+def _guess_robot(word: str) -> str:
+    """Return the robot's name in a path of a config or of results."""
     parts = Path(word).parts
     if len(parts) > 1 and parts[0] == _RESULTS.name:
         return parts[1]
     return Path(word).name.removesuffix(".yaml").replace("..", "")
 
 
-def results_below(folder: Path) -> list[str]:
+def list_results_below(folder: Path) -> list[str]:
     """List the results folders in a folder."""
     return [str(path.parents[1]) for path in sorted(folder.glob(f"*/{SUMMARY}"))]
 
 
-def no_results(folder: Path, command: str) -> ArtifactError:
+def make_no_results_error(folder: Path, command: str) -> ArtifactError:
     """Return the error that a folder holds no results itself, with those below it.
 
     Args:
         folder: Folder that was named.
         command: Command that takes results.
     """
-    below = results_below(folder)
+    below = list_results_below(folder)
     found = f"Did you mean `paramreduce {command} {shlex.quote(below[0])}`?" if below else ""
     return ArtifactError(
         f"{folder}: holds no results itself.",

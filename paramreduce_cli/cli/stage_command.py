@@ -1,4 +1,4 @@
-"""Commands that run stages; derived from their signatures, nothing about a stage is written here."""
+"""Commands of the stages, derived from the signatures of the stages."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -17,9 +17,9 @@ from paramreduce_cli.cli.options import (
     SET,
     WAIT,
     FilePath,
-    callbacks,
-    cores,
-    results_store,
+    count_cores,
+    make_callbacks,
+    make_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, show_progress, warn_user
@@ -35,8 +35,8 @@ _OF_LOGS = (MeasuredLog, Identification)
 """What is made where torques are measured."""
 
 
-def stage_command(name: str) -> click.Command:
-    """The command that runs a stage."""
+def make_stage_command(name: str) -> click.Command:
+    """Return the command that runs a stage."""
     stage = describe_stage(name, stages[name])
     config_optional = not stage.needs_config
 
@@ -56,7 +56,7 @@ def stage_command(name: str) -> click.Command:
         robot = config is not None and (samples is None or has_robot(config))
         loaded = load_config(config, overrides) if config is not None and robot else None
         settings = None if loaded is not None else load_settings(config, overrides)
-        store = results_store(loaded, results)
+        store = make_store(loaded, results)
         placed = locate_errors(config, overrides)
         lock = "" if part is None else f"-{stage.name}-{part.number}-{part.count}"
         with placed, store.lock(lock, wait=wait), show_progress(stage.name, quiet) as progress:
@@ -65,8 +65,8 @@ def stage_command(name: str) -> click.Command:
             runner = Runner(
                 loaded,
                 store,
-                jobs or cores(),
-                callbacks(progress),
+                jobs or count_cores(),
+                make_callbacks(progress),
                 samples,
                 settings,
                 format_arguments(config if robot else None, results, overrides),
@@ -74,7 +74,7 @@ def stage_command(name: str) -> click.Command:
             outcome = runner.run(stage, force=force, go_on=True, part=part or WHOLE)
         if not quiet:
             say_outcome(outcome)
-        return _exit_code(stage, outcome, quiet)
+        return _find_exit_code(stage, outcome, quiet)
 
     params: list[Any] = [RESULTS, SET, FORCE, QUIET, VERBOSE, LOG, WAIT]
     if stage.lends_run is not None:
@@ -95,12 +95,13 @@ def stage_command(name: str) -> click.Command:
     config = "configs/ur10.yaml" if stage.output in _OF_LOGS else "configs/puma560.yaml"
     example = f"{stage.name} {{config}}"
     decorator = click.command(
-        stage.name, cls=ExampleCommand, help=_stage_help(stage), example=example, config=config
+        stage.name, cls=ExampleCommand, help=_format_help(stage), example=example, config=config
     )
     return decorator(decorated)
 
 
-def _stage_help(stage: Stage) -> str:
+def _format_help(stage: Stage) -> str:
+    """Return the help of a stage: its docstring, and the files that it reads and writes."""
     reads = [get_file(entry.type) for entry in stage.artifacts]
     source = " and ".join([", ".join(reads[:-1]), reads[-1]] if len(reads) > 1 else reads)
     flow = f"Reads {source or 'the config'}; writes {get_file(stage.output)}."
@@ -108,7 +109,8 @@ def _stage_help(stage: Stage) -> str:
     return f"{text}\n\n{flow}"
 
 
-def _exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
+def _find_exit_code(stage: Stage, outcome: Outcome, quiet: bool) -> int:
+    """Return the exit code of a stage, after telling the verdict of a validation."""
     if stage.output is not Validation:
         return 0
     record = outcome.record or load_file(outcome.path, Validation, None, stage.name)[0]

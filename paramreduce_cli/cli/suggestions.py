@@ -1,4 +1,4 @@
-"""What to type next after a call that does not work, from what the error and the folder hold."""
+"""Suggestions of what to type after a call that fails, from the error and the folder."""
 
 import difflib
 import shlex
@@ -9,7 +9,12 @@ from pathlib import Path
 import click
 
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.project_state import config_meant, configs_in, project_above, results_meant
+from paramreduce_cli.cli.project_state import (
+    find_project_above,
+    guess_config,
+    guess_results,
+    list_configs,
+)
 from paramreduce_cli.errors import ConfigError, MissingConfigError, ParamreduceError
 from paramreduce_cli.stages import stages
 
@@ -64,14 +69,14 @@ def suggest_after_error(error: ParamreduceError, call: Call) -> str:
     words = list(call.words)
     if not words:
         return show_example(call)
-    if meant := _other_place(error, words):
+    if meant := _suggest_other_place(error, words):
         return f"Next: {meant}"
     if error.command or error.remedy:
         return ""
-    corrected = _corrected(error, words)
+    corrected = _correct_call(error, words)
     if corrected is None:
         return show_example(call)
-    return f"{'Then again' if corrected == words else 'Next'}: {_typed(corrected)}"
+    return f"{'Then again' if corrected == words else 'Next'}: {_format_call(corrected)}"
 
 
 def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
@@ -81,13 +86,13 @@ def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
     if isinstance(error, click.NoSuchOption) and call.command is not None:
         option = _meant_option(error.option_name, call.command, words)
         changed = [_with_option(word, error.option_name, option) for word in words if option]
-        meant = _typed(changed) if option else ""
+        meant = _format_call(changed) if option else ""
     elif isinstance(error, click.MissingParameter) and _is_config(error.param):
-        meant = _with_config(words)
+        meant = _insert_config(words)
     elif isinstance(error, UnknownCommandError):
-        meant = _meant_place(error.name, words)
+        meant = _suggest_meant_place(error.name, words)
     elif rejected := getattr(error, "rejected", ""):
-        meant = _meant_place(rejected, words)
+        meant = _suggest_meant_place(rejected, words)
     return f"Next: {meant}" if meant else show_example(call)
 
 
@@ -112,45 +117,45 @@ def _is_config(parameter: click.Parameter | None) -> bool:
     return parameter is not None and parameter.name == "config"
 
 
-def _typed(words: Sequence[str]) -> str:
+def _format_call(words: Sequence[str]) -> str:
     return shlex.join(["paramreduce", *words])
 
 
-def _with_config(words: Sequence[str]) -> str:
+def _insert_config(words: Sequence[str]) -> str:
     """Return the call with the first config here; empty where there is none, or samples are given."""
-    here = configs_in(Path())
+    here = list_configs(Path())
     if not here or any(word.startswith("--samples") for word in words):
         return ""
-    return _typed([words[0], str(here[0]), *words[1:]])
+    return _format_call([words[0], str(here[0]), *words[1:]])
 
 
-def _other_place(error: ParamreduceError, words: list[str]) -> str:
+def _suggest_other_place(error: ParamreduceError, words: list[str]) -> str:
     """Return the call with what the user means by a path or a name that is rejected."""
     if isinstance(error, MissingConfigError):
-        return _with_config(words)
+        return _insert_config(words)
     if words[0] == "init" and len(words) == 2:
-        return _example_meant(words[1])
+        return _suggest_example(words[1])
     known = error.choices or error.options
-    return "" if known or not error.rejected else _meant_place(error.rejected, words)
+    return "" if known or not error.rejected else _suggest_meant_place(error.rejected, words)
 
 
-def _meant_place(rejected: str, words: list[str]) -> str:
+def _suggest_meant_place(rejected: str, words: list[str]) -> str:
     """Return the call with the config, the results or the folder that a typed word stands for."""
     word = next((w for w in words if rejected in (w, w.rstrip("/"))), None)
     if word is None:
         return ""
-    above = project_above(Path())
+    above = find_project_above(Path())
     if above is not None and not Path(word).exists() and (above / word).exists():
-        return f"cd {above} && {_typed(words)}"
-    for meant in (_other_kind(word, words), _misspelt_robot(word, words)):
+        return f"cd {above} && {_format_call(words)}"
+    for meant in (_replace_by_other_kind(word, words), _correct_robot_name(word, words)):
         if meant is not None:
-            return _typed(meant) if meant != words else ""
-    return _example_meant(word) if config_meant(word) is None else ""
+            return _format_call(meant) if meant != words else ""
+    return _suggest_example(word) if guess_config(word) is None else ""
 
 
-def _other_kind(word: str, words: list[str]) -> list[str] | None:
+def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
     """Return the call with a config for results, or results for a config, or a robot's name."""
-    config, results = config_meant(word), results_meant(word)
+    config, results = guess_config(word), guess_results(word)
     if word == words[0]:
         return None if config is None or len(words) > 1 else ["run", str(config)]
     if words[0] in (*stages, *_OF_CONFIGS):
@@ -162,35 +167,35 @@ def _other_kind(word: str, words: list[str]) -> list[str] | None:
     return None if config is None else ["run", str(config)]
 
 
-def _misspelt_robot(word: str, words: list[str]) -> list[str] | None:
+def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
     """Return the call with the config whose name is like a robot's name that was typed."""
     if words[0] not in (*stages, *_OF_CONFIGS) or Path(word).name != word or Path(word).suffix:
         return None
-    here = {path.stem: path for path in configs_in(Path())}
+    here = {path.stem: path for path in list_configs(Path())}
     near = difflib.get_close_matches(word, here, n=1, cutoff=_LIKE_ROBOT)
     return _exchanged(words, word, str(here[near[0]])) if near else None
 
 
-def _example_meant(word: str) -> str:
+def _suggest_example(word: str) -> str:
     """Return the call that copies the example of a robot's name; empty where there is none."""
     from paramreduce_cli.config.examples import list_examples  # late: it loads much
 
     name = Path(word).name.removesuffix(".yaml")
-    return _typed(["init", "--example", name]) if name in list_examples() else ""
+    return _format_call(["init", "--example", name]) if name in list_examples() else ""
 
 
-def _corrected(error: ParamreduceError, words: list[str]) -> list[str] | None:
+def _correct_call(error: ParamreduceError, words: list[str]) -> list[str] | None:
     """Return the call with a choice or an option of the error; None where the error has none."""
     if error.choices:
-        return _exchanged(words, error.rejected, nearest_choice(error.rejected, error.choices))
+        return _exchanged(words, error.rejected, find_nearest_choice(error.rejected, error.choices))
     if error.options:
         return _exchanged(words, error.rejected, error.options[-1]) or [*words, *error.options]
-    if error.rejected.startswith("results/") and (config := config_meant(error.rejected)):
+    if error.rejected.startswith("results/") and (config := guess_config(error.rejected)):
         return ["run", str(config)]
     return words if isinstance(error, ConfigError) and error.in_file else None
 
 
-def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
+def find_nearest_choice(rejected: str, choices: Sequence[str]) -> str:
     """Return the choice most like a rejected word, with a number in range where the choices have numbers.
 
     Args:
@@ -212,10 +217,10 @@ def nearest_choice(rejected: str, choices: Sequence[str]) -> str:
         name, number = default.partition(":")[0] or (numbered or others)[0], digits
     begun = [choice for choice in others if choice.partition(":")[0].startswith(name)]
     near = begun or difflib.get_close_matches(name, others or choices, n=1, cutoff=0.0)
-    return _in_range(near[0], number or default.partition(":")[2])
+    return _limit_to_range(near[0], number or default.partition(":")[2])
 
 
-def _in_range(choice: str, number: str) -> str:
+def _limit_to_range(choice: str, number: str) -> str:
     """Return ``swap:1...7`` or ``swap:2|4|6`` with the nearest number that it has."""
     name, _, numbers = choice.partition(":")
     first, dots, last = numbers.partition(_RANGE)
@@ -263,7 +268,7 @@ def _usual_config(rejected: str) -> str:
     path = Path(rejected)
     if path.suffix not in (".h5", ".json", ".html"):
         return ""
-    config = config_meant(str(path.parent))
+    config = guess_config(str(path.parent))
     return "" if config is None else shlex.quote(str(config))
 
 

@@ -30,7 +30,7 @@ from paramreduce_cli.records import (
     Validation,
 )
 from paramreduce_cli.stages import stages
-from paramreduce_cli.stages.process_log import no_log
+from paramreduce_cli.stages.process_log import make_no_log_error
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
 LENT: tuple[Any, ...] = (Run, Tell, Items)
@@ -200,7 +200,7 @@ def check_is_asked_for(stage: Stage, config: Config) -> None:
     if (stage.output is MeasuredLog and not logged) or (
         stage.output is Identification and not has_measured_torques(config)
     ):
-        raise no_log()
+        raise make_no_log_error()
 
 
 def list_stages_to_run(config: Config) -> list[Stage]:

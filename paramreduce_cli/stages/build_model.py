@@ -1,4 +1,4 @@
-"""build-model: from the description to parameters and their base."""
+"""The stage build-model: from the description of a robot to its parameters and base parameters."""
 
 import dataclasses
 import warnings
@@ -64,10 +64,10 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
             ("nominal_torque",),
         )
     affects = affecting_parameters(mechanism, K[:, measured])
-    base = base_parameters(W, _preference(model, mechanism), model.rank_tolerance, affects)
+    base = base_parameters(W, _order_columns(model, mechanism), model.rank_tolerance, affects)
     _check_named(model, mechanism, base)
     _say_other_modes(robot, model, mechanism, base)
-    texts = _expressions(robot, mechanism, base, affects, states, rng)
+    texts = _format_expressions(robot, mechanism, base, affects, states, rng)
     lean = formulations(mechanism, affects, base.columns, run)
     check_formulations(mechanism, lean, np.flatnonzero(affects), states, rng)
     return Model(
@@ -97,7 +97,7 @@ def _say_other_modes(
             K = Dynamics(mode).regressor(*states)[:, robot.find_measured()]
             affects = affecting_parameters(mode, K)
             W = K.reshape(-1, K.shape[2])
-            found = base_parameters(W, _preference(model, mode), model.rank_tolerance, affects)
+            found = base_parameters(W, _order_columns(model, mode), model.rank_tolerance, affects)
         except (NumericalError, DataError):
             continue
         counts.append(found.columns.size)
@@ -124,7 +124,7 @@ def _check_named(model: ModelSection, mechanism: Mechanism, base: BaseParameters
             )
 
 
-def _expressions(
+def _format_expressions(
     robot: Robot,
     mechanism: Mechanism,
     base: BaseParameters,
@@ -132,7 +132,7 @@ def _expressions(
     states: States,
     rng: np.random.Generator,
 ) -> list[str]:
-    """Regrouping relations, coefficients named where they follow changed lengths as well.
+    """Return the regrouping relations, with coefficients named if they hold for other lengths too.
 
     Without named lengths, as in mechanisms with loops, coefficients are numbers.
     """
@@ -146,8 +146,8 @@ def _expressions(
     return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
 
 
-def _preference(model: ModelSection, mechanism: Mechanism) -> IntArray:
-    """Preference order of columns, those that the config names first."""
+def _order_columns(model: ModelSection, mechanism: Mechanism) -> IntArray:
+    """Return the preference order of the columns, those that the config names first."""
     usual = mechanism.preference_order
     if model.base_columns is None:
         return usual

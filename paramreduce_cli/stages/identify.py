@@ -1,4 +1,4 @@
-"""identify: values from measured torques, how sure they are, and what looks wrong."""
+"""The stage identify: parameters from measured torques, their uncertainty, and hints."""
 
 import warnings
 
@@ -51,25 +51,25 @@ def identify(
         raise DataError("samples.h5 holds no validation set.", command="sample")
     training, held_out = samples.estimation, samples.validation
     factors, n_samples = training.compute_factors(), training.n_samples
-    scale = np.where(np.isfinite(model.nominal_torque), _sizes(training), np.inf)
+    scale = np.where(np.isfinite(model.nominal_torque), _compute_torque_rms(training), np.inf)
     deviation = np.where(np.isfinite(scale), 1.0, np.inf)
     if identification.estimator != "ordinary":
         deviation = estimate_joint_noise(factors, scale, n_samples)
-    full, full_fit = _estimate(identification, make_base_model(model), samples, deviation)
+    full, full_fit = _estimate_model(identification, make_base_model(model), samples, deviation)
     tell(Progress("identification", 1, _STEPS, "base parameters"))
-    reduced, _ = _estimate(identification, validation.selected.model, samples, deviation)
+    reduced, _ = _estimate_model(identification, validation.selected.model, samples, deviation)
     tell(Progress("identification", 2, _STEPS, "selected parameters"))
-    consistency = _consistency(identification, model, samples, deviation)
+    consistency = _fit_consistent(identification, model, samples, deviation)
     delay = 0.0 if log is None else log.delay
     hints = find_hints(model, training, full, full_fit, consistency, delay)
     for text in hints:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
-    shown = _shown(held_out)
+    shown = _take_first_samples(held_out)
     tell(Progress("identification", _STEPS, _STEPS))
     return Identification(
         estimator=identification.estimator,
         torque_deviation=deviation,
-        torque_size=_sizes(held_out),
+        torque_size=_compute_torque_rms(held_out),
         full=full,
         reduced=reduced,
         residuals=full_fit.analyse_residuals(n_samples),
@@ -78,30 +78,31 @@ def identify(
         comparison=compare_held_out(full, reduced),
         shown_time=np.concatenate([block.time for block in shown]),
         shown_measured=np.concatenate([block.tau for block in shown]),
-        shown_full=_predicted(shown, full.standard),
-        shown_reduced=_predicted(shown, reduced.standard),
+        shown_full=_predict_torques(shown, full.standard),
+        shown_reduced=_predict_torques(shown, reduced.standard),
     )
 
 
-def _columns(chosen: ReducedModel) -> FloatArray:
-    """Standard parameters by those of a model, (n_standard, n)."""
+def _make_expansion(chosen: ReducedModel) -> FloatArray:
+    """Return the standard parameters by those of a model, (n_standard, n)."""
     columns = np.zeros((chosen.position.size, chosen.n))
     columns[chosen.kept, chosen.position[chosen.kept]] = 1.0
     return columns
 
 
-def _merged(factors: FloatArray, columns: FloatArray) -> FloatArray:
-    """Factors of [W | tau] per trajectory and joint for the columns of a model."""
+def _merge_factors(factors: FloatArray, columns: FloatArray) -> FloatArray:
+    """Return the factors of [W | tau] by trajectory and joint for the columns of a model."""
     return np.concatenate([factors[..., :-1] @ columns, factors[..., -1:]], axis=-1)
 
 
-def _estimate(
+def _estimate_model(
     wanted: IdentificationSection, chosen: ReducedModel, samples: Samples, deviation: FloatArray
 ) -> tuple[Estimate, LinearFit]:
+    """Return the identified parameters of a model, and their fit."""
     training, held_out = samples.estimation, samples.validation
     assert held_out is not None
-    columns = _columns(chosen)
-    factors = _merged(training.compute_factors(), columns)
+    columns = _make_expansion(chosen)
+    factors = _merge_factors(training.compute_factors(), columns)
     values = least_squares(combined_factor(factors, deviation))
     if wanted.estimator == "robust":
         values, deviation = fit_robustly(
@@ -114,7 +115,9 @@ def _estimate(
         )
     rows = collect_rows(training.iterate_blocks(), columns, training.n_samples)
     fitted = LinearFit(rows, values, deviation)
-    own, other = (_errors(part, columns @ values, deviation) for part in (training, held_out))
+    own, other = (
+        _compute_errors(part, columns @ values, deviation) for part in (training, held_out)
+    )
     estimate = Estimate(
         names=chosen.names,
         values=values,
@@ -124,15 +127,15 @@ def _estimate(
         held_out=other[0],
         joint_train=own[1],
         joint_held_out=other[1],
-        folds=_folds(factors, deviation),
+        folds=_cross_validate(factors, deviation),
     )
     return estimate, fitted
 
 
-def _errors(
+def _compute_errors(
     part: SampleSet, standard: FloatArray, deviation: FloatArray
 ) -> tuple[float, FloatArray]:
-    """Error of all joints together, and root mean squares joint by joint."""
+    """Return the error of all joints together, and the root mean squares joint by joint."""
     measured = np.isfinite(deviation)
     left, whole = np.zeros(measured.size), np.zeros(measured.size)
     for block in part.iterate_blocks():
@@ -143,8 +146,8 @@ def _errors(
     return float(np.sqrt(left[measured].sum() / whole[measured].sum())), joints
 
 
-def _folds(factors: FloatArray, deviation: FloatArray) -> FloatArray:
-    """Error on each trajectory when fitted without it; no folds where there is but one."""
+def _cross_validate(factors: FloatArray, deviation: FloatArray) -> FloatArray:
+    """Return the error on each trajectory when fitted without it; nothing if there is only one."""
     measured = np.isfinite(deviation)
     found = []
     for k in range(len(factors) if len(factors) > 1 else 0):
@@ -155,15 +158,16 @@ def _folds(factors: FloatArray, deviation: FloatArray) -> FloatArray:
     return np.array(found)
 
 
-def _sizes(part: SampleSet) -> FloatArray:
-    """Root mean squares of the torques, (n_dof,)."""
+def _compute_torque_rms(part: SampleSet) -> FloatArray:
+    """Return the root mean squares of the torques, (n_dof,)."""
     total = np.sum([np.sum(block.tau**2, axis=0) for block in part.iterate_blocks()], axis=0)
     return np.where(total > 0, np.sqrt(total / part.n_samples), 1.0)
 
 
-def _consistency(
+def _fit_consistent(
     wanted: IdentificationSection, model: Model, samples: Samples, deviation: FloatArray
 ) -> Consistency | None:
+    """Return the physically consistent parameters, or None if the config asks for none."""
     if wanted.consistency == "none":
         return None
     held_out = samples.validation
@@ -188,8 +192,8 @@ def _consistency(
     drives = standard[known.positive]
     return Consistency(
         standard=standard,
-        train=_errors(samples.estimation, standard, deviation)[0],
-        held_out=_errors(held_out, standard, deviation)[0],
+        train=_compute_errors(samples.estimation, standard, deviation)[0],
+        held_out=_compute_errors(held_out, standard, deviation)[0],
         smallest_eigenvalues=physics.compute_smallest_eigenvalues(known, standard),
         unconstrained_eigenvalues=physics.compute_smallest_eigenvalues(
             known, physics.fit_unconstrained(factor, known)
@@ -199,8 +203,8 @@ def _consistency(
     )
 
 
-def _shown(part: SampleSet) -> list[Block]:
-    """The first samples, for figures."""
+def _take_first_samples(part: SampleSet) -> list[Block]:
+    """Return the first samples, for figures."""
     found: list[Block] = []
     for block in part.iterate_blocks():
         if block.trajectory != 0 or sum(b.time.size for b in found) >= _MOST_SHOWN:
@@ -209,5 +213,5 @@ def _shown(part: SampleSet) -> list[Block]:
     return found
 
 
-def _predicted(blocks: list[Block], standard: FloatArray) -> FloatArray:
+def _predict_torques(blocks: list[Block], standard: FloatArray) -> FloatArray:
     return np.concatenate([(b.W @ standard).reshape(b.tau.shape) for b in blocks])

@@ -1,4 +1,4 @@
-"""optimize-trajectories: exciting trajectories, and point-to-point motions to test models on."""
+"""The stage optimize-trajectories: exciting trajectories, and point-to-point motions to test models on."""
 
 import warnings
 import zlib
@@ -43,11 +43,11 @@ def optimize_trajectories(
     """
     wanted = trajectories
     period = wanted.period if coefficients is None else coefficients.period
-    task = excitation_task(wanted, model, period)
+    task = make_task(wanted, model, period)
     if coefficients is None:
-        sets = _optimised(wanted, task, items, run)
+        sets = _optimise_sets(wanted, task, items, run)
     else:
-        sets = _measured(wanted, model, task, coefficients)
+        sets = _evaluate_coefficients(wanted, model, task, coefficients)
     motions = _find_point_to_point(wanted, task, model, period, sets)
     return Trajectories(
         period=period,
@@ -64,34 +64,34 @@ def optimize_trajectories(
     )
 
 
-def excitation_task(
+def make_task(
     wanted: TrajectoriesSection, model: Model, period: float | None = None
 ) -> ExcitationTask:
-    """What the config asks of all trajectories."""
+    """Return the settings that all trajectories share."""
     return ExcitationTask(
         mechanism=model.mechanism,
         base=model.base,
         base_values=model.base_values,
-        torque_scale=_torque_scale(wanted, model.nominal_torque),
+        torque_scale=_choose_torque_scale(wanted, model.nominal_torque),
         criterion=wanted.criterion,
         constraints=wanted.build_constraints(model.mechanism),
-        settings=_settings(wanted, model, period or wanted.period, wanted.harmonics),
+        settings=_make_settings(wanted, model, period or wanted.period, wanted.harmonics),
         seed=wanted.seed,
     )
 
 
-def _torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> FloatArray:
-    """Noise of the torques where it is given; what is not measured stays without weight."""
+def _choose_torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> FloatArray:
+    """Return the noise of the torques if it is given, else nominal torques; infinite where nothing is measured."""
     if wanted.torque_noise is None:
         return nominal_torque
     noise = expand_per_joint(wanted.torque_noise, nominal_torque.size)
     return np.where(np.isfinite(nominal_torque), noise, np.inf)
 
 
-def _settings(
+def _make_settings(
     wanted: TrajectoriesSection, model: Model, period: float, harmonics: int
 ) -> TrajectorySettings:
-    """What the config asks of every trajectory."""
+    """Return the settings of every trajectory."""
     return TrajectorySettings(
         period=period,
         harmonics=harmonics,
@@ -111,9 +111,10 @@ def _settings(
     )
 
 
-def _optimised(
+def _optimise_sets(
     wanted: TrajectoriesSection, task: ExcitationTask, items: Items, run: Run
 ) -> dict[str, tuple[Trajectory, ...]]:
+    """Return optimised trajectories by set."""
     counts = (wanted.count, wanted.validation_count, wanted.test_count)
     keys = {
         name: [f"{name}-{k:04d}" for k in range(count)]
@@ -159,17 +160,17 @@ def _find_point_to_point(
     return found
 
 
-def _measured(
+def _evaluate_coefficients(
     wanted: TrajectoriesSection, model: Model, task: ExcitationTask, brought: Coefficients
 ) -> dict[str, tuple[Trajectory, ...]]:
-    """The trajectories of coefficients that the user brings, measured but not changed."""
+    """Return the trajectories of user-supplied coefficients, evaluated but not changed."""
     excitation = build_excitation(task)
 
     def measure(coefficients: FloatArray) -> Trajectory:
         harmonics = (coefficients.shape[1] - 1) // 2
         return describe(
             excitation,
-            _settings(wanted, model, brought.period, harmonics),
+            _make_settings(wanted, model, brought.period, harmonics),
             coefficients,
             kappa_start=np.nan,
             cpu_seconds=0.0,

@@ -1,4 +1,4 @@
-"""process-log: logs of the machine, made ready."""
+"""The stage process-log: logs of the machine, processed for identification."""
 
 import warnings
 
@@ -10,8 +10,8 @@ from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
 
 
-def no_log() -> ConfigError:
-    """What is said where there is no log."""
+def make_no_log_error() -> ConfigError:
+    """Return the error that the config names no log."""
     return ConfigError(
         "is missing: it says where the logs are.",
         ("sampling", "log"),
@@ -27,7 +27,7 @@ def process_log(
     What was done to them, and what looks wrong in them, is part of the result.
     """
     if log is None:
-        raise no_log()
+        raise make_no_log_error()
     names = model.mechanism.coordinate_names
     unmeasured = [
         name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)

@@ -1,4 +1,4 @@
-"""reduce: select parameters with each heuristic, and prove how good that is."""
+"""The stage reduce: parameters selected by each heuristic, and proofs of the best subsets."""
 
 import time
 import warnings
@@ -71,7 +71,7 @@ def reduce(
             "the samples have other parameters than the model: they are of another robot. Bring "
             "samples of this one, or give no CONFIG."
         )
-    weights = _weights(reduction, samples)
+    weights = _choose_weights(reduction, samples)
     grouped = make_columns(reduction, samples)
     columns = grouped.columns
     factor = merge_factor(combined_factor(samples.estimation.compute_factors(), weights), columns)
@@ -92,10 +92,10 @@ def reduce(
             raise PartFinished
     same = previous is not None and np.array_equal(previous.factor, factor)
     proven = kept.load(previous.proofs if previous is not None and same else None)
-    inputs = _criterion_inputs(reduction, counted, model, samples, columns)
+    inputs = _make_criterion_inputs(reduction, counted, model, samples, columns)
     if not items.part.is_whole:
         objective = criteria[SelectionMethod.criterion](problem, inputs)
-        _prove_part(_task(objective, reduction, proven, items, kept, run), kept, sizes)
+        _prove_part(_make_task(objective, reduction, proven, items, kept, run), kept, sizes)
     tasks: dict[str, SelectionTask] = {}
     found: dict[str, _Selected] = {}
     proofs = None
@@ -105,12 +105,12 @@ def reduce(
         method = SelectionMethod.parse(name)
         if method.criterion not in tasks:
             objective = criteria[method.criterion](problem, inputs)
-            tasks[method.criterion] = _task(objective, reduction, proven, items, kept, run)
-        found[name], made = _selected(tasks[method.criterion], method, reduction.stop)
+            tasks[method.criterion] = _make_task(objective, reduction, proven, items, kept, run)
+        found[name], made = _run_heuristic(tasks[method.criterion], method, reduction.stop)
         proofs = made if made is not None else proofs
     run.progress(Progress("heuristics", len(names), len(names)))
     _warn_of_open_proofs(proofs)
-    heuristics = _with_norms(found, samples, columns, weights)
+    heuristics = _add_norms(found, samples, columns, weights)
     return Reduction(columns, weights, rank, factor, heuristics, proofs)
 
 
@@ -146,7 +146,8 @@ def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> 
     raise PartFinished
 
 
-def _weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
+def _choose_weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
+    """Return the size that each joint's errors are divided by, (n_dof,), or raise DataError if it is unusable."""
     weights = samples.nominal_torque
     if wanted.weighting == "none":
         n_dof = next(iter(samples.estimation.iterate_blocks())).tau.shape[1]
@@ -177,14 +178,14 @@ def _warn_of_rank(rank: int, model: Model | None, columns: Columns) -> None:
         )
 
 
-def _criterion_inputs(
+def _make_criterion_inputs(
     wanted: ReductionSection,
     counted: CountedDynamics,
     model: Model | None,
     samples: Samples,
     columns: Columns,
 ) -> CriterionInputs:
-    """What criteria ask for, made from the stage's inputs when they do."""
+    """Return the inputs of criteria, computed when a criterion asks for them."""
 
     def modelled(criterion: str) -> Model:
         if model is None:
@@ -242,14 +243,14 @@ def _warn_of_open_proofs(proofs: Proofs | None) -> None:
 
 @dataclass(frozen=True)
 class _Selected:
-    """What a heuristic found: subsets and their fits."""
+    """The subsets of a heuristic with their fits."""
 
     subsets: tuple[IntArray, ...]
     fits: list[Fit]
     seconds: float
 
 
-def _task(
+def _make_task(
     objective: Objective,
     wanted: ReductionSection,
     proven: Proofs | None,
@@ -257,6 +258,7 @@ def _task(
     kept: KeptProofs,
     run: Run,
 ) -> SelectionTask:
+    """Return the task that every heuristic of a criterion gets."""
     return SelectionTask(
         objective=objective,
         largest=wanted.stop.parameters,
@@ -270,9 +272,10 @@ def _task(
     )
 
 
-def _selected(
+def _run_heuristic(
     task: SelectionTask, method: SelectionMethod, stop: Stop
 ) -> tuple[_Selected, Proofs | None]:
+    """Return the subsets and fits of a heuristic, and its proofs if it makes any."""
     started = time.perf_counter()
     found = run_heuristic(method.heuristic, task)
     seconds = time.perf_counter() - started
@@ -284,22 +287,22 @@ def _selected(
             ("reduction", "stop", "parameters"),
         )
     fits = [task.objective.fit(subset) for subset in found.subsets]
-    kept = _kept(fits, stop)
+    kept = _count_kept(fits, stop)
     return _Selected(found.subsets[:kept], fits[:kept], seconds), found.proofs
 
 
-def _kept(fits: list[Fit], stop: Stop) -> int:
-    """How many subsets a limit of the error leaves."""
+def _count_kept(fits: list[Fit], stop: Stop) -> int:
+    """Return the number of subsets up to the first within the limit of the error."""
     if stop.torque_error is None:
         return len(fits)
     good = (k for k, f in enumerate(fits, 1) if f.torque_error <= stop.torque_error)
     return next(good, len(fits))
 
 
-def _with_norms(
+def _add_norms(
     found: dict[str, _Selected], samples: Samples, columns: Columns, weights: FloatArray
 ) -> dict[str, Subsets]:
-    """One pass over the samples for the 1- and infinity norms of all models together."""
+    """Return the subsets with the 1- and infinity norms of their errors, from one pass over the samples."""
     models = [
         columns.make_model(subset, f.parameters).standard
         for entry in found.values()
@@ -312,12 +315,12 @@ def _with_norms(
     start = 0
     for name, entry in found.items():
         part = slice(start, start + len(entry.subsets))
-        heuristics[name] = _subsets(name, entry, errors, part)
+        heuristics[name] = _make_subsets(name, entry, errors, part)
         start = part.stop
     return heuristics
 
 
-def _subsets(name: str, found: _Selected, errors: NormErrors, part: slice) -> Subsets:
+def _make_subsets(name: str, found: _Selected, errors: NormErrors, part: slice) -> Subsets:
     return Subsets(
         heuristic=name,
         subsets=found.subsets,

@@ -1,4 +1,4 @@
-"""reduce-terms: functions of reduced models with terms left out."""
+"""The stage reduce-terms: functions of reduced models with negligible terms removed."""
 
 import warnings
 from collections.abc import Iterable, Iterator
@@ -84,14 +84,14 @@ def reduce_terms(
         if sampling.measured
         else f"{format_percent(_MARGIN)} of it, which leaves room for other motions,"
     )
-    _say_missing([name for name in names if name not in functions], bool(functions), allowance)
+    _warn_of_missing([name for name in names if name not in functions], bool(functions), allowance)
     alone = sampling.measured or samples.validation is None
     return TermReduction(allowed.torque, allowed.acceleration, alone, functions)
 
 
 @dataclass(frozen=True)
 class _Task:
-    """What is asked of every function."""
+    """A task that every function gets: budget, samples and starts."""
 
     section: TermsSection
     budget: Budget
@@ -129,7 +129,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
         run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, detail))
 
     searcher = Searcher(
-        lean, _looked_at(judge, samples, *_FIRST), _looked_at(judge, samples, *_CLOSELY),
+        lean, _choose_samples(judge, samples, *_FIRST), _choose_samples(judge, samples, *_CLOSELY),
         judge.poses(_POSES), budget, direct,
     )  # fmt: skip
     found = simplified(
@@ -137,14 +137,16 @@ def _search(task: _Task, name: str) -> TermModel | None:
         jobs=run.jobs, progress=progress,
     )  # fmt: skip
     if found.cut_short:
-        _say_late(name)
+        _warn_of_time_limit(name)
     fitted = judge.thinned(samples.estimation, _FITTED)
-    way = [Judged.of(one.refitted(fitted, budget), judge, budget) for one in found.front]
+    way = [Judged.judge(one.refitted(fitted, budget), judge, budget) for one in found.front]
     ends = (one.refitted(fitted, budget) for one in found.ends)
-    records = (_record(one, judge, way, lean) for one in _in_order(ends, judge, budget))
+    records = (
+        _make_record(one, judge, way, lean) for one in _iterate_within_budget(ends, judge, budget)
+    )
     term = next((record for record in records if record is not None), None)
     if term is not None and not np.isfinite(budget.acceleration):
-        _say_unfit(term)
+        _warn_of_accelerations(term)
     return term
 
 
@@ -158,19 +160,21 @@ class Judged:
     """The largest as a share of the budget."""
 
     @classmethod
-    def of(cls, program: Simplified, judge: Judge, budget: Budget) -> "Judged":
-        """Of a program."""
+    def judge(cls, program: Simplified, judge: Judge, budget: Budget) -> "Judged":
+        """Return a program with its errors."""
         errors = judge.errors(program)
         return cls(program, errors, judge.strain(errors, budget))
 
     @property
     def rank(self) -> tuple[int, float]:
-        """The less the better."""
+        """Operations, then the worst ratio to the budget; less is better."""
         return self.program.program.n_operations, self.strain
 
 
-def _in_order(ends: Iterable[Simplified], judge: Judge, budget: Budget) -> Iterator[Judged]:
-    """Those within the budget, the leanest first, the more exact ones of as many operations before others.
+def _iterate_within_budget(
+    ends: Iterable[Simplified], judge: Judge, budget: Budget
+) -> Iterator[Judged]:
+    """Yield the programs within the budget, the leanest first; among equals the most exact first.
 
     Args:
         ends: Programs, the leanest first; they are judged when they are asked for.
@@ -179,16 +183,16 @@ def _in_order(ends: Iterable[Simplified], judge: Judge, budget: Budget) -> Itera
     """
     for _, alike in groupby(ends, lambda one: one.program.n_operations):
         judged = sorted(
-            (Judged.of(one, judge, budget) for one in alike), key=lambda one: one.strain
+            (Judged.judge(one, judge, budget) for one in alike), key=lambda one: one.strain
         )
         yield from (one for one in judged if one.strain <= 1)
 
 
-def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
-    """So many samples that parameters are fitted to while terms are left out, and that errors are watched on.
+def _choose_samples(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
+    """Return the samples for fitting parameters and for watching errors during the search.
 
-    Measured torques: both are of the training part, quarters of it by turns, as one motion alone says
-    little of what a program without terms is worth on another.
+    If torques are measured both are of the training part, with quarters of it in turn, as one motion alone says little
+    about another.
     """
     if judge.measured:
         some = judge.thinned(samples.estimation, searched + watched)
@@ -201,8 +205,8 @@ def _looked_at(judge: Judge, samples: Samples, searched: int, watched: int) -> L
     return LookedAt(fitted_to, judge.thinned(samples.validation, watched))
 
 
-def _say_late(name: str) -> None:
-    """Of a search that might have found less."""
+def _warn_of_time_limit(name: str) -> None:
+    """Warn that a search ended by its time limit, and might have found fewer operations."""
     warnings.warn(
         f"terms.time_limit ended the search for the {name} dynamics; --set terms.time_limit=null searches to the end and "
         "may find fewer operations",
@@ -211,8 +215,8 @@ def _say_late(name: str) -> None:
     )
 
 
-def _say_unfit(term: TermModel) -> None:
-    """Of an M that is positive definite, but no more than that."""
+def _warn_of_accelerations(term: TermModel) -> None:
+    """Warn that M is positive definite, but accelerations are not accurate."""
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if np.nanmax([0.0, *errors]) > 1:
         warnings.warn(
@@ -223,8 +227,8 @@ def _say_unfit(term: TermModel) -> None:
         )
 
 
-def _say_missing(names: list[str], others: bool, part: str) -> None:
-    """Of functions that stay as they are; what comes after goes on if there is another one.
+def _warn_of_missing(names: list[str], others: bool, part: str) -> None:
+    """Warn of functions without a program within the budget.
 
     Raises:
         ConfigError: There is no other one.
@@ -240,8 +244,10 @@ def _say_missing(names: list[str], others: bool, part: str) -> None:
     warnings.warn(f"terms.torque_error: {text}", ParamreduceWarning, stacklevel=3)
 
 
-def _record(judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels) -> TermModel | None:
-    """A program with what it is worth and those on the way to it; None if not all of its M are positive definite."""
+def _make_record(
+    judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels
+) -> TermModel | None:
+    """Return a program with its errors and front, or None if one of its M is not positive definite."""
     one, (estimation, validation) = judged.program, judged.errors
     smallest, states = judge.smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
     if judge.direct and not smallest > 0:
@@ -273,12 +279,12 @@ def _record(judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels) -
         lower=judge.lower,
         upper=judge.upper,
         drawn=judge.drawn,
-        front=_front([*way, judged], judge),
+        front=_make_front([*way, judged], judge),
     )
 
 
-def _front(programs: list[Judged], judge: Judge) -> TermFront:
-    """What programs are worth that no leaner one beats, by the largest error as a share of the budget."""
+def _make_front(programs: list[Judged], judge: Judge) -> TermFront:
+    """Return the Pareto front of programs by operations and worst ratio to the budget."""
     kept: list[Judged] = []
     for one in sorted(programs, key=lambda one: one.rank):
         if not kept or one.strain < kept[-1].strain:

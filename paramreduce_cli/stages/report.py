@@ -1,4 +1,4 @@
-"""report: figures, tables, the page and summary.json."""
+"""The stage report: figures, tables, the page and summary.json."""
 
 import warnings
 from collections.abc import Mapping
@@ -78,9 +78,9 @@ def report(
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
     motion = first_motion(shown.iterate_blocks(), selected.model)
-    running = _running(model, selected, Exported.IDM)
-    direct = _running(model, selected, Exported.DDM) if running else {}
-    states = {} if model is None else _states(model, motion)
+    running = _compile_models(model, selected, Exported.IDM)
+    direct = _compile_models(model, selected, Exported.DDM) if running else {}
+    states = {} if model is None else _compute_states(model, motion)
     data = ReportData(
         **vars(artifacts),
         title=section.title or provenance.robot,
@@ -88,13 +88,13 @@ def report(
         weighting=search.weighting,
         counted=counted,
         simulated=sampling.simulation is not None,
-        rms_torque=_rms_torque(samples, reduction.nominal_torque),
+        rms_torque=_compute_torque_rms(samples, reduction.nominal_torque),
         motion=motion,
-        skeletons=() if model is None else _skeletons(section, model, motion),
-        animation=None if model is None else _animation(model, samples),
+        skeletons=() if model is None else _draw_skeletons(section, model, motion),
+        animation=None if model is None else _make_animation(model, samples),
         speed=speed(running, states) if running else None,
         speed_direct=speed(direct, states) if direct else None,
-        tracking=_tracking(section, model, running, motion),
+        tracking=_simulate_tracking(section, model, running, motion),
     )
     lean = {
         name: found
@@ -103,7 +103,7 @@ def report(
     }
     summary = summary_of(artifacts, lean, provenance)
     formats = [str(name) for name in section.formats]
-    drawn = [name for name, _ in _shown(figures, model)]
+    drawn = [name for name, _ in _list_shown(figures, model)]
 
     def tell(done: int, name: str = "") -> None:
         run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
@@ -114,21 +114,26 @@ def report(
     files = {
         f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats
     }
-    every = ((name, make(data)) for name, make in _shown(tables, model))
+    every = ((name, make(data)) for name, make in _list_shown(tables, model))
     made = {name: table for name, table in every if table.rows}
     symbols = {} if model is None else model.mechanism.symbols
     for name, table in made.items():
         files[f"tables/{name}.csv"] = table.to_csv().encode()
         files[f"tables/{name}.tex"] = format_latex_table(table, symbols).encode()
     files["index.html"] = render_page(
-        data, summary, images, made, provenance, _code(model, reduction, validation, provenance)
+        data,
+        summary,
+        images,
+        made,
+        provenance,
+        _export_code(model, reduction, validation, provenance),
     ).encode()
     tell(len(drawn) + 1)
     return Report(summary, files)
 
 
-def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
-    """Figures or tables by name; those of a mechanism only where there is one."""
+def _list_shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
+    """Return figures or tables by name, without those of a mechanism if there is none."""
     return [
         (name, draw)
         for name, draw in offered.items()
@@ -136,8 +141,10 @@ def _shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]:
     ]
 
 
-def _running(model: Model | None, selected: Selected, what: Exported) -> dict[str, RunningModel]:
-    """The exported code of the full and of the selected model; none where its formulation fails."""
+def _compile_models(
+    model: Model | None, selected: Selected, what: Exported
+) -> dict[str, RunningModel]:
+    """Return the exported code of the full and of the selected model, compiled; nothing if a formulation fails."""
     if model is None:
         return {}
     models = {"full model": make_full_model(model), f"{selected.n} parameters": selected.model}
@@ -148,8 +155,8 @@ def _running(model: Model | None, selected: Selected, what: Exported) -> dict[st
         return {}
 
 
-def _states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
-    """What exported functions take along a motion."""
+def _compute_states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
+    """Return the inputs of exported functions along a motion."""
     mechanism = model.mechanism
     if mechanism.loops is None:
         return {"q": motion.z, "dq": motion.dz, "ddq": motion.ddz}
@@ -161,22 +168,22 @@ def _states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
     return {"q": motion.q, "dq": dq, "ddq": ddq, "R": R, "b": b}
 
 
-def _tracking(
+def _simulate_tracking(
     section: ReportSection,
     model: Model | None,
     running: Mapping[str, RunningModel],
     motion: ShownMotion,
 ) -> Tracking | None:
-    """Control with the exported code of the full and of the selected model."""
+    """Return the tracking of a controller with the full and with the selected model, or None if it is not asked for."""
     if section.tracking is None or model is None or not running:
         return None
     return tracked(section.tracking, model, running, motion.z, motion.dz)
 
 
-def _code(
+def _export_code(
     model: Model | None, reduction: Reduction, validation: Validation, provenance: Provenance
 ) -> Mapping[str, bytes]:
-    """The selected model in C, checked; none without a mechanism."""
+    """Return the checked C code of the selected model; nothing without a mechanism."""
     if model is None:
         return {}
     chosen, title = chosen_model(None, model, reduction, validation)
@@ -194,8 +201,10 @@ def _code(
     return files
 
 
-def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
-    """By set and joint, N m or N; zero is as small as relative errors of joints take it to be."""
+def _compute_torque_rms(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
+    """Return the root mean squares of torques by set, (n_dof,), N m or N; at least a tiny number, as errors are divided
+    by them.
+    """
     found = {}
     for name in SETS:
         one = getattr(samples, name)
@@ -207,17 +216,21 @@ def _rms_torque(samples: Samples, nominal: FloatArray) -> dict[str, FloatArray]:
     return found
 
 
-def _animation(model: Model, samples: Samples) -> Animation:
+def _make_animation(model: Model, samples: Samples) -> Animation:
+    """Return the animation of the motions of both sets."""
     sets = [part for part in (samples.validation, samples.estimation) if part is not None]
     short = all(part.n_samples <= _ANIMATED for part in sets)
     return animation(model, motions(samples, _MOTIONS if short else 1, _FRAMES))
 
 
-def _skeletons(section: ReportSection, model: Model, motion: ShownMotion) -> tuple[Skeleton, ...]:
-    return tuple(skeleton(model, q) for q in _shown_poses(section, model, motion))
+def _draw_skeletons(
+    section: ReportSection, model: Model, motion: ShownMotion
+) -> tuple[Skeleton, ...]:
+    return tuple(skeleton(model, q) for q in _choose_poses(section, model, motion))
 
 
-def _shown_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:
+def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:
+    """Return the poses that the config names, or some along the motion."""
     if section.poses is not None:
         wanted = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
         coordinates = Coordinates(model.mechanism, once=True)

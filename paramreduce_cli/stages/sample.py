@@ -1,4 +1,4 @@
-"""sample: states, torques and observation matrices of all sets."""
+"""The stage sample: states, torques and observation matrices of all sets."""
 
 import itertools
 import warnings
@@ -87,30 +87,30 @@ def sample(
     def observed(name: str, points: int | None) -> ComputedSet:
         recording: Recording | None = getattr(recordings, name)
         if sampling.log is not None:
-            return _logged(model, dynamics, log, name)
+            return _sample_log(model, dynamics, log, name)
         if sampling.simulation is not None:
-            return _simulated(sampling.simulation, model, dynamics, name, tell)
+            return _sample_simulation(sampling.simulation, model, dynamics, name, tell)
         if recording is not None:
-            return _recorded(sampling, model, dynamics, recording)
+            return _sample_recording(sampling, model, dynamics, recording)
         if trajectories is None:
             raise DataError(f"there is neither a recording nor a trajectory for the {name} set.")
         series = [trajectory.coefficients for trajectory in getattr(trajectories, name)]
         if name == "estimation" and sampling.symmetries:
-            series = _completed(sampling, model, trajectories, series)
-        return _generated(model, dynamics, trajectories, name, series, points)
+            series = _complete_series(sampling, model, trajectories, series)
+        return _sample_series(model, dynamics, trajectories, name, series, points)
 
     points = {"estimation": sampling.points, "validation": sampling.validation_points}
     tested = _is_tested(sampling, trajectories, recordings)
     names = SETS if tested else SETS[:2]
     computed = {name: observed(name, points.get(name)) for name in names}
-    stored = _combined_items(computed, items, tell)
+    stored = _combine_items(computed, items, tell)
     if stored is not None:
-        return _samples(sampling, model, stored["estimation"], stored)
+        return _make_samples(sampling, model, stored["estimation"], stored)
     told = {name: ToldSet(one, f"{name} set", tell) for name, one in computed.items()}
-    return _samples(sampling, model, computed["estimation"], told)
+    return _make_samples(sampling, model, computed["estimation"], told)
 
 
-def _combined_items(
+def _combine_items(
     computed: Mapping[str, ComputedSet], items: Items, tell: Tell
 ) -> dict[str, JoinedSet] | None:
     """Return the sets as their items, all of them kept; None where no item is kept and none has to be.
@@ -127,7 +127,7 @@ def _combined_items(
 
     run = Run(progress=tell)
     found: dict[str, Any] = complete_items(
-        run, items, list(pieces), lambda: pieces, _piece, task="samples"
+        run, items, list(pieces), lambda: pieces, _get_piece, task="samples"
     )
     return {
         name: JoinedSet([one for key, one in found.items() if key.startswith(f"{name}-")])
@@ -135,7 +135,7 @@ def _combined_items(
     }
 
 
-def _piece(pieces: Mapping[str, ObservedSet], key: str) -> SampleSet:
+def _get_piece(pieces: Mapping[str, ObservedSet], key: str) -> SampleSet:
     return pieces[key]
 
 
@@ -152,7 +152,7 @@ def _is_tested(
     return trajectories is not None and bool(trajectories.test or trajectories.test_point_to_point)
 
 
-def _samples(
+def _make_samples(
     sampling: SamplingSection,
     model: Model,
     estimation: ComputedSet | JoinedSet,
@@ -164,18 +164,19 @@ def _samples(
         names=model.mechanism.parameter_names,
         preference=np.array([parameter.preference for parameter in parameters]),
         values=model.values,
-        nominal_torque=_nominal_torque(model, estimation),
-        nominal_acceleration=_nominal_acceleration(sampling, model, estimation),
+        nominal_torque=_compute_nominal_torque(model, estimation),
+        nominal_acceleration=_compute_nominal_acceleration(sampling, model, estimation),
         estimation=sets["estimation"],
         validation=sets.get("validation"),
         test=sets.get("test"),
     )
 
 
-def _completed(
+def _complete_series(
     sampling: SamplingSection, model: Model, trajectories: Trajectories, series: list[FloatArray]
 ) -> list[FloatArray]:
-    """The images of all series under the symmetries of the mechanism.
+    """Return the images of all series under the symmetries of the mechanism, or raise an error if one leaves the
+    limits.
 
     Those that lead out of the limits are refused: they are none of this mechanism.
     """
@@ -203,7 +204,7 @@ def _completed(
     return series
 
 
-def _generated(
+def _sample_series(
     model: Model,
     dynamics: Dynamics,
     trajectories: Trajectories,
@@ -211,13 +212,13 @@ def _generated(
     series: list[FloatArray],
     points: int | None,
 ) -> ObservedSet:
-    """Samples of Fourier series, as many as these were optimised on if nothing else is asked for."""
+    """Return the samples of Fourier series."""
     points = points or trajectories.points
     motions = trajectories.test_point_to_point if name == "test" else ()
     finer = 1 if model.mechanism.loops is None else -(-FINER * trajectories.points // points)
     return ObservedSet(
         spans([points] * (len(series) + len(motions))),
-        _motions_states(
+        _chain_states(
             len(series),
             _series_states(series, trajectories.period, points, finer),
             evaluate_along(motions, points, finer),
@@ -228,9 +229,10 @@ def _generated(
     )
 
 
-def _recorded(
+def _sample_recording(
     sampling: SamplingSection, model: Model, dynamics: Dynamics, recording: Recording
 ) -> ObservedSet:
+    """Return the samples of a recording of states, with measured torques or torques of the model."""
     _warn_of_still_joints(model, recording)
     if sampling.torques == "model":
         recording = replace(recording, tau=None)
@@ -246,7 +248,7 @@ def _recorded(
     starts = np.concatenate([[0], begun, [recording.time.size]])
     return ObservedSet(
         spans(np.diff(starts)),
-        _recorded_states(recording, starts),
+        _read_recorded_states(recording, starts),
         dynamics,
         model.values,
         recording.source,
@@ -254,7 +256,8 @@ def _recorded(
     )
 
 
-def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str) -> LoggedSet:
+def _sample_log(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str) -> LoggedSet:
+    """Return the samples of a processed log."""
     if log is None:
         raise DataError("there is no log.h5.", command="process-log")
     motions = log.training if name == "estimation" else log.held_out
@@ -269,10 +272,10 @@ def _logged(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name: str
     return found
 
 
-def _simulated(
+def _sample_simulation(
     wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str, tell: Tell
 ) -> ObservedSet:
-    """Samples of the full model's motions under the inputs that the config gives."""
+    """Return the samples of simulated motions of the full model under the config's inputs."""
     mechanism = model.mechanism
     rng = np.random.default_rng([0, zlib.crc32(name.encode())])
     time = np.arange(0.0, wanted.duration, wanted.step)
@@ -283,7 +286,7 @@ def _simulated(
     counts = (wanted.runs, wanted.validation_runs, wanted.test_runs)
     runs = dict(zip(SETS, counts, strict=True))[name]
     for done in range(runs):
-        inputs = [_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
+        inputs = [_make_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
         start = z.copy()
         for coordinate, (lower, upper) in wanted.start.items():
             start[mechanism.coordinate_names.index(coordinate)] = rng.uniform(lower, upper)
@@ -294,14 +297,15 @@ def _simulated(
         tell(Progress(f"simulate motions of the {name} set", done + 1, runs))
     return ObservedSet(
         spans([time.size] * len(motions)),
-        _motion_states(motions),
+        _read_motion_states(motions),
         dynamics,
         model.values,
         f"{name} set",
     )
 
 
-def _input(section: InputSection | None, rng: np.random.Generator) -> Input:
+def _make_input(section: InputSection | None, rng: np.random.Generator) -> Input:
+    """Return an input with random phases."""
     if section is None:
         return Input()
     phases = rng.uniform(0, 2 * np.pi, len(section.frequencies)).tolist()
@@ -309,7 +313,9 @@ def _input(section: InputSection | None, rng: np.random.Generator) -> Input:
     return Input(phases=tuple(phases), **given)
 
 
-def _motion_states(motions: list[SimulatedMotion]) -> StatesAt:
+def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
+    """Return a function that gives the states of simulated motions."""
+
     def at(span: Span) -> StateBlock:
         motion, part = motions[span.trajectory], slice(span.start, span.stop)
         states = motion.time[part], motion.z[part], motion.dz[part], motion.ddz[part]
@@ -358,8 +364,8 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
     return at
 
 
-def _motions_states(count: int, first: StatesAt, second: StatesAt) -> StatesAt:
-    """States of so many motions of one kind, and of those of another kind that come after them."""
+def _chain_states(count: int, first: StatesAt, second: StatesAt) -> StatesAt:
+    """Return a function that gives the states of motions of one kind, then of another."""
 
     def at(span: Span) -> StateBlock:
         if span.trajectory < count:
@@ -370,8 +376,10 @@ def _motions_states(count: int, first: StatesAt, second: StatesAt) -> StatesAt:
     return at
 
 
-def _recorded_states(r: Recording, starts: IntArray) -> StatesAt:
-    """States of a recording whose motions begin at some rows, with the end as the last of them."""
+def _read_recorded_states(r: Recording, starts: IntArray) -> StatesAt:
+    """Return a function that gives the states of a recording whose motions begin at some rows; the last entry is the
+    end.
+    """
 
     def at(span: Span) -> StateBlock:
         first = starts[span.trajectory]
@@ -383,6 +391,7 @@ def _recorded_states(r: Recording, starts: IntArray) -> StatesAt:
 
 
 def _warn_of_still_joints(model: Model, recording: Recording) -> None:
+    """Warn of joints that never move in a recording."""
     still = np.ptp(recording.z, axis=0) == 0
     names = [n for n, s in zip(model.mechanism.coordinate_names, still, strict=True) if s]
     if names:
@@ -393,8 +402,8 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
         )
 
 
-def _torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
-    """Those of the states where they were measured; else observation matrices are needed too."""
+def _iterate_torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
+    """Yield the torques, without observation matrices if torques were measured."""
     states: Iterator[StateBlock | Block] = iter(found.iterate_states())
     first = next(states, None)
     if first is None or first.tau is None:
@@ -402,17 +411,19 @@ def _torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
     return (block.tau for block in itertools.chain([first], states) if block.tau is not None)
 
 
-def _nominal_torque(model: Model, estimation: ComputedSet | JoinedSet) -> FloatArray:
+def _compute_nominal_torque(model: Model, estimation: ComputedSet | JoinedSet) -> FloatArray:
+    """Return the nominal torques of the config, or the standard deviations over the estimation set."""
     if model.nominal_torque_given:
         return model.nominal_torque
-    deviation = standard_deviation(_torques(estimation))
+    deviation = standard_deviation(_iterate_torques(estimation))
     deviation[np.isinf(model.nominal_torque)] = np.inf
-    return _scale(deviation, model, "nominal_torque", "torque")
+    return _check_scale(deviation, model, "nominal_torque", "torque")
 
 
-def _nominal_acceleration(
+def _compute_nominal_acceleration(
     sampling: SamplingSection, model: Model, estimation: ComputedSet | JoinedSet
 ) -> FloatArray:
+    """Return the nominal accelerations of the config, or the standard deviations over the estimation set."""
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
         return expand_per_joint(given, model.mechanism.n_dof)
@@ -420,11 +431,11 @@ def _nominal_acceleration(
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
         deviation[deviation == 0] = 1.0
-    return _scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
+    return _check_scale(deviation, model, "sampling.nominal_acceleration", "acceleration")
 
 
-def _scale(deviation: FloatArray, model: Model, key: str, what: str) -> FloatArray:
-    """A standard deviation that is to divide by, refused where it is zero."""
+def _check_scale(deviation: FloatArray, model: Model, key: str, what: str) -> FloatArray:
+    """Return a standard deviation that errors are divided by, or raise an error if it is zero."""
     if not np.all(deviation > 0):
         joint = model.mechanism.coordinate_names[int(np.argmin(deviation))]
         raise DataError(

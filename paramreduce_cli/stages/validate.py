@@ -1,4 +1,4 @@
-"""validate: what every reduced model is worth, and whether the selected one is accepted."""
+"""The stage validate: errors and costs of every reduced model, and acceptance of the selected model."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -90,7 +90,7 @@ def validate(
     Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
     """
     if model is None:
-        _refuse_what_needs_a_model(judging, wanted)
+        _check_without_model(judging, wanted)
     if samples.test is None:
         _refuse_what_needs_a_test_set(judging)
     known = previous if run.unchanged >= _MEASURED_ON else None
@@ -99,23 +99,23 @@ def validate(
             known.heuristics, known.full, known.nominal_acceleration, known.lower, known.upper
         )
     elif model is None:
-        measured = _torques_alone(samples, reduction)
+        measured = _measure_torques(samples, reduction)
     else:
-        measured = _measured(model, samples, reduction, counted, run)
+        measured = _measure(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
     costs = None if model is None else OperationCounts(model, counted, reduction, run)
     if costs is not None and (costs.are_few or "operations" in wanted.get_tolerances()):
         heuristics = costs.count(heuristics, list_models(heuristics))
     crossed = None
     if wanted.cross_validation:
-        methods = _crossed_methods(wanted, reduction)
+        methods = _list_cross_validated(wanted, reduction)
         crossed = known.cross_validation if known else None
         if crossed is None or set(crossed) != set(methods):
-            crossed = _cross_validation(search, methods, model, samples, reduction, run)
+            crossed = _cross_validate(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
     selected = select_model(wanted, values, reduction, heuristics, crossed)
     if model is not None and costs is not None:
-        full |= _counts_by_name(Counts(model, counted), "selected_", selected.model)
+        full |= _count_operations(Counts(model, counted), "selected_", selected.model)
         estimated = find_pareto_front(costs.estimate(heuristics))
         heuristics = costs.count(heuristics, list_shown_models(heuristics, selected, estimated))
     chosen = (selected.heuristic, selected.n)
@@ -124,7 +124,7 @@ def validate(
     elif known and known.stability and (known.selected.heuristic, known.selected.n) == chosen:
         repeated = known.stability
     else:
-        repeated = _stability(search, model, samples, reduction, selected, run)
+        repeated = _measure_stability(search, model, samples, reduction, selected, run)
     accepted, sentence = judge_model(judging.accept, selected, heuristics[selected.heuristic])
     return Validation(
         heuristics=heuristics,
@@ -144,7 +144,7 @@ def validate(
 
 @dataclass(frozen=True)
 class _Measured:
-    """What all models are worth, whichever is selected and whatever is accepted."""
+    """The errors and costs of all models, before a model is selected."""
 
     heuristics: Mapping[str, HeuristicValidation]
     full: Mapping[str, float]
@@ -153,8 +153,10 @@ class _Measured:
     upper: FloatArray
 
 
-def _refuse_what_needs_a_model(judging: ValidationSection, wanted: SelectedSection) -> None:
-    """Brought samples have torques, but no mass matrices to accelerate and no functions to count.
+def _check_without_model(judging: ValidationSection, wanted: SelectedSection) -> None:
+    """Raise ConfigError if errors of accelerations or operations are asked for.
+
+    Samples without a robot have torques, but no mass matrices and no functions to count.
 
     Raises:
         ConfigError: An error of accelerations, or a number of operations, is asked for.
@@ -188,9 +190,10 @@ def _refuse_what_needs_a_test_set(judging: ValidationSection) -> None:
             )
 
 
-def _measured(
+def _measure(
     model: Model, samples: Samples, reduction: Reduction, counted: CountedDynamics, run: Run
 ) -> _Measured:
+    """Return the errors and costs of all models."""
     if samples.validation is None:
         raise DataError("samples.h5 holds no validation set.", command="sample")
     dynamics = Dynamics(model.mechanism)
@@ -228,22 +231,22 @@ def _measured(
     test = [] if samples.test is None else measure(samples.test, "test", by_motion=True)
     every = [estimation, validation, *test]
     heuristics = {
-        name: _judged(found.n, estimation, validation, test, models.rows[name])
+        name: _make_validation(found.n, estimation, validation, test, models.rows[name])
         for name, found in reduction.heuristics.items()
     }
-    full = _full_model(model, counted, [acceleration for _, acceleration in every])
-    return _Measured(heuristics, full, nominal, *_ranges([torque for torque, _ in every]))
+    full = _measure_full_model(model, counted, [acceleration for _, acceleration in every])
+    return _Measured(heuristics, full, nominal, *_compute_ranges([torque for torque, _ in every]))
 
 
-def _ranges(sets: Sequence[NormErrors]) -> tuple[FloatArray, FloatArray]:
-    """Of the states of all sets, each (3, n_dof)."""
+def _compute_ranges(sets: Sequence[NormErrors]) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and largest states of all sets, (3, n_dof) each."""
     lower: FloatArray = np.min([one.lower for one in sets], axis=0)
     upper: FloatArray = np.max([one.upper for one in sets], axis=0)
     return lower, upper
 
 
-def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
-    """Errors of torques; what only a mechanism tells is not a number."""
+def _measure_torques(samples: Samples, reduction: Reduction) -> _Measured:
+    """Return the torque errors of all models; NaN for all that needs a mechanism."""
     if samples.validation is None:
         raise DataError(
             "the samples hold no validation set: /validation/W and /validation/tau are missing."
@@ -263,14 +266,15 @@ def _torques_alone(samples: Samples, reduction: Reduction) -> _Measured:
     blocks = samples.test.iterate_blocks() if samples.test is not None else ()
     test = [measure(own) for _, own in groupby(blocks, lambda block: block.trajectory)]
     heuristics = {
-        name: _judged(found.n, estimation, validation, test, models.rows[name])
+        name: _make_validation(found.n, estimation, validation, test, models.rows[name])
         for name, found in reduction.heuristics.items()
     }
     sets = [torque for torque, _ in (estimation, validation, *test)]
-    return _Measured(heuristics, {}, no_joint, *_ranges(sets))
+    return _Measured(heuristics, {}, no_joint, *_compute_ranges(sets))
 
 
 def _check_coordinates(model: Model, samples: Samples) -> None:
+    """Raise DataError unless the samples hold all coordinates that the loops need."""
     n_q = model.mechanism.n_q
     for part in (samples.estimation, samples.validation, samples.test):
         if part is not None and next(iter(part.iterate_blocks())).q.shape[1] != n_q:
@@ -281,7 +285,8 @@ def _check_coordinates(model: Model, samples: Samples) -> None:
 
 
 class _Models:
-    """Standard parameters of all reduced models, each different one once, and the full model last if it is known.
+    """The standard parameters of all reduced models, each different model once, and of the full model last if it is
+    known.
 
     Attributes:
         values: (n_standard, n_models)
@@ -306,9 +311,10 @@ class _Models:
         self.values: FloatArray = np.column_stack([*columns, *([] if full is None else [full])])
 
 
-def _judged(
+def _make_validation(
     n: IntArray, estimation: _Errors, validation: _Errors, test: Sequence[_Errors], rows: IntArray
 ) -> HeuristicValidation:
+    """Return the validation of one heuristic from the errors on all sets."""
     every = [acceleration for _, acceleration in (estimation, validation, *test)]
     no_motion = np.zeros((n.size, 0))
     no_joint = np.full(estimation[0].squares.shape, np.nan)
@@ -343,26 +349,27 @@ def _judged(
     )
 
 
-def _full_model(
+def _measure_full_model(
     model: Model, counted: CountedDynamics, sets: Sequence[AccelerationErrors]
 ) -> dict[str, float]:
+    """Return operations and mass-matrix properties of the full model, by name."""
     counts = Counts(model, counted)
-    result = _counts_by_name(counts, "", make_full_model(model))
-    result |= _counts_by_name(counts, "base_", make_base_model(model))
+    result = _count_operations(counts, "", make_full_model(model))
+    result |= _count_operations(counts, "base_", make_base_model(model))
     result["mass_matrix_condition"] = float(max(one.condition[-1] for one in sets))
     smallest = min(one.smallest_eigenvalue[-1] for one in sets)
     result["mass_matrix_smallest_eigenvalue"] = float(smallest)
     return result
 
 
-def _counts_by_name(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
+def _count_operations(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
     """Count operations of a model: lean, and by textbook recursion."""
     names = [prefix + name for name in (*COUNTS, *TEXTBOOK_COUNTS)]
     return dict(zip(names, [*counts.lean(chosen), *counts.textbook(chosen)], strict=True))
 
 
-def _crossed_methods(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:
-    """Heuristics that cross-validation looks at, by the name that they were run under.
+def _list_cross_validated(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:
+    """Return the heuristics for cross-validation by the name of the method that ran.
 
     Raises:
         ConfigError: None selects by torque.
@@ -380,7 +387,7 @@ def _crossed_methods(wanted: SelectedSection, reduction: Reduction) -> dict[str,
     return found
 
 
-def _cross_validation(
+def _cross_validate(
     search: ReductionSection,
     methods: Mapping[str, str],
     model: Model | None,
@@ -388,7 +395,7 @@ def _cross_validation(
     reduction: Reduction,
     run: Run,
 ) -> dict[str, CrossValidation]:
-    """Errors with each trajectory left out, of the heuristics that select by torque."""
+    """Return the errors with each trajectory left out, of the heuristics that select by torque."""
     factors = samples.estimation.compute_factors()
     if len(factors) < 2:
         raise ConfigError(
@@ -429,7 +436,7 @@ def _cross_validation(
     return found
 
 
-def _stability(
+def _measure_stability(
     search: ReductionSection,
     model: Model | None,
     samples: Samples,
@@ -437,7 +444,7 @@ def _stability(
     selected: Selected,
     run: Run,
 ) -> Stability:
-    """The selection repeated by torque with each trajectory left out and with fewer samples."""
+    """Repeat the selection by torque without each trajectory and with fewer samples."""
     grouped = make_columns(search, samples)
     weights = reduction.nominal_torque
     problem = make_problem(reduction.factor, model, grouped, samples.values)

@@ -16,7 +16,7 @@ from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.workers import build_excitation, optimise_all
 from paramreduce_cli.records import Items, Run
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.optimize_trajectories import excitation_task
+from paramreduce_cli.stages.optimize_trajectories import make_task
 from tests.oracles import capsules, pinocchio_model
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -67,7 +67,7 @@ def main(count=100, jobs=2):
     for robot in ("ur10", "panda"):
         config = load_config(ROOT / "configs" / f"{robot}.yaml")
         model = build_model(config, config.model, Run())
-        task = excitation_task(config.trajectories, model)
+        task = make_task(config.trajectories, model)
         keys = [f"estimation-{k:04d}" for k in range(count)]
         found = optimise_all(task, keys, Run(jobs=jobs), Items())
         measured = [worst(config, model, task, found[key]) for key in keys]

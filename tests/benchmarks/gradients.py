@@ -11,7 +11,7 @@ from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE
 from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.loops.follower import Follower
-from paramreduce_cli.stages.optimize_trajectories import excitation_task
+from paramreduce_cli.stages.optimize_trajectories import make_task
 from tests.conftest import config_and_model
 
 
@@ -46,7 +46,7 @@ def descend(make, start):
 
 def rows():
     config, model = config_and_model("puma560")
-    task = excitation_task(config.trajectories, model)
+    task = make_task(config.trajectories, model)
     excitation, settings = build_excitation(task), task.settings
     basis = settings.build_basis()
     limits = LimitMap(settings.limits, basis, "gauge")

@@ -191,7 +191,7 @@ def test_a_hint_that_fails_hides_no_error(invoke, folder, monkeypatch):
     def broken(*_):
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr("paramreduce_cli.cli.suggestions.project_above", broken)
+    monkeypatch.setattr("paramreduce_cli.cli.suggestions.find_project_above", broken)
     assert "there is no such file" in invoke("run", "configs/two_lnik.yaml", code=2).err
     assert "there is no option" in invoke("run", "--nothing", code=2).err
 

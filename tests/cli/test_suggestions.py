@@ -2,7 +2,7 @@
 
 import pytest
 
-from paramreduce_cli.cli.suggestions import Call, nearest_choice, suggest_after_error
+from paramreduce_cli.cli.suggestions import Call, find_nearest_choice, suggest_after_error
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError, MissingConfigError
 
 
@@ -60,7 +60,7 @@ def test_what_is_meant(error, typed, meant, tmp_path, monkeypatch):
     ],
 )
 def test_the_nearest_choice(rejected, choices, nearest):
-    assert nearest_choice(rejected, choices) == nearest
+    assert find_nearest_choice(rejected, choices) == nearest
 
 
 def test_commands_have_the_arguments_of_the_call():

@@ -17,13 +17,13 @@ from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import Run
 from paramreduce_cli.stages.build_model import build_model
-from paramreduce_cli.stages.optimize_trajectories import excitation_task
+from paramreduce_cli.stages.optimize_trajectories import make_task
 
 
 @pytest.fixture(scope="module", params=["five_bar", "hexaglide"])
 def case(request):
     config, model = config_and_model(request.param)
-    task = excitation_task(config.trajectories, model)
+    task = make_task(config.trajectories, model)
     settings = dataclasses.replace(task.settings, starts=1, polished=1, max_iterations=20)
     return build_excitation(task), settings, task.constraints
 
@@ -106,7 +106,7 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
     config = load_config(path)
     model = build_model(config, config.model, Run())
     wanted = config.trajectories.model_copy(update={"scaling": "weighted", "harmonics": 3})
-    task = excitation_task(wanted, model, 2 * np.pi)
+    task = make_task(wanted, model, 2 * np.pi)
     excitation = build_excitation(task)
     settings = dataclasses.replace(task.settings, starts=3, polished=2, max_iterations=40)
     for seed in range(2):

@@ -26,7 +26,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import Items, Run
-from paramreduce_cli.stages.optimize_trajectories import excitation_task, optimize_trajectories
+from paramreduce_cli.stages.optimize_trajectories import make_task, optimize_trajectories
 
 ASKED = [
     "trajectories.rest_to_rest=true",
@@ -87,7 +87,7 @@ def test_rest_costs_little(made):
 @pytest.mark.parametrize("seed", [0, 1])
 def test_gradients_of_loads_and_rest(seed):
     config, model = config_and_model("two_link", *ASKED)
-    task = excitation_task(config.trajectories, model)
+    task = make_task(config.trajectories, model)
     excitation = build_excitation(task)
     basis = task.settings.build_basis()
     limits = LimitMap(task.settings.limits, basis, "ball", rest_to_rest=True)
@@ -113,9 +113,7 @@ def test_noise_of_torques_weights_the_rows():
     noise = np.array([0.4, 0.02])
     config, model = config_and_model("two_link", *ASKED, "trajectories.torque_noise=[0.4, 0.02]")
     plain, _ = config_and_model("two_link", *ASKED)
-    weighted, usual = (
-        build_excitation(excitation_task(c.trajectories, model)) for c in (config, plain)
-    )
+    weighted, usual = (build_excitation(make_task(c.trajectories, model)) for c in (config, plain))
     rng = np.random.default_rng(0)
     z, dz, ddz = rng.normal(size=(3, 40, 2))
     dynamics = Dynamics(model.mechanism)
@@ -142,7 +140,7 @@ def test_limits_that_no_motion_keeps_are_said():
         "two_link", *[t for t in ASKED if "torque" not in t], "trajectories.torque_limits=[0.5, 0.1]",
         "trajectories.start_pose=[-0.6, 0]",
     )  # fmt: skip
-    task = excitation_task(config.trajectories, model)
+    task = make_task(config.trajectories, model)
     excitation = build_excitation(task)
     with pytest.raises(NumericalError, match="leave no motion") as error:
         optimise_trajectory(excitation, task.settings, [0])

@@ -13,7 +13,7 @@ from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import JointLimits
-from paramreduce_cli.stages.optimize_trajectories import excitation_task
+from paramreduce_cli.stages.optimize_trajectories import make_task
 
 NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
 
@@ -21,7 +21,7 @@ NOMINAL = np.array([350, 300, 125, 8, 3, 1.0])
 @pytest.fixture(scope="module")
 def parts():
     config, model = config_and_model("puma560")
-    excitation = build_excitation(excitation_task(config.trajectories, model))
+    excitation = build_excitation(make_task(config.trajectories, model))
     return Dynamics(model.mechanism), model.base, excitation
 
 
@@ -114,7 +114,7 @@ def test_a_joint_cannot_meet_its_limit_by_being_parked_there():
 
 def test_trajectories_follow_a_rounded_sign_and_are_measured_by_the_true_one():
     config, model = config_and_model("two_link", "drives.all.coulomb=2")
-    excitation = build_excitation(excitation_task(config.trajectories, model))
+    excitation = build_excitation(make_task(config.trajectories, model))
     rng = np.random.default_rng(0)
     states = tuple(rng.normal(size=(3, 50, 2)))
     expected = Dynamics(model.mechanism).regressor(*states)[..., model.base.columns]

@@ -183,14 +183,14 @@ def model_weights(runner):
 
 
 def test_a_function_for_which_nothing_is_found_stops_no_run(tmp_path, monkeypatch):
-    record = reduce_terms._record
+    record = reduce_terms._make_record
 
     def none_for(*functions):
         def found(one, judge, *others):
             name = "direct" if judge.direct else "inverse"
             return None if name in functions else record(one, judge, *others)
 
-        monkeypatch.setattr(reduce_terms, "_record", found)
+        monkeypatch.setattr(reduce_terms, "_make_record", found)
 
     none_for("direct")
     with pytest.warns(

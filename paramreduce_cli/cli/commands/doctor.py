@@ -18,7 +18,7 @@ import rich.markup
 import rich.table
 
 from paramreduce_cli import __version__
-from paramreduce_cli.cli.options import cores
+from paramreduce_cli.cli.options import count_cores
 from paramreduce_cli.cli.terminal import JSON, emit, say_table
 from paramreduce_cli.errors import ParamreduceError
 
@@ -63,7 +63,7 @@ def _findings() -> Iterator[tuple[str, str, str]]:
     yield _compiler()
     yield from _caches()
     yield _loops()
-    yield "cores", "ok", f"{cores()} that this process may use"
+    yield "cores", "ok", f"{count_cores()} that this process may use"
     threads = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
     yield "threads", "ok", ", ".join(f"{k}={v}" for k, v in threads.items() if v)
     yield _algebra()

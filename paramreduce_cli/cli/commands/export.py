@@ -9,8 +9,8 @@ import click
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.exporting import up_to_date
-from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, results_store
+from paramreduce_cli.cli.exporting import load_current
+from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, make_store
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, say, show_progress
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError, ConfigError
@@ -95,7 +95,7 @@ def export(
     Without a CONFIG, of samples that were brought, values alone can be written.
     """
     loaded = load_config(config, overrides) if config is not None else None
-    store = results_store(loaded, results)
+    store = make_store(loaded, results)
     if loaded is None and (kind != VALUES or text in _OF_A_ROBOT):
         raise click.UsageError(
             f"Code and robots' files need a CONFIG; without one there is --format {VALUES} of a reduced model."
@@ -123,10 +123,10 @@ def export(
         records.append(Identification)
     elif text not in (FULL, BASE):
         records += [Reduction] if text is not None else [Reduction, Validation]
-    loading = {record: up_to_date(loaded, store, record) for record in records}
+    loading = {record: load_current(loaded, store, record) for record in records}
     if Reduction in loading and Validation not in loading:
         with contextlib.suppress(ArtifactError):  # it only tells more
-            loading[Validation] = up_to_date(loaded, store, Validation)
+            loading[Validation] = load_current(loaded, store, Validation)
     simplified = None
     if text == TERMS:
         chosen, simplified, title = simplified_model(loading[TermReduction], _FUNCTIONS[what])
@@ -172,8 +172,8 @@ def _leanest(config: Config, store: Store, function: str) -> str:
     Raises:
         ConfigError: There is none within it.
     """
-    validation = up_to_date(config, store, Validation)
-    terms = up_to_date(config, store, TermReduction) if config.terms is not None else None
+    validation = load_current(config, store, Validation)
+    terms = load_current(config, store, TermReduction) if config.terms is not None else None
     found = find_leanest(function, config.selected, validation.heuristics, terms)
     if found is None:
         raise ConfigError(

@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.artifacts.report_files import save_files
 from paramreduce_cli.artifacts.store import Store
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.exporting import up_to_date
+from paramreduce_cli.cli.exporting import load_current
 from paramreduce_cli.cli.options import CONFIG, RESULTS, SET
 from paramreduce_cli.cli.terminal import LOG, say
 from paramreduce_cli.config import load_config
@@ -67,7 +67,7 @@ def export_trajectory(
     """
     loaded = load_config(config, overrides)
     store = Store(results or Path("results") / loaded.robot)
-    model, trajectories = (up_to_date(loaded, store, record) for record in (Model, Trajectories))
+    model, trajectories = (load_current(loaded, store, record) for record in (Model, Trajectories))
     pose = loaded.trajectories.start_pose
     start = None if pose is None else expand_per_joint(pose, loaded.n_dof)
     ways = PathPlanner(model, trajectories)

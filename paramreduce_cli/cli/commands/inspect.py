@@ -18,7 +18,7 @@ from paramreduce_cli.artifacts.inspection import list_contents
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.project_state import no_results, results_below
+from paramreduce_cli.cli.project_state import list_results_below, make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
@@ -48,8 +48,8 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
         file = _only_results()
     folder = file if file.is_dir() else file.parent
     if file.is_dir() and chosen is None:
-        if not (file / "validation.h5").exists() and results_below(file):
-            raise no_results(file, "inspect")
+        if not (file / "validation.h5").exists() and list_results_below(file):
+            raise make_no_results_error(file, "inspect")
         chosen = "selected"
     if chosen == "selected":
         title, model = _selected(folder / "validation.h5")

@@ -7,7 +7,7 @@ import click
 
 from paramreduce_cli.artifacts.report_files import list_newer_artifacts, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.project_state import no_results
+from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import complain, say
 
 
@@ -20,7 +20,7 @@ def open(results: Path) -> None:  # the file's name is the command's
     """
     folder = results if results.name == "report" else results / "report"
     if not folder.is_dir():
-        raise no_results(results, "open")
+        raise make_no_results_error(results, "open")
     verify_report(folder / "summary.json")
     newer = list_newer_artifacts(folder.parent)
     if newer:

@@ -18,9 +18,9 @@ from paramreduce_cli.cli.options import (
     QUIET,
     RESULTS,
     SET,
-    callbacks,
-    cores,
-    results_store,
+    count_cores,
+    make_callbacks,
+    make_store,
 )
 from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import (
@@ -72,7 +72,7 @@ def run(
     """
     quiet = quiet or as_json
     loaded = load_config(config, overrides)
-    store = results_store(loaded, results)
+    store = make_store(loaded, results)
     _warn_of_open_tasks(config)
     for path, key in find_missing_files(loaded):
         raise make_missing_error(
@@ -88,7 +88,9 @@ def run(
         for number, stage in enumerate(stages, 1):
             label = f"{number}/{len(stages)} {stage.name}"
             with show_progress(label, quiet, as_json) as progress:
-                runner = Runner(loaded, store, jobs or cores(), callbacks(progress), asked=words)
+                runner = Runner(
+                    loaded, store, jobs or count_cores(), make_callbacks(progress), asked=words
+                )
                 outcome = runner.run(stage, force=force)
             if as_json:
                 emit(event="stage", stage=stage.name, up_to_date=outcome.current,

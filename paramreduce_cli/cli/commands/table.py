@@ -11,7 +11,7 @@ from paramreduce_cli.artifacts.atomic import replace_atomically
 from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.project_state import no_results
+from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say, warn_user
 from paramreduce_cli.errors import ArtifactError, ConfigError
 from paramreduce_cli.report.overview import overview, overview_row
@@ -105,7 +105,7 @@ def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
 
 def _summary(path: Path) -> dict[str, Any]:
     if path.is_dir() and not (path / SUMMARY).exists():
-        raise no_results(path, "table")
+        raise make_no_results_error(path, "table")
     return load_summary(path)
 
 
