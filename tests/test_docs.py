@@ -205,3 +205,10 @@ def test_every_example_of_a_config_is_valid():
     assert SweepSection in wrong
     assert wrong_in({"torque_error": 2}, TermsSection, {}), "values count"
     assert wrong_in({"torque_eror": 0.01}, TermsSection, {}), "keys count"
+
+
+def test_the_diagram_of_the_pipeline_shows_the_declared_stages():
+    spec = importlib.util.spec_from_file_location("pipeline", DOCS / "pipeline.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    assert module.IMAGE.read_text() == module.draw_pipeline()

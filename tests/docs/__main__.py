@@ -19,7 +19,7 @@ from tests.pythons import interpreters
 LONG = ("tutorial.md", "how-to.md", "python.md")
 """Pages that are typed as they stand, each in an empty folder of its own."""
 SHORT = {
-    prepared.paper: ("README.md", "lean.md", "terms.md"),
+    prepared.paper: ("README.md", "stages.md", "lean.md", "terms.md"),
     prepared.matrix: ("artifacts.md",),
     prepared.config: ("cluster.md",),
     prepared.robot: ("robots.md",),

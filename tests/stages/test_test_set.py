@@ -113,8 +113,8 @@ def test_without_it_errors_are_those_of_the_validation_set(tmp_path, invoke):
         "validation.accept={}",
     ]
     out = invoke("run", TWO_LINK, "--results", tmp_path, settings=[*QUICK, *none]).out
-    assert "ε_τ V" in out
-    assert "ε_τ T" not in out
+    assert "on the estimation and on the validation set" in out
+    assert "test set" not in out
     assert summary_of(tmp_path)["selected"]["torque_error"]["test"] is None
     assert "no search looked at" not in (tmp_path / "report" / "index.html").read_text()
 

@@ -162,10 +162,13 @@ def _say_summary(summary: dict[str, Any]) -> None:
         )
     tested = summary["selected"]["torque_error"]["test"] is not None
     table = rich.table.Table(title=f"Reduced models with {n} parameters", box=rich.box.SIMPLE)
-    errors = (
-        ("ε_τ T", "worst", "ε_z̈ T", "worst") if tested else ("ε_τ E", "ε_τ V", "ε_z̈ E", "ε_z̈ V")
-    )
-    for k, heading in enumerate(("heuristic", *errors, "d", "M|δ")):
+    parts = ("median", "worst") if tested else ("est.", "val.")
+    headings = [
+        "heuristic",
+        *(f"{what}\nerror,\n{part}" for what in ("torque", "accel.") for part in parts),
+        *(f"ops,\n{function}" for function in ("inv.", "dir.")),
+    ]
+    for k, heading in enumerate(headings):
         table.add_column(heading, justify="left" if k == 0 else "right", no_wrap=True)
     for name, rows in summary["validation"].items():
         for row in rows:
@@ -177,15 +180,19 @@ def _say_summary(summary: dict[str, Any]) -> None:
     table.add_row("full model" if found is None else "all parameters", "", "", "", "", *operations)
     say_table(table, _TABLE_WIDTH)
     if tested:
-        say("T: the test set, which no search looks at; the median and the worst of its motions.")
+        say("Errors: median and worst of the motions in the test set, which no search has seen.")
+    else:
+        say("Errors: on the estimation and on the validation set.")
+    say("Ops: operations of the inverse dynamics, and of mass matrix and bias (direct dynamics).")
     for one in summary["terms"]:
-        name = {"inverse": "d", "direct": "[M | δ]"}[one["function"]]
         said = "".join(
-            f", {symbol} {known}"
-            for symbol, kind in (("ε_τ", "torque_error"), ("ε_z̈", "acceleration_error"))
-            if (known := _said(one[kind]))
+            f", {what} error {known}"
+            for what in ("torque", "acceleration")
+            if (known := _said(one[f"{what}_error"]))
         )
-        say(f"Without small terms: {name} in {one['operations']} operations{said}")
+        say(
+            f"Negligible terms removed, {one['function']} dynamics: {one['operations']} operations{said}"
+        )
     if found is not None:
         say(found["comparison"])
         if found["consistent"] is not None:
