@@ -28,11 +28,11 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.resources.item_completion import complete_items
 from paramreduce_cli.terms.descent import Simplified
+from paramreduce_cli.terms.evaluation import Errors, Evaluator
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.judging import Errors, Judge
-from paramreduce_cli.terms.searching import LookedAt, Searcher
-from paramreduce_cli.terms.simplify import simplified
-from paramreduce_cli.terms.starts import starts_within
+from paramreduce_cli.terms.searching import Searcher, SearchSamples
+from paramreduce_cli.terms.simplify import simplify
+from paramreduce_cli.terms.starts import list_starts
 from paramreduce_cli.texts import format_percent
 
 _FIRST, _CLOSELY = (300, 200), (1000, 500)
@@ -74,7 +74,7 @@ def reduce_terms(
             ("terms",),
         )
     allowed = Budget(section.torque_error, section.acceleration_error or np.inf)
-    budget = allowed if sampling.measured else allowed.scaled(_MARGIN)
+    budget = allowed if sampling.measured else allowed.scale(_MARGIN)
     names = list(dict.fromkeys(section.functions))
     task = _Task(section, budget, trajectories, sampling, counted, model, samples, reduction, run)
     found = complete_items(run, items, names, lambda: task, _search, task="functions")
@@ -112,14 +112,14 @@ def _search(task: _Task, name: str) -> TermModel | None:
     projected = model.mechanism.loops is not None and task.counted is CountedDynamics.INDEPENDENT
     lean = LeanModels(model, independent=projected)
     direct = name == "direct"
-    starts = starts_within(budget.torque, lean, model, reduction, direct=direct)
+    starts = list_starts(budget.torque, lean, model, reduction, direct=direct)
     smallest = [start.model.kept for start in starts[:_SMALLEST]]
     suited = replace(
         model, formulations=formulations_for(model, smallest, direct=direct, jobs=run.jobs)
     )
     lean = LeanModels(suited, independent=projected)
     mechanism = model.mechanism
-    judge = Judge(
+    judge = Evaluator(
         model, samples, reduction.nominal_torque,
         trajectories.build_limits(mechanism.n_dof), trajectories.build_constraints(mechanism),
         direct=direct, projected=projected, measured=sampling.measured,
@@ -130,17 +130,17 @@ def _search(task: _Task, name: str) -> TermModel | None:
 
     searcher = Searcher(
         lean, _choose_samples(judge, samples, *_FIRST), _choose_samples(judge, samples, *_CLOSELY),
-        judge.poses(_POSES), budget, direct,
+        judge.sample_poses(_POSES), budget, direct,
     )  # fmt: skip
-    found = simplified(
+    found = simplify(
         searcher, starts, rounds=section.rounds, seconds=section.time_limit or np.inf,
         jobs=run.jobs, progress=progress,
     )  # fmt: skip
     if found.cut_short:
         _warn_of_time_limit(name)
-    fitted = judge.thinned(samples.estimation, _FITTED)
-    way = [Judged.judge(one.refitted(fitted, budget), judge, budget) for one in found.front]
-    ends = (one.refitted(fitted, budget) for one in found.ends)
+    fitted = judge.decimate(samples.estimation, _FITTED)
+    way = [Judged.judge(one.refit(fitted, budget), judge, budget) for one in found.front]
+    ends = (one.refit(fitted, budget) for one in found.ends)
     records = (
         _make_record(one, judge, way, lean) for one in _iterate_within_budget(ends, judge, budget)
     )
@@ -160,10 +160,10 @@ class Judged:
     """The largest as a share of the budget."""
 
     @classmethod
-    def judge(cls, program: Simplified, judge: Judge, budget: Budget) -> "Judged":
+    def judge(cls, program: Simplified, judge: Evaluator, budget: Budget) -> "Judged":
         """Return a program with its errors."""
-        errors = judge.errors(program)
-        return cls(program, errors, judge.strain(errors, budget))
+        errors = judge.compute_errors(program)
+        return cls(program, errors, judge.compute_worst_ratio(errors, budget))
 
     @property
     def rank(self) -> tuple[int, float]:
@@ -172,7 +172,7 @@ class Judged:
 
 
 def _iterate_within_budget(
-    ends: Iterable[Simplified], judge: Judge, budget: Budget
+    ends: Iterable[Simplified], judge: Evaluator, budget: Budget
 ) -> Iterator[Judged]:
     """Yield the programs within the budget, the leanest first; among equals the most exact first.
 
@@ -188,21 +188,23 @@ def _iterate_within_budget(
         yield from (one for one in judged if one.strain <= 1)
 
 
-def _choose_samples(judge: Judge, samples: Samples, searched: int, watched: int) -> LookedAt:
+def _choose_samples(
+    judge: Evaluator, samples: Samples, searched: int, watched: int
+) -> SearchSamples:
     """Return the samples for fitting parameters and for watching errors during the search.
 
     If torques are measured both are of the training part, with quarters of it in turn, as one motion alone says little
     about another.
     """
     if judge.measured:
-        some = judge.thinned(samples.estimation, searched + watched)
+        some = judge.decimate(samples.estimation, searched + watched)
         count = some.states.shape[1]
         fitted = np.arange(count) * _PARTS // count % 2 == 0
-        return LookedAt(some.some(fitted), some.some(~fitted))
-    fitted_to = judge.thinned(samples.estimation, searched)
+        return SearchSamples(some.select(fitted), some.select(~fitted))
+    fitted_to = judge.decimate(samples.estimation, searched)
     if samples.validation is None:
-        return LookedAt(fitted_to, None)
-    return LookedAt(fitted_to, judge.thinned(samples.validation, watched))
+        return SearchSamples(fitted_to, None)
+    return SearchSamples(fitted_to, judge.decimate(samples.validation, watched))
 
 
 def _warn_of_time_limit(name: str) -> None:
@@ -245,15 +247,15 @@ def _warn_of_missing(names: list[str], others: bool, part: str) -> None:
 
 
 def _make_record(
-    judged: Judged, judge: Judge, way: list[Judged], lean: LeanModels
+    judged: Judged, judge: Evaluator, way: list[Judged], lean: LeanModels
 ) -> TermModel | None:
     """Return a program with its errors and front, or None if one of its M is not positive definite."""
     one, (estimation, validation) = judged.program, judged.errors
-    smallest, states = judge.smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
+    smallest, states = judge.find_smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
     if judge.direct and not smallest > 0:
         return None
-    model, program = one.compact()
-    strayed, test = judge.strayed(one), judge.test_errors(one)
+    model, program = one.drop_unused()
+    strayed, test = judge.measure_deviation(one), judge.compute_test_errors(one)
     whole = (lean.direct if judge.direct else lean.inverse)(one.start.model)
     return TermModel(
         heuristic=one.start.heuristic,
@@ -283,14 +285,14 @@ def _make_record(
     )
 
 
-def _make_front(programs: list[Judged], judge: Judge) -> TermFront:
+def _make_front(programs: list[Judged], judge: Evaluator) -> TermFront:
     """Return the Pareto front of programs by operations and worst ratio to the budget."""
     kept: list[Judged] = []
     for one in sorted(programs, key=lambda one: one.rank):
         if not kept or one.strain < kept[-1].strain:
             kept.append(one)
     errors = np.array([one.errors for one in kept])
-    test = np.array([judge.test_errors(one.program) for one in kept])
+    test = np.array([judge.compute_test_errors(one.program) for one in kept])
     return TermFront(
         operations=np.array([one.rank[0] for one in kept], dtype=np.int64),
         torque_error=SetErrors(errors[:, 0, 0], errors[:, 1, 0], test[:, 0]),

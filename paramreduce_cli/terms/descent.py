@@ -1,4 +1,4 @@
-"""From one start down: terms are left out, and what is left is rewritten on the way."""
+"""A descent from one start: terms are pruned, and the remaining program is rewritten on the way."""
 
 from __future__ import annotations
 
@@ -48,21 +48,21 @@ class Simplified:
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
 
-    def refitted(self, samples: TermSamples, budget: Budget) -> Simplified:
-        """The same with parameters fitted to more samples."""
+    def refit(self, samples: TermSamples, budget: Budget) -> Simplified:
+        """Return the program with its parameters fitted to more samples."""
         tape = Tape(self.program)
         fitting = Fitting(tape, self.beta.size, samples, budget)
         return replace(self, beta=fitting.fit(tape.everything(), self.beta, looks=_LOOKS).beta)
 
-    def outputs(self, states: FloatArray) -> Outputs:
-        """What it gives for states (n_states, n_samples)."""
+    def evaluate(self, states: FloatArray) -> Outputs:
+        """Return the outputs of the program for states, (n_states, n_samples)."""
         m = states.shape[1]
         values = np.broadcast_to(self.beta[:, None], (self.beta.size, m))
         given = self.program.evaluated([*values, *states])
         return Outputs.of(np.array([np.broadcast_to(value, m) for value in given]))
 
-    def compact(self) -> tuple[ReducedModel, Program]:
-        """The same with the parameters that the program uses, and no others."""
+    def drop_unused(self) -> tuple[ReducedModel, Program]:
+        """Return the model and the program without the parameters that the program does not use."""
         model = self.start.model
         used = sorted(
             {
@@ -83,8 +83,8 @@ class Simplified:
 
 
 @dataclass(frozen=True)
-class Passed:
-    """A program on the way: less of its fit than would fill the memory."""
+class Candidate:
+    """A candidate that a search has reached: a program before pruning, its pruning, and its parameters."""
 
     tape: Tape
     """The program that it is what is left of."""
@@ -97,11 +97,11 @@ class Passed:
 
 
 @dataclass(frozen=True)
-class Way:
-    """What a descent has come by."""
+class SearchHistory:
+    """The history of a descent: its start, and the candidates on the way down."""
 
     start: Start
-    visited: dict[int, Passed]
+    visited: dict[int, Candidate]
     """The best program of every number of operations."""
     fewest: int
     """Operations of the leanest program, which may not be remembered any more."""
@@ -110,11 +110,11 @@ class Way:
 
     @property
     def rank(self) -> tuple[int, float]:
-        """The less the better; the same for ends that are the same."""
+        """Fewest operations, then worst ratio to the budget; less is better, and equal ends have equal ranks."""
         return self.fewest, round(self.strain, _SAME)
 
-    def simplified(self, passed: Passed, dice: int = 0) -> Simplified:
-        """A program on the way, its sums and products rearranged; how hangs on the dice."""
+    def rebuild(self, passed: Candidate, dice: int = 0) -> Simplified:
+        """Return the program of a candidate, with its sums and products rearranged as a seed says."""
         program, sizes = rescaled(passed.tape.rebuilt(passed.pruning), passed.beta.size)
         graph = Graph()
         program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))], dice))
@@ -134,25 +134,27 @@ class Descent:
     """Of that program."""
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
-    visited: dict[int, Passed]
+    visited: dict[int, Candidate]
     """The best one of every number of operations."""
 
     @classmethod
-    def begun(
+    def start_from(
         cls, start: Start, program: Program, searching: Callable[[Tape], TermSearch]
     ) -> Descent:
-        """With all terms of a program, whose first inputs are the parameters of the start."""
+        """Return a descent with all terms of a program, whose first inputs are the parameters of the start."""
         program, units = rescaled(program, start.model.n)
-        return cls._of(Simplified(start, program, start.model.values / units, units), searching, {})
+        return cls._make(
+            Simplified(start, program, start.model.values / units, units), searching, {}
+        )
 
     @classmethod
-    def again(
-        cls, way: Way, rng: np.random.Generator, searching: Callable[[Tape], TermSearch]
+    def restart(
+        cls, way: SearchHistory, rng: np.random.Generator, searching: Callable[[Tape], TermSearch]
     ) -> Descent:
-        """From a program shortly before the end of a descent, written in another way.
+        """Return a descent from a program shortly before the end of another descent, written in another way.
 
-        Where sums and products were rearranged by other dice, it has other terms to leave out. What the descent passed
-        before stays with it, as on other samples a dearer program may be the one to go on from.
+        With sums and products rearranged differently it has other terms to remove. Candidates of the other descent are
+        kept, as on other samples a costlier program may be the better one to continue from.
 
         Args:
             way: What the descent has come by.
@@ -162,14 +164,17 @@ class Descent:
         near = [count for count in sorted(way.visited) if count <= way.fewest / _LEG]
         count = int(rng.choice(near))
         dearer = {known: passed for known, passed in way.visited.items() if known > count}
-        whole = way.simplified(way.visited[count], int(rng.integers(_DICE)))
-        return cls._of(whole, searching, dearer)
+        whole = way.rebuild(way.visited[count], int(rng.integers(_DICE)))
+        return cls._make(whole, searching, dearer)
 
     @classmethod
-    def _of(
-        cls, whole: Simplified, searching: Callable[[Tape], TermSearch], visited: dict[int, Passed]
+    def _make(
+        cls,
+        whole: Simplified,
+        searching: Callable[[Tape], TermSearch],
+        visited: dict[int, Candidate],
     ) -> Descent:
-        """With all terms of a program, after others on the way to it."""
+        """Return a descent with all terms of a program, after earlier candidates."""
         search = searching(Tape(whole.program))
         end = search.start(whole.beta)
         descent = cls(whole.start, searching, search, end, whole.units, visited)
@@ -177,15 +182,15 @@ class Descent:
         return descent
 
     @property
-    def way(self) -> Way:
-        """What it has come by so far."""
-        return Way(self.start, self.visited, min(self.visited), self.end.fit.strain)
+    def history(self) -> SearchHistory:
+        """Return the history so far."""
+        return SearchHistory(self.start, self.visited, min(self.visited), self.end.fit.strain)
 
-    def down(self, noise: float = 0.0) -> Way:
-        """Leave terms out until no more can go, also of what comes of rewriting.
+    def descend(self, noise: float = 0.0) -> SearchHistory:
+        """Remove terms until none can go, also terms that appear by rewriting.
 
-        A rewritten program has other terms than before, and shares more of what they are made of. It
-        is rewritten early, too: which terms are cheap to do without hangs on what the others share.
+        A rewritten program has other terms than before, and shares more subexpressions. It is rewritten early, too, as
+        which terms are cheap to remove depends on what the others share.
 
         Args:
             noise: Of the logarithm of what terms seem to cost, until no more can go with it.
@@ -194,20 +199,19 @@ class Descent:
         while True:
             before = min(descent.visited)
             until = int(_LEG * descent.end.count)
-            end = descent.search.descended(descent.end, descent._note, noise, until=until)
+            end = descent.search.descend(descent.end, descent._note, noise, until=until)
             descent = replace(descent, end=end)
-            rewritten = descent._rewritten()
+            rewritten = descent._rewrite()
             if min(rewritten.visited) == before:
-                return descent.down() if noise else descent.way
+                return descent.descend() if noise else descent.history
             descent = rewritten
 
-    def _rewritten(self) -> Descent:
-        """Among the terms of the leanest program as it is rewritten; as it was if that takes it out of the budget.
-
-        Mass matrices are taken anew, which is enough for what is at the edge of it.
+    def _rewrite(self) -> Descent:
+        """Return a descent among the terms of the leanest program after rewriting, or as it was if rewriting exceeds
+        the budget. Mass matrices are computed again, which suffices for programs at the edge of the budget.
         """
         passed = self.visited[min(self.visited)]
-        simplified = self.way.simplified(passed)
+        simplified = self.history.rebuild(passed)
         search = self.searching(Tape(simplified.program))
         end = search.start(simplified.beta)
         if not end.fit.within:
@@ -221,85 +225,87 @@ class Descent:
         known = self.visited.get(step.count)
         if known is None or step.fit.excess < known.excess:
             fit = step.fit
-            passed = Passed(
+            passed = Candidate(
                 self.search.tape, fit.pruning, fit.beta, self.units, fit.cost, fit.excess
             )
             self.visited[step.count] = passed
 
 
-def gone_on(way: Way, searching: Callable[[Tape], TermSearch]) -> Way | None:
-    """Down on other samples, from the leanest program within the budget there, or made to be.
+def continue_on_samples(
+    way: SearchHistory, searching: Callable[[Tape], TermSearch]
+) -> SearchHistory | None:
+    """Continue a descent on other samples, from the leanest program that is within the budget there.
 
     Args:
-        way: Of a descent on some samples.
+        way: History of a descent on some samples.
         searching: Makes searches on others.
 
     Returns:
         None where no program is within the budget there.
     """
-    tried: list[Way] = []
+    tried: list[SearchHistory] = []
     for count, passed in sorted(way.visited.items()):
         search = searching(passed.tape)
-        end = search.mended(passed.pruning, passed.beta)
+        end = search.restore_budget(passed.pruning, passed.beta)
         if not end.fit.within:
             continue
         descent = Descent(way.start, searching, search, end, passed.units, {})
         descent._note(end)
-        tried.append(descent.down())
+        tried.append(descent.descend())
         if end.count <= count or len(tried) == _MENDED:
             break
     return min(tried, key=lambda one: one.rank, default=None)
 
 
-def leanest(ways: Iterable[Way], number: int) -> list[Way]:
-    """Those with the leanest different ends, so many at most."""
-    different: dict[tuple[int, float], Way] = {}
+def find_leanest_histories(ways: Iterable[SearchHistory], number: int) -> list[SearchHistory]:
+    """Return the histories with the leanest different ends, so many at most."""
+    different: dict[tuple[int, float], SearchHistory] = {}
     for way in ways:
         different.setdefault(way.rank, way)
     return [different[rank] for rank in sorted(different)[:number]]
 
 
-def drawn(ways: Sequence[Way], rng: np.random.Generator) -> Way:
-    """One of them at random, the likelier the leaner."""
+def draw_history(ways: Sequence[SearchHistory], rng: np.random.Generator) -> SearchHistory:
+    """Return a random history; leaner ends are likelier."""
     fewest = np.array([one.fewest for one in ways])
     weights = np.exp((fewest.min() - fewest) / _LIKELY)
     return ways[int(rng.choice(len(ways), p=weights / weights.sum()))]
 
 
-def slimmed(ways: Sequence[Way], number: int) -> list[Way]:
-    """The same ways, of all but the leanest ones only programs that are the best of their operations.
+def drop_candidates(ways: Sequence[SearchHistory], number: int) -> list[SearchHistory]:
+    """Return the histories, of which all but the leanest keep only the best candidate for each number of operations.
 
-    Hundreds of ways with all that they have passed would fill the memory.
+    Hundreds of whole histories would fill the memory.
 
     Args:
-        ways: In any order, which is kept.
+        ways: Histories in any order, which is kept.
         number: How many of the leanest stay whole.
     """
-    whole = {id(way) for way in leanest(ways, number)}
+    whole = {id(way) for way in find_leanest_histories(ways, number)}
     costs: dict[int, float] = {}
     for way in ways:
         for count, passed in way.visited.items():
             costs[count] = min(passed.cost, costs.get(count, np.inf))
 
-    def best(way: Way) -> Way:
+    def best(way: SearchHistory) -> SearchHistory:
         some = {count: one for count, one in way.visited.items() if one.cost <= costs[count]}
         return replace(way, visited=some)
 
     return [way if id(way) in whole else best(way) for way in ways]
 
 
-def front(ways: Iterable[Way]) -> list[Simplified]:
-    """Programs on the way that no leaner one beats, some of them, evenly spread."""
+def list_front(ways: Iterable[SearchHistory]) -> list[Simplified]:
+    """Return programs of histories that no leaner program beats, a few of them, evenly spread."""
     entries = [
         (count, max(passed.cost, _EXACT), way)
         for way in ways
         for count, passed in way.visited.items()
     ]
-    kept: list[tuple[int, Way]] = []
+    kept: list[tuple[int, SearchHistory]] = []
     least_cost = np.inf
     for count, cost, way in sorted(entries, key=lambda entry: entry[:2]):
         if cost < least_cost:
             least_cost = cost
             kept.append((count, way))
     picks = np.unique(np.linspace(0, len(kept) - 1, min(_ON_THE_WAY, len(kept))).astype(int))
-    return [way.simplified(way.visited[count]) for count, way in (kept[i] for i in picks)]
+    return [way.rebuild(way.visited[count]) for count, way in (kept[i] for i in picks)]

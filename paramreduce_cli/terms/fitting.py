@@ -1,4 +1,4 @@
-"""Values of a program's parameters that fit torques, and accelerations, and how well they do."""
+"""Fits of a program's parameters to torques and accelerations."""
 
 from __future__ import annotations
 
@@ -7,10 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.records import FloatArray, IntArray
-from paramreduce_cli.terms.likeness import Ways, alike
-from paramreduce_cli.terms.matrices import positive_definite, roots, times, whitening
+from paramreduce_cli.terms.matrices import (
+    compute_roots,
+    compute_whitening,
+    is_positive_definite,
+    multiply_triangles,
+)
 from paramreduce_cli.terms.pruning import WHOLE, Pruning
 from paramreduce_cli.terms.samples import TermSamples
+from paramreduce_cli.terms.substitutions import Substitutions, find_substitutions
 from paramreduce_cli.terms.tape import Outputs, Tape
 
 _LARGEST = 1e100
@@ -23,20 +28,20 @@ _RIDGE = 1e-13
 
 @dataclass(frozen=True)
 class Budget:
-    """Errors that are allowed."""
+    """A budget: the errors of torques and accelerations that are allowed."""
 
     torque: float
     acceleration: float
     """Infinite where accelerations do not matter; mass matrices must be positive definite even so."""
 
-    def scaled(self, factor: float) -> Budget:
-        """Return a share of it."""
+    def scale(self, factor: float) -> Budget:
+        """Return a fraction of the budget."""
         return Budget(factor * self.torque, factor * self.acceleration)
 
 
 @dataclass(frozen=True)
 class Costs:
-    """What changes of rows add to the sum of squares, to first order."""
+    """The costs of changes of rows: what they add to the sum of squares, to first order."""
 
     again: FloatArray
     """The parameters fitted again: exactly where they change by multiples of one combination of them,
@@ -60,22 +65,24 @@ class Linear:
     metric: FloatArray | None
     """Where accelerations matter, (n_dof, n_dof, n_samples)."""
 
-    def explained(self, changes: FloatArray) -> FloatArray:
-        """Squares of what the parameters make up for, (k,), of changes (k, n_rows)."""
-        return np.sum(self._coordinates(changes) ** 2, axis=1)
+    def compute_explained_squares(self, changes: FloatArray) -> FloatArray:
+        """Return the squares of what the parameters can compensate, (k,), of changes of rows, (k, n_rows)."""
+        return np.sum(self._project(changes) ** 2, axis=1)
 
-    def costs(self, changes: FloatArray, beta: FloatArray, combinations: FloatArray) -> Costs:
-        """What it costs that rows lose something.
+    def estimate_costs(
+        self, changes: FloatArray, beta: FloatArray, combinations: FloatArray
+    ) -> Costs:
+        """Return the costs of changes of rows.
 
         Args:
-            changes: What rows lose, (k, n_rows).
-            beta: The parameters that fit, (n_parameters,).
+            changes: Losses of the rows, (k, n_rows).
+            beta: Fitted parameters, (n_parameters,).
             combinations: Of the parameters that these are multiples of, zero where they are none of one,
                 (k, n_parameters).
         """
         size = np.einsum("cr,cr->c", changes, changes)
         along = changes @ self.residual
-        C = self._coordinates(changes)
+        C = self._project(changes)
         explained = np.einsum("cn,cn->c", C, C)
         plain = size + 2 * along
         again, sure = plain - explained, plain.copy()
@@ -92,14 +99,14 @@ class Linear:
         again[one] = sure[one] = e**2 - np.where(gone, 0.0, regained)
         return Costs(again, plain, sure)
 
-    def _coordinates(self, changes: FloatArray) -> FloatArray:
-        """In the orthonormal basis of the columns, (k, n_parameters)."""
+    def _project(self, changes: FloatArray) -> FloatArray:
+        """Return changes in the orthonormal basis of the columns, (k, n_parameters)."""
         return np.asarray(changes @ self.rows.T @ self.factor.T)
 
 
 @dataclass(frozen=True)
 class TermFit:
-    """What remains of a program, its parameters fitted."""
+    """A fit of a pruned program."""
 
     pruning: Pruning
     beta: FloatArray
@@ -122,7 +129,7 @@ class TermFit:
 
 
 class Fitting:
-    """Fits what remains of a program: terms are left out, nodes stand for others.
+    """A fitter of a pruned program, whose terms are removed and whose nodes are replaced.
 
     Args:
         tape: The program.
@@ -153,7 +160,8 @@ class Fitting:
         size = float(np.linalg.norm(samples.ddz / nominal[:, None]))
         self._acceleration_scale = 1 / (nominal * size)
 
-    def _inputs(self, beta: FloatArray, samples: TermSamples) -> FloatArray:
+    def _stack_inputs(self, beta: FloatArray, samples: TermSamples) -> FloatArray:
+        """Return the inputs of the program: parameters, then states, (n + n_states, n_samples)."""
         n_states, m = samples.states.shape
         inputs = np.empty((self.n + n_states, m))
         inputs[: self.n], inputs[self.n :] = beta[:, None], samples.states
@@ -169,47 +177,50 @@ class Fitting:
         """
         samples = self.samples
         needed = self.tape.needed(pruning)
-        values = self.tape.values(pruning, self._inputs(beta, samples), needed)
+        values = self.tape.values(pruning, self._stack_inputs(beta, samples), needed)
         present = self._parameters >= 0
         present[present] = pruning.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
         W[present] = self.tape.adjoints_of(
             pruning, values, samples.seeds, self._in_parameters, self._parameters[present]
         )
-        inverse = samples.inverse_masses(self.tape.outputs(values))
+        inverse = samples.invert_mass_matrices(self.tape.outputs(values))
         for _ in range(looks):
-            metric = self._metric(inverse)
-            rows = self._weighed(W, metric)
-            target = self._weighed(samples.tau[None], metric)[0]
-            beta, factor = _solved(rows, target)
+            metric = self._compute_metric(inverse)
+            rows = self._weigh(W, metric)
+            target = self._weigh(samples.tau[None], metric)[0]
+            beta, factor = _solve_normal_equations(rows, target)
             off = samples.tau - np.tensordot(beta, W, 1)
             if not samples.direct:
                 break
             # Accelerations go with the mass matrices of the fitted values.
-            values = self.tape.values(pruning, self._inputs(beta, samples), needed)
-            inverse = samples.inverse_masses(self.tape.outputs(values))
-        residual = self._weighed(off[None], metric)[0]
-        errors = self._errors(off, inverse)
-        return self._judged(pruning, beta, errors, Linear(rows, factor, residual, metric))
+            values = self.tape.values(pruning, self._stack_inputs(beta, samples), needed)
+            inverse = samples.invert_mass_matrices(self.tape.outputs(values))
+        residual = self._weigh(off[None], metric)[0]
+        errors = self._compute_errors(off, inverse)
+        return self._evaluate(pruning, beta, errors, Linear(rows, factor, residual, metric))
 
-    def _judged(
+    def _evaluate(
         self, pruning: Pruning, beta: FloatArray, errors: tuple[float, float], linear: Linear
     ) -> TermFit:
-        shares = self._shares(errors)
+        """Return the fit with its cost, its worst ratio to the budget, and whether it is within the budget."""
+        shares = self._compute_ratios(errors)
         cost = float(np.sum(np.minimum(shares, _LARGEST) ** 2))
         strain = cost
         if self._watched is not None and max(shares) <= 1.0:
-            watched = self._shares(self.errors(pruning, beta, self._watched))
+            watched = self._compute_ratios(self.compute_errors(pruning, beta, self._watched))
             strain += float(np.sum(np.minimum(watched, _LARGEST) ** 2))
             shares += watched
         if self._poses is not None and max(shares) <= 1.0:
-            masses = self._poses.mass_matrices(self._outputs(pruning, beta, self._poses))
-            if not positive_definite(masses):
+            masses = self._poses.build_mass_matrices(
+                self._compute_outputs(pruning, beta, self._poses)
+            )
+            if not is_positive_definite(masses):
                 shares.append(np.inf)
         return TermFit(pruning, beta, *errors, cost, strain, float(np.max(shares)), linear)
 
-    def _shares(self, errors: tuple[float, float]) -> list[float]:
-        """Errors over the allowed ones."""
+    def _compute_ratios(self, errors: tuple[float, float]) -> list[float]:
+        """Return the errors over the allowed ones."""
         torque, acceleration = errors
         if not self.samples.direct:
             return [torque / self.budget.torque]
@@ -217,8 +228,8 @@ class Fitting:
         share = np.inf if np.isinf(acceleration) else acceleration / self.budget.acceleration
         return [torque / self.budget.torque, share]
 
-    def _errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
-        """Of torques and of accelerations, from differences of torques."""
+    def _compute_errors(self, off: FloatArray, inverse: FloatArray | None) -> tuple[float, float]:
+        """Return the errors of torques and of accelerations from differences of torques."""
         torque = float(np.linalg.norm(off * self._torque_scale[:, None]))
         if not self.samples.direct:
             return torque, np.nan
@@ -227,64 +238,67 @@ class Fitting:
         caused = np.einsum("mij,jm->im", inverse, off) * self._acceleration_scale[:, None]
         return torque, float(np.linalg.norm(caused))
 
-    def errors(
+    def compute_errors(
         self, pruning: Pruning, beta: FloatArray, samples: TermSamples
     ) -> tuple[float, float]:
-        """Errors of torques and of accelerations on other samples."""
-        return samples.errors(self._outputs(pruning, beta, samples))
+        """Return the errors of torques and of accelerations on other samples."""
+        return samples.compute_errors(self._compute_outputs(pruning, beta, samples))
 
-    def _outputs(self, pruning: Pruning, beta: FloatArray, samples: TermSamples) -> Outputs:
-        """Of the program."""
-        values = self.tape.values(pruning, self._inputs(beta, samples), self.tape.needed(pruning))
+    def _compute_outputs(self, pruning: Pruning, beta: FloatArray, samples: TermSamples) -> Outputs:
+        """Return the outputs of the program."""
+        values = self.tape.values(
+            pruning, self._stack_inputs(beta, samples), self.tape.needed(pruning)
+        )
         return self.tape.outputs(values)
 
-    def effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
-        """What the rows of a fit lose with each term, (n_candidates, n_rows)."""
-        values, own, adjoints = self._derived(fit)
+    def compute_effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
+        """Return what the rows of a fit lose with each term, (n_candidates, n_rows)."""
+        values, own, adjoints = self._differentiate(fit)
         found = self.tape.effects(fit.pruning, candidates, values, own, adjoints)
-        return self._weighed(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
+        return self._weigh(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
-    def stand_ins(self, fit: TermFit) -> tuple[Ways, FloatArray, FloatArray]:
-        """Nodes that could stand for others, and what :meth:`Ways.changes` wants to know.
-
-        That is the values of all nodes, and the weighed derivatives of the torques by them.
+    def list_substitutions(self, fit: TermFit) -> tuple[Substitutions, FloatArray, FloatArray]:
+        """Return the substitutions of nodes by others, with the arguments of :meth:`Substitutions.estimate_changes`:
+        the values of all nodes, and the weighted derivatives of the torques by them.
         """
-        values, _, adjoints = self._derived(fit)
-        pulls = self._weighed(adjoints, fit.linear.metric).reshape(adjoints.shape)
+        values, _, adjoints = self._differentiate(fit)
+        pulls = self._weigh(adjoints, fit.linear.metric).reshape(adjoints.shape)
         itself = fit.pruning.kept[:, WHOLE] & (fit.pruning.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
-        ways = alike(values, pulls, residual, self._made & itself, self._in_parameters)
+        ways = find_substitutions(values, pulls, residual, self._made & itself, self._in_parameters)
         constants = self.tape.constants()
-        return ways.with_ones(constants[itself[constants]]), values, pulls
+        return ways.add_ones(constants[itself[constants]]), values, pulls
 
-    def _derived(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Values of the nodes, what they would be, and derivatives of the torques by them."""
-        inputs, everywhere = self._inputs(fit.beta, self.samples), np.ones(self.tape.size, np.bool_)
+    def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return values of nodes, values without pruning, and derivatives of the torques by nodes."""
+        inputs, everywhere = (
+            self._stack_inputs(fit.beta, self.samples),
+            np.ones(self.tape.size, np.bool_),
+        )
         values = self.tape.values(fit.pruning, inputs, everywhere)
         adjoints = self.tape.adjoints(fit.pruning, values, self.samples.seeds, everywhere)
         return values, self.tape.own_values(fit.pruning, inputs, values), adjoints
 
-    def _metric(self, inverse: FloatArray | None) -> FloatArray | None:
-        """Square roots of the quadratic forms that take differences of torques to the cost.
-
-        None where only torques matter, whose form is diagonal; (n_dof, n_dof, n_samples).
+    def _compute_metric(self, inverse: FloatArray | None) -> FloatArray | None:
+        """Return square roots of the quadratic forms that take differences of torques to the cost, (n_dof, n_dof,
+        n_samples); None if only torques matter, whose form is diagonal.
         """
         if inverse is None or np.isinf(self.budget.acceleration):
             return None
         caused = inverse * (self._acceleration_scale / self.budget.acceleration)[:, None]
-        return roots(caused, self._torque_scale / self.budget.torque)
+        return compute_roots(caused, self._torque_scale / self.budget.torque)
 
-    def _weighed(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
-        """Torques as they enter the cost, (k, n_rows)."""
+    def _weigh(self, torques: FloatArray, metric: FloatArray | None) -> FloatArray:
+        """Return torques as they enter the cost, (k, n_rows)."""
         if metric is None:
             scaled = torques * (self._torque_scale / self.budget.torque)[:, None]
         else:
-            scaled = times(metric, np.ascontiguousarray(torques))
+            scaled = multiply_triangles(metric, np.ascontiguousarray(torques))
         return scaled.reshape(torques.shape[0], -1)
 
 
-def _solved(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Least squares by the normal equations of unit columns, as quick as a search needs.
+def _solve_normal_equations(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return least-squares parameters by the normal equations of unit columns, which are fast.
 
     Args:
         rows: Transposed, (n_parameters, n_rows).
@@ -293,5 +307,5 @@ def _solved(rows: FloatArray, target: FloatArray) -> tuple[FloatArray, FloatArra
     Returns:
         The parameters, and the inverse of the triangular factor of their Gram matrix.
     """
-    factor = whitening(rows @ rows.T, _RIDGE)
+    factor = compute_whitening(rows @ rows.T, _RIDGE)
     return factor.T @ (factor @ (rows @ target)), factor

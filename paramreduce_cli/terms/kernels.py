@@ -1,4 +1,4 @@
-"""What a :class:`paramreduce_cli.terms.tape.Tape` computes again and again, compiled by Numba.
+"""Kernels of :class:`paramreduce_cli.terms.tape.Tape`, compiled by Numba.
 
 Each takes the program before pruning, and the pruning.
 """
@@ -30,8 +30,8 @@ SEVERAL = -2
 
 
 @compiled()
-def needed(program: Instructions, pruning: Pruning) -> BoolArray:
-    """Nodes that outputs are made of, (n_nodes,)."""
+def find_live_nodes(program: Instructions, pruning: Pruning) -> BoolArray:
+    """Return the nodes that the outputs depend on, (n_nodes,)."""
     codes, operands = program.codes, program.operands
     kept, source = pruning.kept, pruning.source
     used = np.zeros(codes.size, dtype=np.bool_)
@@ -52,14 +52,14 @@ def needed(program: Instructions, pruning: Pruning) -> BoolArray:
 
 
 @inlined
-def _multiple(factor: float, values: FloatArray, result: FloatArray) -> None:
-    """A vector times a factor; assigned as a whole it takes Numba seconds to compile that shapes are compared."""
+def _multiply(factor: float, values: FloatArray, result: FloatArray) -> None:
+    """Write a vector times a factor; assigning it as a whole takes Numba seconds to compile, as shapes are compared."""
     for i in range(result.size):
         result[i] = factor * values[i]
 
 
 @compiled(within=True)
-def _made(
+def _evaluate_node(
     k: int,
     program: Instructions,
     pruning: Pruning,
@@ -67,7 +67,7 @@ def _made(
     v: FloatArray,
     result: FloatArray,
 ) -> None:
-    """What node k makes of its operands."""
+    """Write the value of node k, computed from its operands."""
     codes, operands = program.codes, program.operands
     numbers, kept = program.numbers, pruning.kept
     code, m = codes[k], inputs.shape[1]
@@ -77,7 +77,7 @@ def _made(
     if code == CONSTANT:
         result[:] = numbers[k]
     elif code == INPUT:
-        _multiple(1.0, inputs[int(numbers[k])], result)
+        _multiply(1.0, inputs[int(numbers[k])], result)
     elif code == SUM:
         if not kept[k, FIRST]:
             s = 0.0
@@ -102,38 +102,38 @@ def _made(
 
 
 @compiled()
-def values(
+def evaluate(
     program: Instructions, pruning: Pruning, inputs: FloatArray, which: BoolArray
 ) -> FloatArray:
-    """Of the nodes that are asked for, zero for others, (n_nodes, n_samples)."""
+    """Return the values of the nodes asked for, zero for others, (n_nodes, n_samples)."""
     kept, source, factor = pruning
     v = np.zeros((program.codes.size, inputs.shape[1]))
     for k in range(program.codes.size):
         if not which[k] or not kept[k, WHOLE]:
             continue
         if source[k] == k:
-            _made(k, program, pruning, inputs, v, v[k])
+            _evaluate_node(k, program, pruning, inputs, v, v[k])
         elif source[k] == NUMBER:
             v[k] = factor[k]
         else:
-            _multiple(factor[k], v[source[k]], v[k])
+            _multiply(factor[k], v[source[k]], v[k])
     return v
 
 
 @compiled()
-def own_values(
+def evaluate_unreplaced(
     program: Instructions, pruning: Pruning, inputs: FloatArray, v: FloatArray
 ) -> FloatArray:
-    """What nodes would be if they were kept as they are, (n_nodes, n_samples)."""
+    """Return the values that nodes would have if they were kept, (n_nodes, n_samples)."""
     own = np.empty(v.shape)
     for k in range(program.codes.size):
-        _made(k, program, pruning, inputs, v, own[k])
+        _evaluate_node(k, program, pruning, inputs, v, own[k])
     return own
 
 
 @inlined
-def _reach(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
-    """Have derivatives be zero before anything is added to them."""
+def _clear_first(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
+    """Set derivatives to zero before something is added for the first time."""
     if not reached[q]:
         reached[q] = True
         for i in range(derivatives.size):
@@ -141,10 +141,10 @@ def _reach(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
 
 
 @compiled()
-def adjoints(
+def accumulate_adjoints(
     program: Instructions, pruning: Pruning, v: FloatArray, seeds: FloatArray, which: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
-    """Derivatives by the nodes that are asked for.
+    """Return the derivatives by the nodes asked for.
 
     Returns:
         Derivatives, (n_nodes, n_quantities, n_samples), and which of them there are, (n_nodes, n_quantities): to
@@ -163,7 +163,7 @@ def adjoints(
         s = -1.0 if outputs[o] & 1 else 1.0
         for q in range(quantities):
             if np.any(seeds[o, q]):
-                _reach(found[k, q], reached[k], q)
+                _clear_first(found[k, q], reached[k], q)
                 for i in range(m):
                     found[k, q, i] += s * seeds[o, q, i]
     for k in range(n - 1, -1, -1):
@@ -178,29 +178,29 @@ def adjoints(
                 continue
             if source[k] != k:
                 if which[source[k]]:
-                    _reach(found[source[k], q], reached[source[k]], q)
+                    _clear_first(found[source[k], q], reached[source[k]], q)
                     for i in range(m):
                         found[source[k], q, i] += factor[k] * found[k, q, i]
             elif code == SUM:
                 if kept[k, FIRST] and which[a]:
-                    _reach(found[a, q], reached[a], q)
+                    _clear_first(found[a, q], reached[a], q)
                     for i in range(m):
                         found[a, q, i] += s * found[k, q, i]
                 if kept[k, SECOND] and which[b]:
-                    _reach(found[b, q], reached[b], q)
+                    _clear_first(found[b, q], reached[b], q)
                     for i in range(m):
                         found[b, q, i] += t * found[k, q, i]
             elif code == PRODUCT:
                 if which[a]:
-                    _reach(found[a, q], reached[a], q)
+                    _clear_first(found[a, q], reached[a], q)
                     for i in range(m):
                         found[a, q, i] += s * t * found[k, q, i] * v[b, i]
                 if which[b]:
-                    _reach(found[b, q], reached[b], q)
+                    _clear_first(found[b, q], reached[b], q)
                     for i in range(m):
                         found[b, q, i] += s * t * found[k, q, i] * v[a, i]
             elif code != SIGN and which[a]:
-                _reach(found[a, q], reached[a], q)
+                _clear_first(found[a, q], reached[a], q)
                 for i in range(m):
                     x = s * v[a, i]
                     if code == SIN:
@@ -214,7 +214,7 @@ def adjoints(
 
 
 @compiled()
-def effects(
+def compute_effects(
     program: Instructions,
     pruning: Pruning,
     candidates: IntArray,
@@ -222,7 +222,7 @@ def effects(
     own: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
-    """What terms give to quantities, (n_candidates, n_quantities n_samples)."""
+    """Return what terms contribute to quantities, (n_candidates, n_quantities n_samples)."""
     operands = program.operands
     kept, source, factor = pruning
     _, quantities, m = adjoints.shape
@@ -234,17 +234,17 @@ def effects(
         given[:] = 0.0
         if what == WHOLE:
             if source[k] == k:
-                _multiple(1.0, own[k], given)
+                _multiply(1.0, own[k], given)
             elif source[k] == NUMBER:
                 given[:] = factor[k]
             else:
-                _multiple(factor[k], v[source[k]], given)
+                _multiply(factor[k], v[source[k]], given)
         elif what == ITSELF:
             if kept[k, WHOLE]:
                 for i in range(m):
                     given[i] = own[k, i] - v[k, i]
         elif kept[k, WHOLE] and source[k] == k:
-            _multiple(-1.0 if operands[k, what] & 1 else 1.0, v[operands[k, what] >> 1], given)
+            _multiply(-1.0 if operands[k, what] & 1 else 1.0, v[operands[k, what] >> 1], given)
         for q in range(quantities):
             for i in range(m):
                 result[c, q * m + i] = adjoints[k, q, i] * given[i]
@@ -252,8 +252,10 @@ def effects(
 
 
 @compiled()
-def combinations(program: Instructions, pruning: Pruning, n: int) -> tuple[IntArray, FloatArray]:
-    """Of which linear combination of the first n inputs nodes are a multiple.
+def find_combinations(
+    program: Instructions, pruning: Pruning, n: int
+) -> tuple[IntArray, FloatArray]:
+    """Return the linear combinations of the first n inputs of which nodes are multiples.
 
     Returns:
         Nodes that are such combinations, NONE or SEVERAL, (n_nodes,); coefficients where a node is one,
@@ -273,7 +275,7 @@ def combinations(program: Instructions, pruning: Pruning, n: int) -> tuple[IntAr
             number[k] = factor[k]
         elif source[k] != k:
             found[k] = found[source[k]]
-            _multiple(factor[k], coefficients[source[k]], coefficients[k])
+            _multiply(factor[k], coefficients[source[k]], coefficients[k])
         elif code == CONSTANT:
             number[k] = numbers[k]
         elif code == INPUT and numbers[k] < n:
@@ -311,8 +313,8 @@ def combinations(program: Instructions, pruning: Pruning, n: int) -> tuple[IntAr
 
 
 @compiled()
-def count(program: Instructions, pruning: Pruning) -> int:
-    """Operations that are left."""
+def count_operations(program: Instructions, pruning: Pruning) -> int:
+    """Return the number of operations that are left."""
     codes, operands = program.codes, program.operands
     kept, source, factor = pruning
     n = codes.size
@@ -369,8 +371,8 @@ def count(program: Instructions, pruning: Pruning) -> int:
 
 
 @compiled()
-def counts(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
-    """The same with one more term the other way round, (n_candidates,)."""
+def count_flipped(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
+    """Return the number of operations left with one more term the other way round, (n_candidates,)."""
     kept, source, factor = pruning
     result = np.empty(candidates.shape[0], dtype=np.int64)
     changed, sources = kept.copy(), source.copy()
@@ -380,7 +382,7 @@ def counts(program: Instructions, pruning: Pruning, candidates: IntArray) -> Int
             sources[k] = k
         else:
             changed[k, what] = not changed[k, what]
-        result[c] = count(program, Pruning(changed, sources, factor))
+        result[c] = count_operations(program, Pruning(changed, sources, factor))
         if what == ITSELF:
             sources[k] = source[k]
         else:
@@ -389,20 +391,20 @@ def counts(program: Instructions, pruning: Pruning, candidates: IntArray) -> Int
 
 
 @compiled()
-def counts_standing(
+def count_replaced(
     program: Instructions,
     pruning: Pruning,
     nodes: IntArray,
     standing_for: IntArray,
     times: FloatArray,
 ) -> IntArray:
-    """The same with one more node standing for another one, (n_ways,)."""
+    """Return the number of operations left with one more node replaced, (n_ways,)."""
     kept, source, factor = pruning
     result = np.empty(nodes.size, dtype=np.int64)
     sources, factors = source.copy(), factor.copy()
     for c in range(nodes.size):
         k = nodes[c]
         sources[k], factors[k] = standing_for[c], times[c]
-        result[c] = count(program, Pruning(kept, sources, factors))
+        result[c] = count_operations(program, Pruning(kept, sources, factors))
         sources[k], factors[k] = source[k], factor[k]
     return result

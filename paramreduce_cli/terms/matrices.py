@@ -1,4 +1,4 @@
-"""Symmetric matrices of a few rows, mostly one for each sample: what a search does thousands of times."""
+"""Small symmetric matrices, mostly one for each sample, for computations that a search repeats thousands of times."""
 
 from __future__ import annotations
 
@@ -11,23 +11,23 @@ _SINGULAR = 1e-14
 """Pivot over the diagonal element it comes from, below which a matrix has no inverse but for rounding."""
 
 
-def inverses(matrices: FloatArray) -> FloatArray | None:
-    """Inverses of positive definite matrices; None where one of them is not.
+def invert(matrices: FloatArray) -> FloatArray | None:
+    """Return the inverses of positive definite matrices, or None if one is not positive definite.
 
     Args:
-        matrices: (n_samples, n, n)
+        matrices: Symmetric matrices, (n_samples, n, n).
     """
-    found, positive = _inverses(matrices)
+    found, positive = _invert(matrices)
     return found if positive else None
 
 
-def positive_definite(matrices: FloatArray) -> bool:
-    """Whether all matrices are, (n_samples, n, n)."""
-    return bool(_positive_definite(matrices))
+def is_positive_definite(matrices: FloatArray) -> bool:
+    """Return whether all matrices are positive definite, (n_samples, n, n)."""
+    return bool(_is_positive_definite(matrices))
 
 
-def roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
-    """Upper triangles R with R' R = F' F + diag(w^2), samples last, (n, n, n_samples).
+def compute_roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
+    """Return upper triangles R with R' R = F' F + diag(w^2), samples last, (n, n, n_samples).
 
     Args:
         factors: F, (n_samples, n, n).
@@ -43,8 +43,8 @@ def roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
 
 
 @compiled()
-def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Upper triangles times vectors, sample by sample.
+def multiply_triangles(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return upper triangles times vectors, sample by sample.
 
     Args:
         triangles: As :func:`roots` gives them, (n, n, n_samples).
@@ -64,8 +64,8 @@ def times(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
 
 
 @compiled()
-def whitening(gram: FloatArray, ridge: float) -> FloatArray:
-    """The lower triangle that times columns makes them orthonormal, from their products with each other, (n, n).
+def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
+    """Return the lower triangle that makes columns orthonormal, from their Gram matrix, (n, n).
 
     Args:
         gram: (n, n)
@@ -95,8 +95,8 @@ def whitening(gram: FloatArray, ridge: float) -> FloatArray:
 
 
 @compiled(within=True)
-def _factored(matrix: FloatArray, lower: FloatArray) -> bool:
-    """The lower triangle by Cholesky; whether there is one."""
+def _factorise(matrix: FloatArray, lower: FloatArray) -> bool:
+    """Write the lower triangle by Cholesky, and return whether there is one."""
     n = matrix.shape[0]
     for i in range(n):
         least = _SINGULAR * matrix[i, i]
@@ -114,21 +114,23 @@ def _factored(matrix: FloatArray, lower: FloatArray) -> bool:
 
 
 @compiled()
-def _positive_definite(matrices: FloatArray) -> bool:
+def _is_positive_definite(matrices: FloatArray) -> bool:
+    """Return whether all matrices have a Cholesky factor."""
     lower = np.empty(matrices.shape[1:])
     s = 0
-    while s < matrices.shape[0] and _factored(matrices[s], lower):
+    while s < matrices.shape[0] and _factorise(matrices[s], lower):
         s += 1
     return s == matrices.shape[0]
 
 
 @compiled()
-def _inverses(matrices: FloatArray) -> tuple[FloatArray, bool]:
+def _invert(matrices: FloatArray) -> tuple[FloatArray, bool]:
+    """Return the inverses, and whether all matrices are positive definite."""
     m, n, _ = matrices.shape
     result = np.zeros((m, n, n))
     lower = np.empty((n, n))
     for s in range(m):
-        if not _factored(matrices[s], lower):
+        if not _factorise(matrices[s], lower):
             return result, False
         for i in range(n):  # the inverse of the triangle, in place
             lower[i, i] = 1 / lower[i, i]

@@ -29,7 +29,7 @@ class Instructions(NamedTuple):
 
 
 class Pruning(NamedTuple):
-    """Which terms of a program remain, and which nodes are replaced by others."""
+    """A pruning of a program: which terms remain, and which nodes are replaced by others."""
 
     kept: BoolArray
     """Whether the first operand, the second operand (both matter to sums alone) and the node itself are kept, (n_nodes, 3)."""
@@ -39,7 +39,7 @@ class Pruning(NamedTuple):
     """Factor of the node that replaces it, or the number, (n_nodes,)."""
 
     @classmethod
-    def nothing(cls, size: int) -> Pruning:
+    def keep_all(cls, size: int) -> Pruning:
         """Return the pruning that keeps all of so many nodes."""
         return cls(np.ones((size, 3), dtype=np.bool_), np.arange(size), np.ones(size))
 

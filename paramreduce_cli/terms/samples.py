@@ -1,4 +1,4 @@
-"""States, and how torques and mass matrices follow from what a program gives for them."""
+"""Samples to fit programs to, with the maps from outputs to torques and mass matrices."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 from paramreduce_cli.expressions.loops import compiled
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
-from paramreduce_cli.terms.matrices import inverses
+from paramreduce_cli.terms.matrices import invert
 from paramreduce_cli.terms.tape import Outputs
 
 
 @dataclass(frozen=True)
 class TermSamples:
-    """Samples on which a program is fitted."""
+    """A set of samples on which a program is fitted."""
 
     states: FloatArray
     """Inputs of the program after its parameters, (n_states, n_samples)."""
@@ -37,8 +37,8 @@ class TermSamples:
     nominal_acceleration: FloatArray
     """(n_dof,)"""
 
-    def some(self, which: BoolArray) -> TermSamples:
-        """Those that are marked, (n_samples,)."""
+    def select(self, which: BoolArray) -> TermSamples:
+        """Return the marked samples, (n_samples,)."""
         return replace(
             self,
             states=np.ascontiguousarray(self.states[:, which]),
@@ -65,7 +65,7 @@ class TermSamples:
 
     @cached_property
     def _across(self) -> FloatArray | None:
-        """The tangent, samples last, (n, n_dof, n_samples)."""
+        """Tangent with samples last, (n, n_dof, n_samples); None without loops."""
         return (
             None if self.tangent is None else np.ascontiguousarray(np.moveaxis(self.tangent, 0, 2))
         )
@@ -75,8 +75,8 @@ class TermSamples:
         """Rows and columns of the entries of M that a program gives, (n_entries,) each; none for torques."""
         return np.tril_indices(len(self.ddq) if self.direct else 0)
 
-    def differences(self, outputs: Outputs) -> FloatArray:
-        """Torques to be met less those of a program, (n_dof, n_samples)."""
+    def compute_residuals(self, outputs: Outputs) -> FloatArray:
+        """Return the torques minus those of a program, (n_dof, n_samples)."""
         rows, columns = self._places
         torques = np.zeros(self.ddq.shape)
         for place, value in zip(outputs.places.tolist(), outputs.values, strict=True):
@@ -92,40 +92,38 @@ class TermSamples:
         result: FloatArray = self.tau - torques
         return result
 
-    def mass_matrices(self, outputs: Outputs) -> FloatArray:
-        """Of the independent coordinates, (n_samples, n_dof, n_dof)."""
+    def build_mass_matrices(self, outputs: Outputs) -> FloatArray:
+        """Return the mass matrices of the independent coordinates, (n_samples, n_dof, n_dof)."""
         rows, columns = self._places
         number = int(np.searchsorted(outputs.places, rows.size))
         lower, places = outputs.values[:number], outputs.places[:number]
         if self._across is None:
-            return np.asarray(_mirrored(lower, rows[places], columns[places], len(self.ddq)))
-        return np.asarray(_projected(lower, rows[places], columns[places], self._across))
+            return np.asarray(_build_symmetric(lower, rows[places], columns[places], len(self.ddq)))
+        return np.asarray(_project_symmetric(lower, rows[places], columns[places], self._across))
 
-    def inverse_masses(self, outputs: Outputs) -> FloatArray | None:
-        """Inverses of the mass matrices, (n_samples, n_dof, n_dof).
-
-        None for the inverse dynamics, or where a matrix is not positive definite.
+    def invert_mass_matrices(self, outputs: Outputs) -> FloatArray | None:
+        """Return the inverses of the mass matrices, (n_samples, n_dof, n_dof); None for the inverse dynamics, or if a
+        matrix is not positive definite.
         """
         if not self.direct:
             return None
-        return inverses(self.mass_matrices(outputs))
+        return invert(self.build_mass_matrices(outputs))
 
-    def errors(self, outputs: Outputs) -> tuple[float, float]:
-        """Normalised errors of torques and of accelerations [Ros2019].
+    def compute_errors(self, outputs: Outputs) -> tuple[float, float]:
+        """Return the normalised errors of torques and of accelerations [Ros2019].
 
-        The latter is infinite where a mass matrix is not positive definite, and not a number where
-        accelerations do not matter.
+        The latter is infinite if a mass matrix is not positive definite, and NaN if accelerations do not matter.
         """
-        return errors_over([(self, outputs)])
+        return compute_joint_errors([(self, outputs)])
 
 
-def errors_over(parts: Iterable[tuple[TermSamples, Outputs]]) -> tuple[float, float]:
-    """The same over several parts of a set together, each with the outputs on it."""
+def compute_joint_errors(parts: Iterable[tuple[TermSamples, Outputs]]) -> tuple[float, float]:
+    """Return the errors over several parts of a set together, each with its outputs."""
     squares = np.zeros(4)
     for part, given in parts:
-        off, weights = part.differences(given), part.nominal_torque[:, None]
+        off, weights = part.compute_residuals(given), part.nominal_torque[:, None]
         squares[:2] += np.sum((off / weights) ** 2), np.sum((part.tau / weights) ** 2)
-        inverse = part.inverse_masses(given)
+        inverse = part.invert_mass_matrices(given)
         if not part.direct:
             squares[2:] = np.nan
             continue
@@ -141,8 +139,8 @@ def errors_over(parts: Iterable[tuple[TermSamples, Outputs]]) -> tuple[float, fl
 
 
 @compiled()
-def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray, n: int) -> FloatArray:
-    """Symmetric matrices, (n_samples, n, n), of some entries of their lower triangles, (n_entries, n_samples)."""
+def _build_symmetric(lower: FloatArray, rows: IntArray, columns: IntArray, n: int) -> FloatArray:
+    """Return symmetric matrices, (n_samples, n, n), from some entries of their lower triangles, (n_entries, n_samples)."""
     count = lower.shape[1]
     result = np.zeros((count, n, n))
     for m in range(count):
@@ -152,10 +150,10 @@ def _mirrored(lower: FloatArray, rows: IntArray, columns: IntArray, n: int) -> F
 
 
 @compiled()
-def _projected(
+def _project_symmetric(
     lower: FloatArray, rows: IntArray, columns: IntArray, across: FloatArray
 ) -> FloatArray:
-    """J^T M J of symmetric matrices, most of whose entries are zero, (n_samples, n_dof, n_dof).
+    """Return J^T M J of symmetric matrices with mostly zero entries, (n_samples, n_dof, n_dof).
 
     Args:
         lower: Some entries of their lower triangles, (n_entries, n_samples).
@@ -189,7 +187,7 @@ def _projected(
     return result
 
 
-def term_samples(
+def make_samples(
     mechanism: Mechanism,
     blocks: Iterable[Block],
     nominal_torque: FloatArray,
@@ -199,10 +197,10 @@ def term_samples(
     projected: bool,
     coordinates: Coordinates | None = None,
 ) -> TermSamples:
-    """Samples for the inverse or the direct dynamics.
+    """Return samples for the inverse or the direct dynamics.
 
     Args:
-        mechanism: The mechanism.
+        mechanism: Mechanism of the robot.
         blocks: States and torques.
         nominal_torque: (n_dof,)
         nominal_acceleration: (n_dof,)

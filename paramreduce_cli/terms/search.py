@@ -1,4 +1,4 @@
-"""Which terms to leave out, greedily.
+"""Greedy removal of terms, then replacement of nodes by multiples of others or by numbers.
 
 Where no term can go any more, a node may still stand for a multiple of another one, or for a number.
 """
@@ -42,7 +42,7 @@ class Step:
 
 
 class TermSearch:
-    """Leaves terms of one program out, and lets nodes stand for others.
+    """A search that removes terms of one program, and replaces nodes by others.
 
     Args:
         fitting: Fits the program.
@@ -61,17 +61,17 @@ class TermSearch:
         self._rng = np.random.default_rng(seed)
 
     def start(self, beta: FloatArray) -> Step:
-        """With all terms."""
+        """Return the first step, with all terms."""
         return self._step(self._fitting.fit(self.tape.everything(), beta, looks=2))
 
-    def descended(
+    def descend(
         self,
         step: Step,
         visit: Callable[[Step], None] = lambda _: None,
         noise: float = 0.0,
         until: int = 0,
     ) -> Step:
-        """Leave terms out until any more would exceed the budget, or few enough operations are left.
+        """Remove terms until any further one would exceed the budget, or few enough operations are left.
 
         Args:
             step: Where to start.
@@ -81,17 +81,19 @@ class TermSearch:
         """
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
         while step.count > until:
-            following = self._next(step, weights, _TRIED) or self._stand_in(step, weights)
+            following = self._remove_cheapest(step, weights, _TRIED) or self._substitute(
+                step, weights
+            )
             if following is None and noise == 0:
-                following = self._next(step, weights, _TRIED_LAST)
+                following = self._remove_cheapest(step, weights, _TRIED_LAST)
             if following is None:
                 return step
             step = following
             visit(step)
         return step
 
-    def mended(self, pruning: Pruning, beta: FloatArray) -> Step:
-        """What is left of a program, with as many terms put back as errors need to be allowed, if that is enough.
+    def restore_budget(self, pruning: Pruning, beta: FloatArray) -> Step:
+        """Put back as many terms as errors need to be within the budget, if that is enough.
 
         Args:
             pruning: Of the program.
@@ -100,23 +102,23 @@ class TermSearch:
         fit = self._fitting.fit(pruning, beta, looks=2)
         back: list[int] = []
         while not fit.within:
-            number = self._most_helpful(fit, back)
+            number = self._find_most_helpful(fit, back)
             if number is None:
                 break
             back.append(number)
-            fit = self._with(fit, self._candidates[number][None])
+            fit = self._fit_flipped(fit, self._candidates[number][None])
         return self._step(fit)
 
-    def _next(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
-        """The program with the cheapest terms left out, None if all are too dear."""
+    def _remove_cheapest(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
+        """Return the program with the cheapest terms removed, or None if all are too costly."""
         fit = step.fit
-        numbers, saved = self._useful(step)
+        numbers, saved = self._find_useful(step)
         if not numbers.size:
             return None
         live, saved = self._candidates[numbers], saved / weights[numbers]
         tried = []
-        costs = self._costs(fit, live)
-        several = self._several(step, live, costs.sure, saved)
+        costs = self._estimate_costs(fit, live)
+        several = self._remove_several(step, live, costs.sure, saved)
         if several is not None:
             return several
         lists = [
@@ -124,7 +126,7 @@ class TermSearch:
             for cost in (costs.again, costs.plain)
         ]
         for number in np.unique(np.concatenate(lists)):
-            changed = self._with(fit, live[number : number + 1])
+            changed = self._fit_flipped(fit, live[number : number + 1])
             if changed.within:
                 tried.append(((changed.strain - fit.strain) / saved[number], number, changed))
         if not tried:
@@ -134,15 +136,15 @@ class TermSearch:
         chosen = [number]
         for _, number, alone in tried[1:_AT_ONCE]:
             expected = best.strain + max(alone.strain - fit.strain, 0.0) * _SUM_HOLDS
-            changed = self._with(fit, live[[*chosen, number]])
+            changed = self._fit_flipped(fit, live[[*chosen, number]])
             if changed.within and changed.strain <= expected:
                 best, chosen = changed, [*chosen, number]
         return self._step(best)
 
-    def _several(
+    def _remove_several(
         self, step: Step, live: IntArray, costs: FloatArray, saved: FloatArray
     ) -> Step | None:
-        """The program without all the terms that cost little together, None if they are few.
+        """Return the program without all terms that cost little together, or None if they are few.
 
         Args:
             step: Where to start.
@@ -156,35 +158,35 @@ class TermSearch:
         little = min(_LITTLE * (1 - fit.excess**2), max(_RISE * fit.excess**2, _LEAST))
         size = int(np.searchsorted(expected, little, side="right"))
         while size > 1:
-            changed = self._with(fit, live[order[:size]])
+            changed = self._fit_flipped(fit, live[order[:size]])
             if changed.within and changed.strain - fit.strain <= _MISJUDGED * little:
                 return self._step(changed)
             size //= 2
         return None
 
-    def _stand_in(self, step: Step, weights: FloatArray) -> Step | None:
-        """The program with one node that stands for another one, None if all are too dear."""
+    def _substitute(self, step: Step, weights: FloatArray) -> Step | None:
+        """Return the program with one node replaced by another, or None if all substitutions are too costly."""
         fit = step.fit
-        ways, values, pulls = self._fitting.stand_ins(fit)
+        ways, values, pulls = self._fitting.list_substitutions(fit)
         counts = self.tape.counts_standing(fit.pruning, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero(counts < step.count)
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
         none = np.zeros((len(useful), self._fitting.n))
-        costs = fit.linear.costs(ways.changes(values, pulls), fit.beta, none)
+        costs = fit.linear.estimate_costs(ways.estimate_changes(values, pulls), fit.beta, none)
         lists = [
             np.argsort(cost * own / saved, kind="stable")[:_TRIED]
             for cost in (costs.again, costs.plain)
         ]
         tried = []
         for place in np.unique(np.concatenate(lists)):
-            changed = self._fitting.fit(fit.pruning.replace(*ways.one(place)), fit.beta)
+            changed = self._fitting.fit(fit.pruning.replace(*ways.get(place)), fit.beta)
             if changed.within:
                 tried.append(((changed.strain - fit.strain) / saved[place], place, changed))
         return self._step(min(tried, key=lambda entry: entry[:2])[2]) if tried else None
 
-    def _useful(self, step: Step) -> tuple[IntArray, FloatArray]:
-        """Numbers of terms without which there are fewer operations, and how many fewer."""
+    def _find_useful(self, step: Step) -> tuple[IntArray, FloatArray]:
+        """Return the numbers of terms whose removal saves operations, and the operations saved."""
         pruning = step.fit.pruning
         # That a node is itself is no term to be left out: see stand-ins.
         numbers = np.flatnonzero(self._droppable & pruning.has(self._candidates))
@@ -194,17 +196,19 @@ class TermSearch:
     def _step(self, fit: TermFit) -> Step:
         return Step(fit, self.tape.count(fit.pruning))
 
-    def _with(self, fit: TermFit, flip: IntArray) -> TermFit:
-        """Fitted with some terms the other way round."""
+    def _fit_flipped(self, fit: TermFit, flip: IntArray) -> TermFit:
+        """Return the fit with some terms the other way round."""
         return self._fitting.fit(fit.pruning.flip(flip), fit.beta)
 
-    def _costs(self, fit: TermFit, live: IntArray) -> Costs:
-        """What leaving each term out costs."""
+    def _estimate_costs(self, fit: TermFit, live: IntArray) -> Costs:
+        """Return the costs of removing each term."""
         combinations = self.tape.combinations(fit.pruning, live, self._fitting.n)
-        return fit.linear.costs(self._fitting.effects(fit, live), fit.beta, combinations)
+        return fit.linear.estimate_costs(
+            self._fitting.compute_effects(fit, live), fit.beta, combinations
+        )
 
-    def _most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
-        """The number of the term to put back that helps most for what it costs, none of some; None if none helps."""
+    def _find_most_helpful(self, fit: TermFit, but: list[int]) -> int | None:
+        """Return the number of the term whose return helps most for its operations, or None if none helps."""
         gone = ~fit.pruning.has(self._candidates)
         gone[but] = False
         numbers = np.flatnonzero(gone)
@@ -212,8 +216,8 @@ class TermSearch:
             return None
         terms = self._candidates[numbers]
         dearer = self.tape.counts(fit.pruning, terms) - self.tape.count(fit.pruning)
-        G = self._fitting.effects(fit, terms)
+        G = self._fitting.compute_effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
-        gain += fit.linear.explained(G)
+        gain += fit.linear.compute_explained_squares(G)
         worth = gain / np.maximum(dearer, 0.5)
         return int(numbers[np.argmax(worth)]) if np.any(gain > 0) else None

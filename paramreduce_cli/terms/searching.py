@@ -14,7 +14,7 @@ import numpy as np
 
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.resources.processes import Item, WorkerPool, start_workers
-from paramreduce_cli.terms.descent import Descent, Way, gone_on
+from paramreduce_cli.terms.descent import Descent, SearchHistory, continue_on_samples
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.samples import TermSamples
 from paramreduce_cli.terms.search import NOISE, TermSearch
@@ -26,8 +26,8 @@ _NOISY = 0.5
 
 
 @dataclass(frozen=True)
-class LookedAt:
-    """Samples that are looked at while terms are left out."""
+class SearchSamples:
+    """A pair of samples for a search: those that parameters are fitted to, and those that errors are watched on."""
 
     samples: TermSamples
     """What parameters are fitted to."""
@@ -48,7 +48,7 @@ class Near(NamedTuple):
 class Again(NamedTuple):
     """A descent to go down once more from shortly before its end."""
 
-    way: Way
+    way: SearchHistory
     """What it has come by."""
     turn: int
     """Number of the dice."""
@@ -56,13 +56,13 @@ class Again(NamedTuple):
 
 @dataclass(frozen=True)
 class Searcher:
-    """Goes down from starts."""
+    """A searcher that descends from starts."""
 
     lean: LeanModels
     """Programs of reduced models."""
-    looked_at: LookedAt
+    looked_at: SearchSamples
     """Samples for most of the search."""
-    closely: LookedAt
+    closely: SearchSamples
     """More samples, for the best of what was found."""
     poses: TermSamples | None
     """States at which mass matrices must be positive definite."""
@@ -72,37 +72,38 @@ class Searcher:
     seed: int = 0
     """Of what is random."""
 
-    def begun(self, start: Start, turn: int = 0) -> Descent:
-        """With all terms."""
-        program = start.program(self.lean, direct=self.direct)
-        return Descent.begun(start, program, self._searching(start, self.looked_at, turn))
+    def start_descent(self, start: Start, turn: int = 0) -> Descent:
+        """Return a descent with all terms of a start."""
+        program = start.build_program(self.lean, direct=self.direct)
+        return Descent.start_from(start, program, self._make_search(start, self.looked_at, turn))
 
-    def down(self, start: Start) -> Way:
-        """From a start until no more terms can go."""
-        return self.begun(start).down()
+    def descend(self, start: Start) -> SearchHistory:
+        """Descend from a start until no more terms can go."""
+        return self.start_descent(start).descend()
 
-    def nearby(self, what: Near) -> Way | None:
-        """The same from one near another one, half the times with noise; None where it is not within the budget.
-
-        The function is the same to begin with, but at the edge of the budget rounding may tell.
+    def descend_nearby(self, what: Near) -> SearchHistory | None:
+        """Descend from a start near another one, with noise half of the time; return None if it is not within the
+        budget. The function is the same at first, but at the edge of the budget rounding may decide.
         """
         rng = np.random.default_rng([self.seed, what.turn])
         start = near(what.start, what.others, self.lean, rng, direct=self.direct)
-        return _down(self.begun(start, what.turn), rng)
+        return _descend(self.start_descent(start, what.turn), rng)
 
-    def again(self, what: Again) -> Way | None:
-        """The same from a program shortly before the end of a descent, written in another way."""
+    def descend_again(self, what: Again) -> SearchHistory | None:
+        """Descend from a program shortly before the end of a descent, written in another way."""
         rng = np.random.default_rng([self.seed, what.turn, 2])
-        searching = self._searching(what.way.start, self.looked_at, what.turn)
-        return _down(Descent.again(what.way, rng, searching), rng)
+        searching = self._make_search(what.way.start, self.looked_at, what.turn)
+        return _descend(Descent.restart(what.way, rng, searching), rng)
 
-    def closer(self, way: Way) -> Way | None:
-        """On from what a descent has come by with more samples."""
-        return gone_on(way, self._searching(way.start, self.closely))
+    def descend_closely(self, way: SearchHistory) -> SearchHistory | None:
+        """Continue a descent with more samples."""
+        return continue_on_samples(way, self._make_search(way.start, self.closely))
 
-    def _searching(
-        self, start: Start, some: LookedAt, turn: int = 0
+    def _make_search(
+        self, start: Start, some: SearchSamples, turn: int = 0
     ) -> Callable[[Tape], TermSearch]:
+        """Return a function that makes the search of a tape."""
+
         def made(tape: Tape) -> TermSearch:
             fitting = Fitting(
                 tape, start.model.n, some.samples, self.budget, some.watched, self.poses
@@ -112,14 +113,16 @@ class Searcher:
         return made
 
 
-def _down(descent: Descent, rng: np.random.Generator) -> Way | None:
-    """Until no more terms can go, half the times with noise; None where it does not begin within the budget."""
+def _descend(descent: Descent, rng: np.random.Generator) -> SearchHistory | None:
+    """Descend until no more terms can go, with noise half of the time; return None if the start is not within the
+    budget.
+    """
     noise = NOISE * (rng.random() < _NOISY)
-    return descent.down(noise) if descent.end.fit.within else None
+    return descent.descend(noise) if descent.end.fit.within else None
 
 
-class Hands:
-    """What does the work of a searcher, here or in other processes.
+class WorkerGroup:
+    """The workers of a searcher, in this process or in others.
 
     Args:
         told: Of what is found on an item, as soon as it is.
@@ -128,27 +131,30 @@ class Hands:
     """
 
     def __init__(
-        self, told: Callable[[Way | None], None], deadline: float, pool: WorkerPool[Searcher]
+        self,
+        told: Callable[[SearchHistory | None], None],
+        deadline: float,
+        pool: WorkerPool[Searcher],
     ) -> None:
         self._told, self._deadline, self._pool = told, deadline, pool
         self.cut_short = False
         """Whether anything was not begun for the deadline."""
 
-    def in_time(self) -> bool:
-        """Whether there is time for what is asked for; if not, the search is cut short."""
+    def is_in_time(self) -> bool:
+        """Return whether time is left; if not, the search is marked as cut short."""
         self.cut_short |= time.monotonic() > self._deadline
         return not self.cut_short
 
-    def each(
+    def map(
         self,
-        work: Callable[[Searcher, Item], Way | None],
+        work: Callable[[Searcher, Item], SearchHistory | None],
         items: Iterable[Item],
         *,
         however_late: bool = False,
-    ) -> list[Way]:
-        """What is found on items, in their order; on one of them at least, and no others when it is too late."""
-        in_time = partial(_begun, work, math.inf if however_late else self._deadline)
-        found: dict[int, Way] = {}
+    ) -> list[SearchHistory]:
+        """Return the results of items in their order: of the first item at least, and of others that start in time."""
+        in_time = partial(_work_in_time, work, math.inf if however_late else self._deadline)
+        found: dict[int, SearchHistory] = {}
         for (number, _), (begun, way) in self._pool.map_unordered(in_time, enumerate(items)):
             self.cut_short |= not begun
             self._told(way)
@@ -157,13 +163,13 @@ class Hands:
         return [found[number] for number in sorted(found)]
 
 
-def _begun(
-    work: Callable[[Searcher, Item], Way | None],
+def _work_in_time(
+    work: Callable[[Searcher, Item], SearchHistory | None],
     deadline: float,
     searcher: Searcher,
     numbered: tuple[int, Item],
-) -> tuple[bool, Way | None]:
-    """Whether an item was begun before the deadline, as the first one always is, and what was found on it."""
+) -> tuple[bool, SearchHistory | None]:
+    """Return whether an item was started before the deadline, as the first one always is, and its result."""
     number, item = numbered
     if number and time.monotonic() > deadline:
         return False, None
@@ -171,12 +177,15 @@ def _begun(
 
 
 @contextlib.contextmanager
-def hands(
-    searcher: Searcher, jobs: int, told: Callable[[Way | None], None], deadline: float = math.inf
-) -> Iterator[Hands]:
-    """Work here, or in so many other processes; what is found by no deadline does not depend on how many."""
+def start_searchers(
+    searcher: Searcher,
+    jobs: int,
+    told: Callable[[SearchHistory | None], None],
+    deadline: float = math.inf,
+) -> Iterator[WorkerGroup]:
+    """Start so many processes for a searcher, or none; without a deadline results do not depend on their number."""
     with start_workers(jobs, partial(_same, searcher)) as pool:
-        yield Hands(told, deadline, pool)
+        yield WorkerGroup(told, deadline, pool)
 
 
 def _same(searcher: Searcher) -> Searcher:

@@ -1,4 +1,4 @@
-"""The leanest program of one function within a budget of errors, found by leaving terms out."""
+"""Search for the leanest program of one function within a budget, by removing terms."""
 
 from __future__ import annotations
 
@@ -11,9 +11,17 @@ from typing import NamedTuple
 import numpy as np
 
 from paramreduce_cli.resources.processes import Item
-from paramreduce_cli.terms.descent import Descent, Simplified, Way, drawn, front, leanest, slimmed
-from paramreduce_cli.terms.searching import Again, Hands, Near, Searcher, hands
-from paramreduce_cli.terms.starts import Start, promising
+from paramreduce_cli.terms.descent import (
+    Descent,
+    SearchHistory,
+    Simplified,
+    draw_history,
+    drop_candidates,
+    find_leanest_histories,
+    list_front,
+)
+from paramreduce_cli.terms.searching import Again, Near, Searcher, WorkerGroup, start_searchers
+from paramreduce_cli.terms.starts import Start, order_by_promise
 
 _LOOKED_AT = 200
 """Starts that are looked at to find the smallest one within the budget, at most."""
@@ -38,7 +46,7 @@ _LEANEST = 12
 
 
 class Found(NamedTuple):
-    """What a search has come to: no programs where no start is within the budget."""
+    """The result of a search: no programs if no start is within the budget."""
 
     ends: list[Simplified]
     """Programs, the leanest first."""
@@ -48,7 +56,7 @@ class Found(NamedTuple):
     """Whether its time was over before it was."""
 
 
-def simplified(
+def simplify(
     searcher: Searcher,
     starts: list[Start],
     *,
@@ -57,7 +65,7 @@ def simplified(
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
 ) -> Found:
-    """Leave terms out, and let nodes stand for others, as long as errors stay within a budget.
+    """Remove terms and replace nodes as long as errors stay within a budget.
 
     Starts are gone down from, each in the formulation that is leanest for it, then others near the best ones, whose
     formulations are changed at random, as long as that helps; then, as long as that helps, once more from programs
@@ -76,41 +84,41 @@ def simplified(
         DataError: A process died.
     """
     deadline = time.monotonic() + seconds
-    every = map(searcher.begun, starts[:_LOOKED_AT])
+    every = map(searcher.start_descent, starts[:_LOOKED_AT])
     smallest = next((one.start for one in every if one.end.fit.within), None)
     if smallest is None:
         return Found([], [])
-    begins = _first(searcher, promising(starts, smallest.model.n))
-    told = _Told(progress, len(begins) + 2 * rounds + _CLOSELY)
+    begins = _list_first(searcher, order_by_promise(starts, smallest.model.n))
+    told = _ProgressMeter(progress, len(begins) + 2 * rounds + _CLOSELY)
 
-    def beside(ends: Sequence[Way], turn: int) -> Near:
+    def beside(ends: Sequence[SearchHistory], turn: int) -> Near:
         rng = np.random.default_rng([searcher.seed, turn, 1])
-        best = leanest(ends, _BEST)
-        parent = best[turn % len(best)] if rng.random() > _DRAWN else drawn(ends, rng)
+        best = find_leanest_histories(ends, _BEST)
+        parent = best[turn % len(best)] if rng.random() > _DRAWN else draw_history(ends, rng)
         return Near(parent.start, [one.start for one in best], turn)
 
-    def before(ends: Sequence[Way], turn: int) -> Again:
-        best = leanest(ends, _BEST)
+    def before(ends: Sequence[SearchHistory], turn: int) -> Again:
+        best = find_leanest_histories(ends, _BEST)
         return Again(best[turn % len(best)], turn)
 
-    pays = told.ahead * _work(searcher, begins) > _MANY
-    with hands(searcher, jobs if pays else 1, told, deadline) as working:
-        ends = working.each(Searcher.down, [one.start for one in begins])
-        ends = _more(working, ends, Searcher.nearby, beside, rounds, told)
-        ends = _more(working, ends, Searcher.again, before, rounds, told)
-        best = leanest(ends, _CLOSELY)
+    pays = told.ahead * _estimate_work(searcher, begins) > _MANY
+    with start_searchers(searcher, jobs if pays else 1, told, deadline) as working:
+        ends = working.map(Searcher.descend, [one.start for one in begins])
+        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, rounds, told)
+        ends = _descend_further(working, ends, Searcher.descend_again, before, rounds, told)
+        best = find_leanest_histories(ends, _CLOSELY)
         told.ahead = len(best)
-        close = working.each(Searcher.closer, best, however_late=True)
+        close = working.map(Searcher.descend_closely, best, however_late=True)
     last = heapq.nsmallest(
         _LEANEST, ((count, k) for k, one in enumerate(close) for count in one.visited)
     )
-    found = [close[k].simplified(close[k].visited[count]) for count, k in last]
+    found = [close[k].rebuild(close[k].visited[count]) for count, k in last]
     found.sort(key=lambda one: one.program.n_operations)
-    return Found(found, front(ends + close), working.cut_short)
+    return Found(found, list_front(ends + close), working.cut_short)
 
 
-class _Told:
-    """Tells how far it is.
+class _ProgressMeter:
+    """A meter of the progress of a search.
 
     Args:
         progress: Told what share is done, and the fewest operations so far.
@@ -121,26 +129,26 @@ class _Told:
         self._progress, self.ahead = progress, ahead
         self._done, self._fewest = 0, np.inf
 
-    def __call__(self, way: Way | None) -> None:
+    def __call__(self, way: SearchHistory | None) -> None:
         """Of one more descent."""
         self._done, self.ahead = self._done + 1, self.ahead - 1
         self._fewest = min(self._fewest, np.inf if way is None else way.fewest)
         self._progress(self._done / (self._done + self.ahead), f"{self._fewest} operations")
 
-    def more(self, ahead: int) -> None:
-        """So many descents are still to be made besides."""
+    def expect(self, ahead: int) -> None:
+        """Add to the number of descents that are still to be made."""
         self.ahead += ahead
 
 
-def _more(
-    working: Hands,
-    ends: list[Way],
-    work: Callable[[Searcher, Item], Way | None],
-    item: Callable[[Sequence[Way], int], Item],
+def _descend_further(
+    working: WorkerGroup,
+    ends: list[SearchHistory],
+    work: Callable[[Searcher, Item], SearchHistory | None],
+    item: Callable[[Sequence[SearchHistory], int], Item],
     patience: int,
-    told: _Told,
-) -> list[Way]:
-    """More descents, while in time, until so many in a row have brought nothing.
+    told: _ProgressMeter,
+) -> list[SearchHistory]:
+    """Make further descents, while in time, until so many in a row have improved nothing.
 
     Args:
         working: Makes them.
@@ -151,34 +159,36 @@ def _more(
         told: Of those that are still to be made, too.
     """
     turn = since = 0
-    fewest = _fewest(ends)
-    while since < patience and working.in_time():
+    fewest = _find_fewest(ends)
+    while since < patience and working.is_in_time():
         turns = range(turn, turn + min(_AT_ONCE, patience - since))
-        ends = slimmed(ends + working.each(work, [item(ends, k) for k in turns]), _CLOSELY)
+        ends = drop_candidates(ends + working.map(work, [item(ends, k) for k in turns]), _CLOSELY)
         turn, since = turns.stop, since + len(turns)
-        saved = fewest - _fewest(ends)
+        saved = fewest - _find_fewest(ends)
         if saved and saved * _HARDLY >= fewest:
-            told.more(since)
+            told.expect(since)
             since, fewest = 0, fewest - saved
     return ends
 
 
-def _fewest(ends: Iterable[Way]) -> int:
+def _find_fewest(ends: Iterable[SearchHistory]) -> int:
     return min(way.fewest for way in ends)
 
 
-def _first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
-    """Descents from starts within the budget, as many as their operations allow."""
+def _list_first(searcher: Searcher, starts: Iterable[Start]) -> list[Descent]:
+    """Return descents from starts within the budget, as many as their operations allow."""
     begins: list[Descent] = []
-    for one in map(searcher.begun, starts):
+    for one in map(searcher.start_descent, starts):
         if one.end.fit.within:
             begins.append(one)
-            if len(begins) >= int(np.clip(_WORK / _work(searcher, begins), _FEWEST, _MOST)):
+            if len(begins) >= int(
+                np.clip(_WORK / _estimate_work(searcher, begins), _FEWEST, _MOST)
+            ):
                 break
     return begins
 
 
-def _work(searcher: Searcher, descents: Sequence[Descent]) -> float:
-    """Operations times torques of a program, as some have on the average."""
+def _estimate_work(searcher: Searcher, descents: Sequence[Descent]) -> float:
+    """Return the operations times torques of a program, averaged over descents."""
     torques = searcher.looked_at.samples.tau.shape[0]
     return float(np.mean([max(one.visited) for one in descents]) * torques)

@@ -1,4 +1,4 @@
-"""Subsets of parameters from which terms are left out."""
+"""Subsets of parameters from which searches for negligible terms start."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -33,8 +33,8 @@ class Start:
     formulation: Formulation | None = None
     """In which it is written, none for whichever is the leanest."""
 
-    def program(self, lean: LeanModels, *, direct: bool) -> Program:
-        """With all terms; its first inputs are the parameters of the model, not all standard ones.
+    def build_program(self, lean: LeanModels, *, direct: bool) -> Program:
+        """Return the program with all terms, not rewritten yet; its first inputs are the parameters of the model.
 
         It is not rewritten yet, as its terms are not those that are left in the end.
         """
@@ -47,10 +47,11 @@ class Start:
         )
 
 
-def starts_within(
+def list_starts(
     torque_error: float, lean: LeanModels, model: Model, reduction: Reduction, *, direct: bool
 ) -> list[Start]:
-    """Subsets within the budget on the estimation set, the smallest first, and the leaner ones of a size.
+    """Return the subsets within the budget on the estimation set, the smallest first, and of one size the leanest
+    first.
 
     Args:
         torque_error: Allowed on the estimation set.
@@ -72,8 +73,8 @@ def starts_within(
     )
 
 
-def promising(starts: list[Start], smallest: int) -> Iterator[Start]:
-    """Where to go down from, the most promising first: the leanest of every size, and so on.
+def order_by_promise(starts: list[Start], smallest: int) -> Iterator[Start]:
+    """Yield starts, the most promising first: the leanest of every size, then the second of every size, and so on.
 
     What a larger subset has besides may cost little once terms are left out, and make up for these.
 

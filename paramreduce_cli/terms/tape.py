@@ -69,7 +69,7 @@ class Tape:
 
     def everything(self) -> Pruning:
         """The whole program."""
-        return Pruning.nothing(self.size)
+        return Pruning.keep_all(self.size)
 
     def candidates(self) -> IntArray:
         """Terms: numbers of nodes and what of them, (n_candidates, 2).
@@ -115,7 +115,7 @@ class Tape:
 
     def needed(self, pruning: Pruning) -> BoolArray:
         """Nodes that outputs are made of, (n_nodes,)."""
-        needed: BoolArray = kernels.needed(self._instructions, pruning)
+        needed: BoolArray = kernels.find_live_nodes(self._instructions, pruning)
         return needed
 
     def values(self, pruning: Pruning, inputs: FloatArray, which: BoolArray) -> FloatArray:
@@ -126,7 +126,7 @@ class Tape:
             inputs: By position, (n_inputs, n_samples).
             which: Nodes that are asked for, with all that they are made of, (n_nodes,).
         """
-        values: FloatArray = kernels.values(
+        values: FloatArray = kernels.evaluate(
             self._instructions, pruning,
             inputs, which,
         )  # fmt: skip
@@ -145,7 +145,7 @@ class Tape:
             inputs: By position, (n_inputs, n_samples).
             values: Of all nodes.
         """
-        own: FloatArray = kernels.own_values(self._instructions, pruning, inputs, values)
+        own: FloatArray = kernels.evaluate_unreplaced(self._instructions, pruning, inputs, values)
         return own
 
     def adjoints(
@@ -184,7 +184,7 @@ class Tape:
         self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> tuple[FloatArray, BoolArray]:
         """Anything where there are none."""
-        return kernels.adjoints(
+        return kernels.accumulate_adjoints(
             self._instructions, pruning,
             values, seeds, which,
         )  # fmt: skip
@@ -202,14 +202,16 @@ class Tape:
         Terms that are left out get what they would give, nodes that stand for others what they would
         give beyond that as what they are.
         """
-        return kernels.effects(self._instructions, pruning, candidates, values, own, adjoints)
+        return kernels.compute_effects(
+            self._instructions, pruning, candidates, values, own, adjoints
+        )
 
     def combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
         """Linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
 
         Zero for terms that are no multiple of one, or for which that cannot be seen.
         """
-        found, coefficients = kernels.combinations(self._instructions, pruning, n)
+        found, coefficients = kernels.find_combinations(self._instructions, pruning, n)
         nodes, what = terms.T
         operands = self._instructions.operands[nodes, np.minimum(what, SECOND)] >> 1
         node = found[np.where(what == WHOLE, nodes, operands)]
@@ -218,14 +220,14 @@ class Tape:
 
     def count(self, pruning: Pruning) -> int:
         """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
-        return int(kernels.count(self._instructions, pruning))
+        return int(kernels.count_operations(self._instructions, pruning))
 
     def counts(self, pruning: Pruning, candidates: IntArray) -> IntArray:
         """Operations left when one more term is the other way round, (n_candidates,).
 
         Nodes that stand for themselves and could only stand for others stay as they are.
         """
-        return kernels.counts(
+        return kernels.count_flipped(
             self._instructions, pruning,
             candidates,
         )  # fmt: skip
@@ -234,7 +236,7 @@ class Tape:
         self, pruning: Pruning, nodes: IntArray, sources: IntArray, factors: FloatArray
     ) -> IntArray:
         """Operations left when one more node stands for another one, (n_ways,)."""
-        return kernels.counts_standing(
+        return kernels.count_replaced(
             self._instructions, pruning,
             nodes, sources, factors,
         )  # fmt: skip

@@ -8,8 +8,8 @@ from terms.test_search import NOMINAL, states
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.samples import term_samples
-from paramreduce_cli.terms.searching import LookedAt, Searcher
+from paramreduce_cli.terms.samples import make_samples
+from paramreduce_cli.terms.searching import Searcher, SearchSamples
 from paramreduce_cli.terms.starts import Start
 
 
@@ -17,14 +17,14 @@ from paramreduce_cli.terms.starts import Start
 def searcher():
     model = model_of("two_link")
     some, more = (
-        term_samples(
+        make_samples(
             model.mechanism, [states(model, count, count)], NOMINAL, np.ones(2),
             direct=False, projected=False,
         )
         for count in (60, 120)
     )  # fmt: skip
     return Searcher(
-        LeanModels(model), LookedAt(some, None), LookedAt(more, None), None, Budget(0.05, np.inf),
+        LeanModels(model), SearchSamples(some, None), SearchSamples(more, None), None, Budget(0.05, np.inf),
         direct=False, seed=0,
     )  # fmt: skip
 

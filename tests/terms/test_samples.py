@@ -46,9 +46,9 @@ def test_torques_and_mass_matrices_of_outputs_most_of_which_are_zero(direct, wit
         matrices = symmetric(everything[:-N])
         torques += np.einsum("mij,jm->im", matrices, some.ddq)
         np.testing.assert_allclose(
-            some.mass_matrices(outputs), np.swapaxes(J, 1, 2) @ matrices @ J, atol=1e-13
+            some.build_mass_matrices(outputs), np.swapaxes(J, 1, 2) @ matrices @ J, atol=1e-13
         )
-    given = some.tau - some.differences(outputs)
+    given = some.tau - some.compute_residuals(outputs)
     np.testing.assert_allclose(given, np.einsum("mij,im->jm", J, torques), atol=1e-13)
     across = np.einsum("oqm,om->qm", some.seeds, everything)
     np.testing.assert_allclose(across, given, atol=1e-13)

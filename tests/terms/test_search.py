@@ -13,7 +13,7 @@ from paramreduce_cli.records import Block, ReducedModel
 from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.kernels import ITSELF
-from paramreduce_cli.terms.samples import term_samples
+from paramreduce_cli.terms.samples import make_samples
 from paramreduce_cli.terms.search import NOISE, TermSearch
 from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Tape
@@ -35,8 +35,8 @@ def states(model, count, seed):
 
 def fitting_of(model, direct, budget, count=60, reduced=None):
     reduced = reduced or make_base_model(model)
-    program = Start("base", reduced, 0.0, 0).program(LeanModels(model), direct=direct)
-    samples = term_samples(
+    program = Start("base", reduced, 0.0, 0).build_program(LeanModels(model), direct=direct)
+    samples = make_samples(
         model.mechanism, [states(model, count, 0)], NOMINAL, np.array([1.0, 2.0]),
         direct=direct, projected=False,
     )  # fmt: skip
@@ -65,7 +65,7 @@ def test_all_terms_are_exact_and_errors_are_what_they_are_defined_as(arm, direct
     whole = search.start(reduced.values)
     assert whole.fit.torque_error < 1e-6
 
-    found = search.descended(whole).fit
+    found = search.descend(whole).fit
     tau, M = predicted(fitting, found, samples, direct)
     weights = NOMINAL[:, None]
     error = np.linalg.norm((tau - samples.tau) / weights) / np.linalg.norm(samples.tau / weights)
@@ -106,7 +106,7 @@ def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
     for term in terms:
         broken = fitting.fit(whole.fit.pruning.flip(term[None]), whole.fit.beta)
         missed += not broken.within
-        mended = search.mended(broken.pruning, broken.beta)
+        mended = search.restore_budget(broken.pruning, broken.beta)
         helped += mended.fit.within and not broken.within
         assert mended.count <= whole.count
         assert np.all(mended.fit.pruning.has(terms)[broken.pruning.has(terms)]), "nothing else goes"
@@ -125,7 +125,9 @@ def test_costs_of_combinations_of_parameters_are_exact(arm):
             fit = fitting.fit(fit.pruning.flip(terms[chosen][None]), fit.beta)
         live = terms[fit.pruning.has(terms)]
         combinations = tape.combinations(fit.pruning, live, fitting.n)
-        costs = fit.linear.costs(fitting.effects(fit, live), fit.beta, combinations)
+        costs = fit.linear.estimate_costs(
+            fitting.compute_effects(fit, live), fit.beta, combinations
+        )
         known = np.flatnonzero(combinations.any(axis=1))
         assert known.size > 10
         for k in known:
@@ -164,7 +166,7 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, direct):
             fewest = tape.count(pruning)
     search = TermSearch(fitting, 0)
     start = search.start(values)
-    noisy = (search.descended(start, noise=noise) for noise in [0.0] + [NOISE] * 20)
-    found = min(map(search.descended, noisy), key=lambda end: end.count)
+    noisy = (search.descend(start, noise=noise) for noise in [0.0] + [NOISE] * 20)
+    found = min(map(search.descend, noisy), key=lambda end: end.count)
     assert found.fit.within
     assert found.count <= fewest, "whole nodes may go as well, so it may even be leaner"

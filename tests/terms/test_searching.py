@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.searching import Again, Near, Searcher, hands
+from paramreduce_cli.terms.searching import Again, Near, Searcher, start_searchers
 
 
 def found(searcher, start, jobs):
     told = []
-    with hands(searcher, jobs, lambda way: told.append(way.rank)) as working:
-        ends = working.each(Searcher.down, [start])
-        ends += working.each(Searcher.nearby, [Near(start, [start], turn) for turn in range(6)])
-        ends += working.each(Searcher.again, [Again(ends[k], k) for k in range(4)])
-        close = working.each(Searcher.closer, ends)
+    with start_searchers(searcher, jobs, lambda way: told.append(way.rank)) as working:
+        ends = working.map(Searcher.descend, [start])
+        ends += working.map(
+            Searcher.descend_nearby, [Near(start, [start], turn) for turn in range(6)]
+        )
+        ends += working.map(Searcher.descend_again, [Again(ends[k], k) for k in range(4)])
+        close = working.map(Searcher.descend_closely, ends)
     assert sorted(told) == sorted(one.rank for one in ends + close)
     return [one.rank for one in ends + close]
 
@@ -29,16 +31,16 @@ def test_what_is_found_does_not_depend_on_the_number_of_processes(searcher, star
 
 @pytest.mark.parametrize("jobs", [1, 2])
 def test_after_the_deadline_one_is_done_unless_all_are_asked_for(searcher, start, jobs):
-    with hands(searcher, jobs, lambda way: None, time.monotonic()) as working:
-        assert len(working.each(Searcher.down, [start] * 3, however_late=True)) == 3
+    with start_searchers(searcher, jobs, lambda way: None, time.monotonic()) as working:
+        assert len(working.map(Searcher.descend, [start] * 3, however_late=True)) == 3
         assert not working.cut_short
-        assert len(working.each(Searcher.down, [start] * 6)) == 1
+        assert len(working.map(Searcher.descend, [start] * 6)) == 1
         assert working.cut_short
-        assert not working.in_time()
+        assert not working.is_in_time()
 
 
 def test_what_is_at_the_edge_of_the_budget_may_be_out_of_it_near_there(searcher, start):
     exact = replace(searcher, budget=Budget(1e-18, np.inf))
-    assert exact.nearby(Near(start, [start], 0)) is None
-    with hands(exact, 1, lambda way: None) as working:
-        assert working.each(Searcher.nearby, [Near(start, [start], 0)]) == []
+    assert exact.descend_nearby(Near(start, [start], 0)) is None
+    with start_searchers(exact, 1, lambda way: None) as working:
+        assert working.map(Searcher.descend_nearby, [Near(start, [start], 0)]) == []

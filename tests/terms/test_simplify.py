@@ -11,13 +11,13 @@ from paramreduce_cli.terms.searching import Searcher
 def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_samples(
     searcher, start, monkeypatch
 ):
-    found = simplify.simplified(searcher, [start], rounds=8).ends
-    monkeypatch.setattr(Searcher, "again", lambda self, what: None)
-    without = simplify.simplified(searcher, [start], rounds=8).ends
+    found = simplify.simplify(searcher, [start], rounds=8).ends
+    monkeypatch.setattr(Searcher, "descend_again", lambda self, what: None)
+    without = simplify.simplify(searcher, [start], rounds=8).ends
     assert found[0].program.n_operations <= without[0].program.n_operations
 
 
-@pytest.mark.parametrize("kind", ["nearby", "again"])
+@pytest.mark.parametrize("kind", ["descend_nearby", "descend_again"])
 @pytest.mark.parametrize(
     ("rounds", "gains", "expected"),
     [
@@ -37,15 +37,15 @@ def test_more_descents_are_made_until_so_many_in_a_row_bring_nothing(
 def test_less_than_one_operation_in_so_many_is_nothing(
     searcher, start, monkeypatch, gain, expected
 ):
-    monkeypatch.setattr(simplify, "_HARDLY", searcher.down(start).fewest / 3)
-    turns, _ = gone_down(searcher, start, monkeypatch, "again", 8, {3: gain})
+    monkeypatch.setattr(simplify, "_HARDLY", searcher.descend(start).fewest / 3)
+    turns, _ = gone_down(searcher, start, monkeypatch, "descend_again", 8, {3: gain})
     assert turns == list(range(expected))
 
 
 def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
     """Numbers of the descents of one kind, some of which save so many operations, and what progress was told."""
     turns, told = [], []
-    way = searcher.down(start)
+    way = searcher.descend(start)
     fewest = [way.fewest]
 
     def work(self, what):
@@ -53,9 +53,9 @@ def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
         fewest[0] -= gains.get(what.turn, 0)
         return replace(way, fewest=fewest[0] if what.turn in gains else way.fewest + 1)
 
-    for name in ("nearby", "again"):
+    for name in ("descend_nearby", "descend_again"):
         monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)
-    found = simplify.simplified(
+    found = simplify.simplify(
         searcher, [start], rounds=rounds, progress=lambda share, detail: told.append(share)
     )
     counts = [one.program.n_operations for one in found.ends]
@@ -68,20 +68,20 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
     searcher, start, monkeypatch
 ):
     begun = []
-    for name in ("down", "nearby", "again", "closer"):
+    for name in ("descend", "descend_nearby", "descend_again", "descend_closely"):
         work = getattr(Searcher, name)
         monkeypatch.setattr(
             Searcher,
             name,
             lambda self, what, n=name, work=work: begun.append(n) or work(self, what),
         )
-    whole = simplify.simplified(searcher, [start], rounds=8)
+    whole = simplify.simplify(searcher, [start], rounds=8)
     assert not whole.cut_short
-    assert {"nearby", "again"} < set(begun)
+    assert {"descend_nearby", "descend_again"} < set(begun)
     begun.clear()
-    found = simplify.simplified(searcher, [start], rounds=8, seconds=1e-9)
-    assert begun == ["down", "closer"]
+    found = simplify.simplify(searcher, [start], rounds=8, seconds=1e-9)
+    assert begun == ["descend", "descend_closely"]
     assert found.cut_short
     least = min(one.program.n_operations for one in found.ends)
-    assert least < searcher.begun(start).way.fewest
+    assert least < searcher.start_descent(start).history.fewest
     assert least >= whole.ends[0].program.n_operations

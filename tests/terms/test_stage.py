@@ -448,9 +448,11 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
 
 def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypatch):
     monkeypatch.setattr(simplify, "_MANY", 0)
-    started, hands = [], simplify.hands
+    started, start_searchers = [], simplify.start_searchers
     monkeypatch.setattr(
-        simplify, "hands", lambda one, jobs, *more: started.append(jobs) or hands(one, jobs, *more)
+        simplify,
+        "start_searchers",
+        lambda one, jobs, *more: started.append(jobs) or start_searchers(one, jobs, *more),
     )
     shutil.copytree(two_link.store.folder, tmp_path / "r")
     runner = Runner(two_link.config, Store(tmp_path / "r"), jobs=2)
@@ -557,7 +559,7 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
         return simplify.Found([], [])
 
     module = sys.modules["paramreduce_cli.stages.reduce_terms"]
-    monkeypatch.setattr(module, "simplified", nothing)
+    monkeypatch.setattr(module, "simplify", nothing)
     settings = [text for text in TERMS if "acceleration" not in text]
     config = load_config(measured_copy / "arm.yaml", [ONE_FORMAT, *settings])
     runner = Runner(config, Store(measured_copy / "results"))

@@ -134,14 +134,14 @@ def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
 ):
     tape = Tape(program)
     pruning = random_remains(tape, seed)
-    swept = kernels.adjoints
+    swept = kernels.accumulate_adjoints
 
     def spoilt(*arguments):
         found, reached = swept(*arguments)
         found[~reached] = np.nan
         return found, reached
 
-    monkeypatch.setattr(kernels, "adjoints", spoilt)
+    monkeypatch.setattr(kernels, "accumulate_adjoints", spoilt)
     values = tape.values(pruning, inputs, everywhere(tape))
     given = (pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
     adjoints, nodes = tape.adjoints(*given), tape.parameters(2)

@@ -1,4 +1,4 @@
-"""What a program without some of its terms is worth: on whole sets, and on random states inside the limits."""
+"""Evaluation of pruned programs on whole sets, and on random states inside the limits."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.samples import TermSamples, errors_over, term_samples
+from paramreduce_cli.terms.samples import TermSamples, compute_joint_errors, make_samples
 
 _TORQUES = 10_000
 """Random states on which torques are compared with those of the full model."""
@@ -48,8 +48,8 @@ Errors = tuple[float, float]
 
 
 @dataclass(frozen=True)
-class Strayed:
-    """How far torques and accelerations stray from the full model's away from the sets."""
+class Deviation:
+    """The deviation of torques and accelerations from the full model's, away from the sets."""
 
     torque_error: float
     """On random states; not a number where there are none, or the torques are not known there."""
@@ -65,8 +65,8 @@ class Strayed:
     """Its z, dz and ddz, (3, n_dof)."""
 
 
-class Judge:
-    """Judges programs of one function.
+class Evaluator:
+    """An evaluator of programs of one function.
 
     Args:
         model: Of the robot.
@@ -105,7 +105,7 @@ class Judge:
             for b in samples.estimation.iterate_blocks()
         ]
         reached = np.array(ranges)[:, :, 0].min(axis=0), np.array(ranges)[:, :, 1].max(axis=0)
-        self._bounds = _bounds(limits, list(model.mechanism.independent), *reached)
+        self._bounds = _compute_bounds(limits, list(model.mechanism.independent), *reached)
         self._constraints = constraints
         self.lower, self.upper = (x[:, list(model.mechanism.independent)] for x in reached)
         """Smallest and largest z, dz and ddz of the estimation set, (3, n_dof) each."""
@@ -126,28 +126,30 @@ class Judge:
         of_joints = every.reshape(3, mechanism.n_q, -1)[:, independent]
         return np.array([of_joints.min(axis=2), of_joints.max(axis=2)])
 
-    def thinned(self, part: SampleSet, most: int) -> TermSamples:
-        """So many samples of a set at most, evenly spread."""
-        return self._made(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // most)))
+    def decimate(self, part: SampleSet, most: int) -> TermSamples:
+        """Return so many samples of a set at most, evenly spread."""
+        return self._make_samples(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // most)))
 
-    def _made(self, blocks: Iterable[Block]) -> TermSamples:
-        return term_samples(
+    def _make_samples(self, blocks: Iterable[Block]) -> TermSamples:
+        return make_samples(
             self._model.mechanism, blocks, self._nominal_torque,
             self._nominal_acceleration, direct=self.direct, projected=self.projected,
             coordinates=self._coordinates,
         )  # fmt: skip
 
-    def errors(self, program: Simplified) -> tuple[Errors, Errors]:
-        """On the estimation and on the validation set; not numbers where there is no such set."""
+    def compute_errors(self, program: Simplified) -> tuple[Errors, Errors]:
+        """Return the errors on the estimation and on the validation set; NaN without such a set."""
         estimation, validation = (
-            errors_over((one, program.outputs(one.states)) for one in parts) if parts else _NONE
+            compute_joint_errors((one, program.evaluate(one.states)) for one in parts)
+            if parts
+            else _NONE
             for parts in self._sets
         )
         return estimation, validation
 
-    def test_errors(self, program: Simplified) -> tuple[FloatArray, FloatArray]:
-        """Errors of torques and of accelerations on every motion of the test set, (n_motions,) each."""
-        errors = [one.errors(program.outputs(one.states)) for one in self._test_motions]
+    def compute_test_errors(self, program: Simplified) -> tuple[FloatArray, FloatArray]:
+        """Return the errors of torques and of accelerations on every motion of the test set, (n_motions,) each."""
+        errors = [one.compute_errors(program.evaluate(one.states)) for one in self._test_motions]
         torque, acceleration = np.array(errors).reshape(-1, 2).T
         return torque, acceleration
 
@@ -159,12 +161,12 @@ class Judge:
             return []
         blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED))
         motions = groupby(blocks, lambda block: block.trajectory)
-        return [self._made(own) for _, own in motions]
+        return [self._make_samples(own) for _, own in motions]
 
-    def strain(self, errors: tuple[Errors, Errors], budget: Budget) -> float:
-        """The largest error as a share of what is allowed; infinite if one is not a number.
+    def compute_worst_ratio(self, errors: tuple[Errors, Errors], budget: Budget) -> float:
+        """Return the largest error over its budget; infinite if an error is NaN.
 
-        Where torques were measured, what is held out is not looked at.
+        If torques were measured, the held-out set does not count.
         """
         no_other = self.measured or self._samples.validation is None
         kinds = 2 if self.direct else 1
@@ -181,44 +183,52 @@ class Judge:
             blocks: list[Block] = []
             if part is not None:
                 blocks = list(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED)))
-            result.append([self._made(some) for some in _together(blocks)])
+            result.append([self._make_samples(some) for some in _group_blocks(blocks)])
         return result
 
-    def strayed(self, program: Simplified) -> Strayed:
-        """How far a program strays inside the limits; where torques were measured, on both sets alone."""
+    def measure_deviation(self, program: Simplified) -> Deviation:
+        """Return the deviation of a program on random states inside the limits; if torques were measured, on both sets
+        alone.
+        """
         parts = [] if self.measured else self._random_sets
         states = sum(part.states.shape[1] for part in parts)
         looked_at = parts or list(chain(*self._sets))
-        outputs = [program.outputs(part.states) for part in looked_at]
-        errors = errors_over(zip(parts, outputs, strict=True)) if parts else _NONE
-        off = np.abs(np.hstack([s.differences(o) for s, o in zip(looked_at, outputs, strict=True)]))
+        outputs = [program.evaluate(part.states) for part in looked_at]
+        errors = compute_joint_errors(zip(parts, outputs, strict=True)) if parts else _NONE
+        off = np.abs(
+            np.hstack([s.compute_residuals(o) for s, o in zip(looked_at, outputs, strict=True)])
+        )
         joint, state = np.unravel_index(np.argmax((off.T / self._nominal_torque).T), off.shape)
         largest = np.where(np.isfinite(self._nominal_torque), off.max(axis=1), np.nan)
         mechanism = self._model.mechanism
         worst = np.hstack([part.states for part in looked_at])[: 3 * mechanism.n_q, state]
         of_joints = worst.reshape(3, -1)[:, list(mechanism.independent)]
-        return Strayed(*errors, states, largest, int(joint), of_joints)
+        return Deviation(*errors, states, largest, int(joint), of_joints)
 
     @cached_property
     def _random_sets(self) -> list[TermSamples]:
         """Random states with the torques of the full model, in parts; empty if none were found."""
         dynamics = Dynamics(self._model.mechanism, once=True)
         return [
-            self._made([self._block(some, dynamics.inverse(*some, self._model.values))])
-            for some in self._random_states(_TORQUES)
+            self._make_samples(
+                [self._make_block(some, dynamics.inverse(*some, self._model.values))]
+            )
+            for some in self._sample_states(_TORQUES)
         ]
 
-    def smallest_eigenvalue(self, program: Simplified) -> tuple[float, int]:
-        """Of all mass matrices looked at, and on how many random states inside the limits."""
+    def find_smallest_eigenvalue(self, program: Simplified) -> tuple[float, int]:
+        """Return the smallest eigenvalue of all mass matrices evaluated, and the number of random states inside the
+        limits among them.
+        """
         smallest, states = np.inf, 0
         for one in chain(*self._sets, self._random_poses):
-            M = one.mass_matrices(program.outputs(one.states))
+            M = one.build_mass_matrices(program.evaluate(one.states))
             smallest = min(smallest, float(np.linalg.eigvalsh(M)[:, 0].min()))
             states += len(M)
         return smallest, states - sum(one.states.shape[1] for one in chain(*self._sets))
 
-    def poses(self, count: int) -> TermSamples | None:
-        """States inside the limits, half of them in their corners if there are no loops; None where M does not matter."""
+    def sample_poses(self, count: int) -> TermSamples | None:
+        """Return states inside the limits, half of them at corners if there are no loops; None if M does not matter."""
         if not self.direct:
             return None
         halves = (
@@ -226,34 +236,35 @@ class Judge:
             for some, corners in ((count // 2, False), (count - count // 2, True))
         )
         q, dq, ddq = (np.vstack(pair) for pair in zip(*halves, strict=True))
-        return self._made([self._block((q, dq, ddq))]) if len(q) else None
+        return self._make_samples([self._make_block((q, dq, ddq))]) if len(q) else None
 
     @property
     def _random_poses(self) -> Iterator[TermSamples]:
         """Random states on which mass matrices are looked at, in parts: those of the errors, and of trees others."""
         yield from self._random_sets
         if self._model.mechanism.loops is None:
-            for some in self._random_states(_MASSES - _TORQUES):
-                yield self._made([self._block(some)])
+            for some in self._sample_states(_MASSES - _TORQUES):
+                yield self._make_samples([self._make_block(some)])
 
     @cached_property
     def _inside(self) -> StatesInside:
+        """Sampler of states inside the limits and constraints."""
         part = self._samples.estimation
         blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _KNOWN))
         known = np.concatenate([b.q for b in blocks])
         lower, upper = self._bounds
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
 
-    def _random_states(self, count: int) -> Iterator[States]:
-        """So many, or as many as are assembled of loops, some at a time; fewer where they are hard to find."""
+    def _sample_states(self, count: int) -> Iterator[States]:
+        """Yield so many random states, some at a time; fewer if loops are hard to assemble."""
         count = count if self._model.mechanism.loops is None else _OF_LOOPS
         for start in range(0, count, _AT_ONCE):
             some = self._inside.drawn(min(_AT_ONCE, count - start), self._rng)
             if len(some[0]):
                 yield some
 
-    def _block(self, states: States, tau: FloatArray | None = None) -> Block:
-        """Of random states; without torques where these do not matter."""
+    def _make_block(self, states: States, tau: FloatArray | None = None) -> Block:
+        """Return a block of random states; without torques if these do not matter."""
         q, dq, ddq = states
         z, dz, ddz = (one[:, list(self._model.mechanism.independent)] for one in states)
         nothing = np.zeros((0, self._n_standard))
@@ -261,10 +272,12 @@ class Judge:
         return Block(0, np.zeros(len(q)), z, dz, ddz, tau, q, dq, ddq, nothing)
 
 
-def _bounds(
+def _compute_bounds(
     limits: JointLimits, independent: list[int], lower: FloatArray, upper: FloatArray
 ) -> FloatArray:
-    """Smallest and largest q, dq and ddq inside limits, (2, 3, n_q); rates without any are as fast as was reached, (3, n_q)."""
+    """Return the smallest and largest q, dq and ddq inside limits, (2, 3, n_q); without a limit of rates, as fast as
+    the data are, (3, n_q).
+    """
     rates = np.array([limits.velocity, limits.acceleration])
     known = np.array([np.vstack([limits.lower, -rates]), np.vstack([limits.upper, rates])])
     own = np.array([lower, upper])[:, :, independent]
@@ -276,6 +289,6 @@ def _bounds(
     return bounds
 
 
-def _together(blocks: list[Block]) -> Iterator[list[Block]]:
+def _group_blocks(blocks: list[Block]) -> Iterator[list[Block]]:
     for start in range(0, len(blocks), _BLOCKS):
         yield blocks[start : start + _BLOCKS]

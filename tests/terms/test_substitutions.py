@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramreduce_cli.terms.kernels import NUMBER
-from paramreduce_cli.terms.likeness import alike
+from paramreduce_cli.terms.substitutions import find_substitutions
 
 N, DOF, SAMPLES = 9, 2, 30
 
@@ -28,10 +28,10 @@ def cost(values, pulls, residual, node, stand_in):
 def test_the_nearest_ones_are_found_with_the_best_factors(nodes):
     values, pulls, residual = nodes
     linear = np.zeros(N, dtype=bool)
-    ways = alike(values, pulls, residual, np.ones(N, dtype=bool), linear)
+    ways = find_substitutions(values, pulls, residual, np.ones(N, dtype=bool), linear)
     found = dict(zip(zip(ways.nodes, ways.sources, strict=True), ways.factors, strict=True))
-    assert ways.one(0)[:2] == (5, 2), "the most promising one comes first"
-    assert ways.one(0)[2] == pytest.approx(-1.5, abs=0.01)
+    assert ways.get(0)[:2] == (5, 2), "the most promising one comes first"
+    assert ways.get(0)[2] == pytest.approx(-1.5, abs=0.01)
     assert found[7, NUMBER] == pytest.approx(0.8, abs=0.01)
     assert (ways.sources < ways.nodes).all()
     for node, source, factor in zip(ways.nodes, ways.sources, ways.factors, strict=True):
@@ -60,7 +60,7 @@ def test_like_stands_for_like_alone(nodes):
     linear = np.arange(N) % 2 == 1
     free = np.arange(N) != 5
     pulls[8] = 0
-    ways = alike(values, pulls, residual, free, linear)
+    ways = find_substitutions(values, pulls, residual, free, linear)
     assert set(ways.nodes) == {2, 3, 4, 6, 7, 0}, "0 for a number alone, 1 for nothing"
     others = ways.sources != NUMBER
     np.testing.assert_array_equal(linear[ways.nodes[others]], linear[ways.sources[others]])
@@ -70,15 +70,19 @@ def test_like_stands_for_like_alone(nodes):
 
 def test_there_may_be_nothing_to_stand_for(nodes):
     values, pulls, residual = nodes
-    ways = alike(values, pulls, residual, np.zeros(N, dtype=bool), np.ones(N, dtype=bool))
+    ways = find_substitutions(
+        values, pulls, residual, np.zeros(N, dtype=bool), np.ones(N, dtype=bool)
+    )
     assert ways.nodes.size == 0
-    assert ways.changes(values, pulls).shape == (0, DOF * SAMPLES)
+    assert ways.estimate_changes(values, pulls).shape == (0, DOF * SAMPLES)
 
 
 def test_changes_are_what_rows_lose(nodes):
     values, pulls, residual = nodes
-    ways = alike(values, pulls, residual, np.ones(N, dtype=bool), np.zeros(N, dtype=bool))
-    for k, lost in enumerate(ways.changes(values, pulls)):
-        node, source, factor = ways.one(k)
+    ways = find_substitutions(
+        values, pulls, residual, np.ones(N, dtype=bool), np.zeros(N, dtype=bool)
+    )
+    for k, lost in enumerate(ways.estimate_changes(values, pulls)):
+        node, source, factor = ways.get(k)
         stand_in = factor if source == NUMBER else factor * values[source]
         np.testing.assert_allclose(lost, (pulls[node] * (values[node] - stand_in)).ravel())

@@ -9,8 +9,8 @@ from conftest import config_of, model_of
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, Constraint
+from paramreduce_cli.terms.evaluation import Evaluator
 from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.judging import Judge
 from paramreduce_cli.terms.tape import Outputs
 
 OFF = np.array([0.5, -2.0])
@@ -22,7 +22,7 @@ class Moved:
     def __init__(self, model, off):
         self.dynamics, self.values, self.off = Dynamics(model.mechanism), model.values, off
 
-    def outputs(self, states):
+    def evaluate(self, states):
         q, dq, ddq = np.split(states, 3)
         return Outputs.of((self.dynamics.inverse(q.T, dq.T, ddq.T, self.values) + self.off).T)
 
@@ -41,7 +41,7 @@ def judge(robot, z, dz, ddz, nominal, constraints=(), **more):
     )
     limits = config_of(robot).trajectories.build_limits(z.shape[1])
     given = {"direct": False, "projected": False, "measured": False} | more
-    return model, Judge(model, samples, nominal, limits, constraints, **given)
+    return model, Evaluator(model, samples, nominal, limits, constraints, **given)
 
 
 def motion(n_dof, count=300, size=0.5):
@@ -50,7 +50,7 @@ def motion(n_dof, count=300, size=0.5):
 
 def test_random_states_and_the_worst_of_them():
     model, judged = judge("two_link", *motion(2), np.array([20.0, 5.0]))
-    found = judged.strayed(Moved(model, OFF))
+    found = judged.measure_deviation(Moved(model, OFF))
     assert found.states == 10_000
     np.testing.assert_allclose(found.largest, np.abs(OFF))
     assert found.worst_joint == 1, "2 of 5 is more than 0.5 of 20"
@@ -63,7 +63,7 @@ def test_random_states_and_the_worst_of_them():
 
 def test_joints_that_were_not_measured_stray_nowhere():
     model, judged = judge("two_link", *motion(2), np.array([20.0, np.inf]))
-    found = judged.strayed(Moved(model, OFF))
+    found = judged.measure_deviation(Moved(model, OFF))
     np.testing.assert_allclose(found.largest, [0.5, np.nan])
     assert found.worst_joint == 0
 
@@ -75,7 +75,7 @@ def test_without_random_states_differences_are_those_on_the_sets(why):
     constraints, measured = ([], True) if why == "measured" else ([far], False)
     nominal = np.array([20.0, 5.0])
     model, judged = judge("two_link", *motion(2), nominal, constraints, measured=measured)
-    found = judged.strayed(Moved(model, OFF))
+    found = judged.measure_deviation(Moved(model, OFF))
     assert found.states == 0
     assert np.isnan(found.torque_error)
     np.testing.assert_allclose(found.largest, np.abs(OFF))
@@ -106,8 +106,8 @@ def test_strain_is_the_largest_share_of_what_is_allowed():
     _, inverse = judge("two_link", *motion(2), np.ones(2))
     _, direct = judge("two_link", *motion(2), np.ones(2), direct=True)
     errors = ((0.01, 0.3), (0.5, 0.9))  # there is no validation set
-    assert inverse.strain(errors, Budget(0.02, 0.1)) == pytest.approx(0.5)
-    assert direct.strain(errors, Budget(0.02, 0.1)) == pytest.approx(3.0)
-    assert direct.strain(errors, Budget(0.02, np.inf)) == pytest.approx(0.5)
-    assert direct.strain(((0.01, np.inf), errors[1]), Budget(0.02, np.inf)) == np.inf
-    assert inverse.strain(((np.nan, 0.3), errors[1]), Budget(0.02, 0.1)) == np.inf
+    assert inverse.compute_worst_ratio(errors, Budget(0.02, 0.1)) == pytest.approx(0.5)
+    assert direct.compute_worst_ratio(errors, Budget(0.02, 0.1)) == pytest.approx(3.0)
+    assert direct.compute_worst_ratio(errors, Budget(0.02, np.inf)) == pytest.approx(0.5)
+    assert direct.compute_worst_ratio(((0.01, np.inf), errors[1]), Budget(0.02, np.inf)) == np.inf
+    assert inverse.compute_worst_ratio(((np.nan, 0.3), errors[1]), Budget(0.02, 0.1)) == np.inf

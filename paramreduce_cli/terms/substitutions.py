@@ -1,4 +1,4 @@
-"""Which nodes of a program are nearly a multiple of another one, or nearly constant."""
+"""Substitutions: nodes of a program that are nearly a multiple of another node, or nearly constant."""
 
 from __future__ import annotations
 
@@ -16,8 +16,8 @@ _WAYS = 400
 
 
 @dataclass(frozen=True)
-class Ways:
-    """Nodes that could stand for others."""
+class Substitutions:
+    """The substitutions of nodes by multiples of others."""
 
     nodes: IntArray
     """(n_ways,)"""
@@ -26,23 +26,23 @@ class Ways:
     factors: FloatArray
     """By which they are multiplied, or the numbers, (n_ways,)."""
 
-    def __getitem__(self, which: IntArray) -> Ways:
-        return Ways(self.nodes[which], self.sources[which], self.factors[which])
+    def __getitem__(self, which: IntArray) -> Substitutions:
+        return Substitutions(self.nodes[which], self.sources[which], self.factors[which])
 
-    def with_ones(self, nodes: IntArray) -> Ways:
-        """And nodes that could stand for the number one."""
-        return Ways(
+    def add_ones(self, nodes: IntArray) -> Substitutions:
+        """Return the substitutions with further ones, by the number one."""
+        return Substitutions(
             np.concatenate([self.nodes, nodes]),
             np.concatenate([self.sources, np.full(nodes.size, NUMBER)]),
             np.concatenate([self.factors, np.ones(nodes.size)]),
         )
 
-    def one(self, which: int) -> tuple[int, int, float]:
-        """Node, source and factor of one way."""
+    def get(self, which: int) -> tuple[int, int, float]:
+        """Return node, source and factor of one substitution."""
         return int(self.nodes[which]), int(self.sources[which]), float(self.factors[which])
 
-    def changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
-        """What rows lose, to first order, (n_ways, n_rows); for arguments see :func:`alike`."""
+    def estimate_changes(self, values: FloatArray, pulls: FloatArray) -> FloatArray:
+        """Return what rows lose, to first order, (n_ways, n_rows); for arguments see :func:`find_substitutions`."""
         stand_in = np.where(
             (self.sources == NUMBER)[:, None],
             self.factors[:, None],
@@ -52,10 +52,10 @@ class Ways:
         return lost.reshape(len(self.nodes), pulls[0].size)
 
 
-def alike(
+def find_substitutions(
     values: FloatArray, pulls: FloatArray, residual: FloatArray, free: BoolArray, linear: BoolArray
-) -> Ways:
-    """The most promising ways to let a node stand for a multiple of one before it.
+) -> Substitutions:
+    """Return the most promising replacements of nodes by multiples of earlier ones.
 
     With w the weighed derivatives of the rows by node k, v values, and r the residual, the cost of
     c v_j in place of v_k is c^2 sum w^2 v_j^2 - 2 c sum (w^2 v_k v_j + w r v_j) + constant, whose
@@ -86,7 +86,7 @@ def alike(
     rows = np.arange(len(nodes))[:, None]
     factors = (across[rows, places] / size[rows, places]).ravel()
     costs = costs[rows, places].ravel()
-    found = Ways(np.repeat(nodes, places.shape[1]), places.ravel(), factors)
+    found = Substitutions(np.repeat(nodes, places.shape[1]), places.ravel(), factors)
     found = found[np.argsort(costs, kind="stable")[: min(_WAYS, int(np.isfinite(costs).sum()))]]
 
     plain = ~linear[nodes]
@@ -94,7 +94,7 @@ def alike(
     numbers = (sums / squares.sum(axis=1))[plain]
     fixed = np.full(numbers.size, NUMBER)
     ones = np.copysign(1.0, found.factors)
-    return Ways(
+    return Substitutions(
         np.concatenate([found.nodes, found.nodes, nodes[plain]]),
         np.concatenate([found.sources, found.sources, fixed]),
         np.concatenate([found.factors, ones, numbers]),
