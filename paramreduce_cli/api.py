@@ -280,7 +280,7 @@ def inverse_dynamics(
         A function of q, dq, ddq, (n_samples, n_q) each, rad or m and their rates, that gives
         (n_samples, n_dof), N m or N.
     """
-    regressor, standard = Dynamics(model.mechanism).regressor, parameters.standard
+    regressor, standard = Dynamics(model.mechanism).compute_regressor, parameters.standard
 
     def torques(q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
         arrays = [np.ascontiguousarray(x, dtype=float) for x in (q, dq, ddq)]

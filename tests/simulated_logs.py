@@ -9,9 +9,9 @@ from scipy.signal import lfilter
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.excitation.fourier import evaluate_basis
-from paramreduce_cli.multibody.base_parameters import base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 
 CONFIG = Path(__file__).resolve().parents[1] / "configs" / "puma560_friction.yaml"
 RATE = 100.0
@@ -42,8 +42,8 @@ def arm():
     config = load_config(CONFIG)
     mechanism = config.build_mechanism()
     dynamics = Dynamics(mechanism)
-    K = dynamics.regressor(*random_states(mechanism, 300, np.random.default_rng(0)))
-    base = base_parameters(K.reshape(-1, K.shape[2]), mechanism.preference_order, 1e-9)
+    K = dynamics.compute_regressor(*draw_states(mechanism, 300, np.random.default_rng(0)))
+    base = choose_base(K.reshape(-1, K.shape[2]), mechanism.preference_order, 1e-9)
     return mechanism, dynamics, base, config.get_values()
 
 
@@ -57,7 +57,7 @@ def simulated(seed):
     series = rng.normal(size=(mechanism.n_dof, 1 + 2 * harmonics))
     series[:, 0] *= 0.3
     z, dz, ddz = basis.evaluate(series * 0.6)
-    K = dynamics.regressor(z, dz, ddz)
+    K = dynamics.compute_regressor(z, dz, ddz)
     others = np.setdiff1d(np.arange(values.size), base.columns)
     return Simulated(
         mechanism.coordinate_names, time, z, dz, ddz, K @ values, K[:, :, base.columns],
@@ -69,9 +69,12 @@ def simulated(seed):
 def along_axes(z, dz, ddz):
     """Observation matrices (n_samples, n_dof, n) of the arm, and what gravity of one unit along each axis adds, (3, ...)."""
     mechanism, dynamics, _, _ = arm()
-    none = Dynamics(replace(mechanism, gravity=np.zeros(3))).regressor(z, dz, ddz)
-    axes = [Dynamics(replace(mechanism, gravity=axis)).regressor(z, dz, ddz) for axis in np.eye(3)]
-    return dynamics.regressor(z, dz, ddz), np.array(axes) - none
+    none = Dynamics(replace(mechanism, gravity=np.zeros(3))).compute_regressor(z, dz, ddz)
+    axes = [
+        Dynamics(replace(mechanism, gravity=axis)).compute_regressor(z, dz, ddz)
+        for axis in np.eye(3)
+    ]
+    return dynamics.compute_regressor(z, dz, ddz), np.array(axes) - none
 
 
 def coloured(shape, size, pole, seed):
@@ -109,7 +112,7 @@ def two_link_log(seconds=12.0, rate=200.0, noise=0.05, seed=0):
     time = np.arange(0, seconds, 1 / rate)
     series = np.array([[0.0, 1.0, 0.6, -1.1, 0.4, 0.7, 0.9], [0.2, -0.8, 0.9, 1.2, -0.5, 0.9, 0.7]])
     z, dz, ddz = evaluate_basis(seconds / 2, 3, time).evaluate(1.2 * series)
-    tau = Dynamics(mechanism, once=True).regressor(z, dz, ddz) @ values
+    tau = Dynamics(mechanism, once=True).compute_regressor(z, dz, ddz) @ values
     for j, (viscous, coulomb, offset) in enumerate(FRICTION.values()):
         tau[:, j] += viscous * dz[:, j] + coulomb * np.sign(dz[:, j]) + offset
     tau += noise * rng.normal(size=tau.shape)
@@ -142,6 +145,6 @@ def tilt_torques(seed):
     log = simulated(seed)
     still = np.zeros_like(log.z)
     return [
-        Dynamics(replace(mechanism, gravity=axis)).regressor(log.z, still, still) @ values
+        Dynamics(replace(mechanism, gravity=axis)).compute_regressor(log.z, still, still) @ values
         for axis in np.eye(3)[:2]
     ]

@@ -19,7 +19,11 @@ from paramreduce_cli.artifacts.hdf5 import Reader, Writer, open_reader, read_sta
 from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.multibody.joined import JoinedSet
-from paramreduce_cli.multibody.observation import BLOCK_SAMPLES, FactorAccumulator, joint_factors
+from paramreduce_cli.multibody.observation import (
+    BLOCK_SAMPLES,
+    FactorAccumulator,
+    compute_joint_factors,
+)
 from paramreduce_cli.records import LAST, SETS, Block, FloatArray, Model, Samples, SampleSet
 
 if TYPE_CHECKING:
@@ -67,7 +71,7 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
             append(own if key == "trajectory" else getattr(block, key))
         if known is None:
             accumulator.add(block)
-    writer.write_dataset(f"{name}/factors", accumulator.result() if known is None else known)
+    writer.write_dataset(f"{name}/factors", accumulator.get_factors() if known is None else known)
 
 
 def _iterate_blocks(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
@@ -205,7 +209,7 @@ class StoredSet:
                 if not W:
                     W_block = none
                 elif rows is None:
-                    K = self._dynamics.regressor(*whole)
+                    K = self._dynamics.compute_regressor(*whole)
                     W_block = K.reshape(-1, K.shape[2])
                 else:
                     W_block = rows[start * self.n_dof : stop * self.n_dof].astype(float)
@@ -245,7 +249,7 @@ class StoredSet:
         if self._own:
             with open_reader(self._path) as reader:
                 return reader.read_array(f"{self._name}/factors", 4)
-        return joint_factors(self.iterate_blocks())
+        return compute_joint_factors(self.iterate_blocks())
 
 
 def _iterate_ranges(owner: FloatArray, most: int) -> Iterator[tuple[int, int]]:

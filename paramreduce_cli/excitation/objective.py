@@ -70,7 +70,7 @@ class Excitation:
 
     def weigh_rows(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
         """Return W with every row divided by its joint's torque scale, with smooth friction."""
-        W = self.observation.forward(q, dz, ddz)
+        W = self.observation.evaluate(q, dz, ddz)
         W *= self._row_weights(q.shape[0])
         return W
 
@@ -119,7 +119,7 @@ class Excitation:
             torque_bar, load_dz_bar = self.loads.pull_back(torques, rates[0], bar)
             W_bar += np.outer(torque_bar, self.loads.values)
         W_bar *= weights
-        z_bar, dz_bar, ddz_bar = self.observation.adjoint(q, *rates, W_bar)
+        z_bar, dz_bar, ddz_bar = self.observation.pull_back(q, *rates, W_bar)
         dz_bar = dz_bar + load_dz_bar
         gradient = (
             z_bar.T @ basis.position + dz_bar.T @ basis.velocity + ddz_bar.T @ basis.acceleration
@@ -137,10 +137,10 @@ class Excitation:
         if not self.quantities.constraints:
             return 0.0, np.zeros_like(coefficients)
         q = positions(basis.evaluate(coefficients)[0])
-        value, slopes = _evaluate_log_barrier(self.quantities.rows(q), level)
+        value, slopes = _evaluate_log_barrier(self.quantities.compute_rows(q), level)
         if np.isinf(value):
             return np.inf, np.full_like(coefficients, np.nan)
-        z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.jacobian(q))
+        z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.compute_jacobian(q))
         return value, z_bar.T @ basis.position
 
     def compute_load_share(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
@@ -160,7 +160,7 @@ class Excitation:
     def find_worst_bound(self, z: FloatArray, positions: Follower) -> Bound:
         """Return the bound that positions z, (n_samples, n_dof), miss by most; infinite where loops cannot be closed."""
         try:
-            rows = self.quantities.rows(positions(z))
+            rows = self.quantities.compute_rows(positions(z))
         except DataError as error:
             return Bound(np.inf, str(error))
         if not rows.size:

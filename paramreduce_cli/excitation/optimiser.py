@@ -218,8 +218,8 @@ class _Search:
             self._rest = find_resting_position(
                 excitation, settings.limits, self._limits.margin, settings.start_pose
             )
-            q = excitation.coordinates.positions(self._rest[None], None)
-            R = excitation.coordinates.tangent(q)[0]
+            q = excitation.coordinates.compute_positions(self._rest[None], None)
+            R = excitation.coordinates.compute_tangent(q)[0]
             values, vectors = np.linalg.eigh(R.T @ R)
             self._mixing = (vectors * np.sqrt(values[0] / values)) @ vectors.T
 
@@ -338,7 +338,7 @@ class _Search:
     def _compute_kappa_on(self, basis: FourierBasis, series: FloatArray) -> float:
         """Return the condition number of a series on the grid of a basis."""
         z, dz, ddz = basis.evaluate(series)
-        q = self._excitation.coordinates.positions(z, None)
+        q = self._excitation.coordinates.compute_positions(z, None)
         return self._excitation.compute_condition_numbers(q, dz, ddz)[self._settings.scaling]
 
 
@@ -351,7 +351,7 @@ def compute_fine_positions(
         DataError: The loops cannot be closed along it.
     """
     fine = settings.build_basis(FINER)
-    return fine.time, excitation.coordinates.positions(fine.evaluate(series)[0], None)
+    return fine.time, excitation.coordinates.compute_positions(fine.evaluate(series)[0], None)
 
 
 def describe(
@@ -375,7 +375,7 @@ def describe(
     times, q = compute_fine_positions(excitation, settings, coefficients)
     excitation.coordinates.check_motion(times, q)
     variants = excitation.compute_condition_numbers(q[::FINER], dz, ddz)
-    quantities = excitation.quantities.values(q)
+    quantities = excitation.quantities.compute_values(q)
     limits = settings.limits
     shares = [
         np.abs(z - (z.max(axis=0) + z.min(axis=0)) / 2) / limits.reach,

@@ -153,11 +153,11 @@ class _MotionLimits:
         time = sample_point_to_point_times(motion, self._points)
         z, _, _ = evaluate_point_to_point(motion, time)
         try:
-            q = self._coordinates.positions(z, None)
+            q = self._coordinates.compute_positions(z, None)
             self._coordinates.check_motion(time, q)
         except DataError:
             return False
-        return bool((self._quantities.rows(q) <= 0).all())
+        return bool((self._quantities.compute_rows(q) <= 0).all())
 
     def _is_strong_enough(self, motion: PointToPoint) -> bool:
         """Whether the torques and powers that the model predicts for a motion are within their limits."""
@@ -167,6 +167,6 @@ class _MotionLimits:
         z, dz, ddz = evaluate_point_to_point(
             motion, sample_point_to_point_times(motion, self._points)
         )
-        states = self._coordinates.states(z, dz, ddz)
-        tau = np.abs(self._dynamics.inverse(*states, self._values))
+        states = self._coordinates.compute_states(z, dz, ddz)
+        tau = np.abs(self._dynamics.compute_torques(*states, self._values))
         return bool(((tau <= torque) & (tau * np.abs(dz) <= power)).all())

@@ -137,10 +137,10 @@ class _ForwardDynamics:
         if self._left < 0 or not np.isfinite(state).all():
             raise _make_divergence_error(time)
         z, dz = np.split(state, 2)
-        q = self._coordinates.positions(z[None], self._near)
+        q = self._coordinates.compute_positions(z[None], self._near)
         self._near = q[0]
-        dq, _ = self._coordinates.rates(q, dz[None], np.zeros((1, dz.size)))
-        M, delta = self._dynamics.direct(q, dq, self._phi)
+        dq, _ = self._coordinates.compute_rates(q, dz[None], np.zeros((1, dz.size)))
+        M, delta = self._dynamics.compute_mass_matrix_and_bias(q, dq, self._phi)
         try:
             ddz = np.linalg.solve(M[0], self.compute_inputs(time, z, dz) - delta[0])
         except np.linalg.LinAlgError as error:

@@ -17,7 +17,7 @@ from paramreduce_cli.excitation.loads import Loads
 from paramreduce_cli.excitation.objective import Excitation
 from paramreduce_cli.excitation.optimiser import TrajectorySettings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
-from paramreduce_cli.multibody.drives import smoothed
+from paramreduce_cli.multibody.drives import smooth_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
@@ -55,17 +55,17 @@ def build_excitation(task: ExcitationTask) -> Excitation:
     settings = task.settings
     # No motion of the series is faster, whatever the limits allow.
     fastest = settings.limits.reach * 2 * np.pi * settings.harmonics / settings.period
-    smooth = smoothed(mechanism, np.minimum(settings.limits.velocity, fastest))
+    smooth = smooth_friction(mechanism, np.minimum(settings.limits.velocity, fastest))
     coordinates, true = Coordinates(mechanism), Dynamics(mechanism)
-    observation = Dynamics(smooth).observation(columns)
+    observation = Dynamics(smooth).make_observation(columns)
 
     def measured(q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        K = true.regressor(q, *coordinates.rates(q, dz, ddz))
+        K = true.compute_regressor(q, *coordinates.compute_rates(q, dz, ddz))
         return K[..., columns].reshape(-1, columns.size)
 
     return Excitation(
         observation=observation,
-        measured=observation.forward if smooth is mechanism else measured,
+        measured=observation.evaluate if smooth is mechanism else measured,
         coordinates=coordinates,
         quantities=Quantities(mechanism, task.constraints),
         beta=task.base.beta,

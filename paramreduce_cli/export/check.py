@@ -11,7 +11,7 @@ from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.checking import TOLERANCE, refuse_if_off
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
 
 _GUESS = 0.01
@@ -37,15 +37,15 @@ def random_cases(
         rng: Where they come from.
         simplified: A function with terms left out.
     """
-    q, dq, ddq = random_states(mechanism, count, rng)
+    q, dq, ddq = draw_states(mechanism, count, rng)
     if simplified is not None and mechanism.loops is None:
         lower, upper = simplified.lower[:, None], simplified.upper[:, None]
         q, dq, ddq = rng.uniform(lower, upper, (3, count, mechanism.n_dof))
     plain = Dynamics(mechanism, once=True)
     phi = model.standard
     expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
-    M, delta = plain.direct(q, dq, phi)
-    K = plain.regressor(q, dq, ddq)
+    M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
+    K = plain.compute_regressor(q, dq, ddq)
     result = {
         "phi": np.tile(model.values, (count, 1)),
         "q": q,
@@ -59,7 +59,7 @@ def random_cases(
     if mechanism.loops is None:
         return result | _simplified(simplified, result, np.eye(mechanism.n_q)[None])
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)
-    R = Coordinates(mechanism, once=True).tangent(q)[:, dependent]
+    R = Coordinates(mechanism, once=True).compute_tangent(q)[:, dependent]
     b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
     guess = q.copy()
     guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
@@ -140,7 +140,7 @@ def check_against_mechanism(
         FormulationError: A parameter that was taken for one without effect has one.
     """
     plain = Dynamics(model.mechanism, once=True)
-    wanted = plain.inverse(stored["q"], stored["dq"], stored["ddq"], model.values)
+    wanted = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
     off = (stored["tau"] - wanted) / entry_sizes("tau", wanted, least["tau"])
     refuse_if_off("the full model", off, np.ones(1))
 

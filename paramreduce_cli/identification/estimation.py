@@ -16,7 +16,7 @@ from paramreduce_cli.identification.uncertainty import (
     fit_noise,
 )
 from paramreduce_cli.multibody.observation import append_rows
-from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import Block, FloatArray, Residuals
 
 _MOST_SAMPLES = 40_000
@@ -117,7 +117,7 @@ def fit_robustly(
             weight = np.sqrt(np.minimum(1.0, _TUNING / np.maximum(size, 1e-12))) / deviation
             stacked = np.concatenate([X, tau[..., None]], axis=2) * weight[..., None]
             factor = append_rows(factor, stacked.reshape(-1, start.size + 1))
-        found = least_squares(factor)
+        found = solve_least_squares(factor)
         change = np.linalg.norm(factor[:, :-1] @ (found - parameters))
         parameters = found
         if change <= _SETTLED * np.linalg.norm(factor[:, -1]):
@@ -235,4 +235,4 @@ def fit_weighted(rows: Rows, deviation: FloatArray) -> LinearFit:
     """
     X = np.concatenate([(x / deviation[:, None]).reshape(-1, x.shape[2]) for x in rows.X])
     y = np.concatenate([(t / deviation).ravel() for t in rows.tau])
-    return LinearFit(rows, least_squares(np.column_stack([X, y])), deviation)
+    return LinearFit(rows, solve_least_squares(np.column_stack([X, y])), deviation)

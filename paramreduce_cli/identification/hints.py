@@ -139,7 +139,7 @@ class _SampledStates:
     @property
     def exact(self) -> FloatArray:
         """W of the states, without the low-pass of the torques, (n_samples, n_dof, n_standard)."""
-        return self.dynamics.regressor(*self.states)
+        return self.dynamics.compute_regressor(*self.states)
 
     def iterate_mirrored(self) -> Iterator[FloatArray]:
         """Yield the regressor with each joint reversed; nothing with loops, where joints depend on each other."""
@@ -148,7 +148,7 @@ class _SampledStates:
         for j in range(self.states[0].shape[1]):
             sign = np.ones(self.states[0].shape[1])
             sign[j] = -1
-            yield self.dynamics.regressor(*(sign * state for state in self.states))
+            yield self.dynamics.compute_regressor(*(sign * state for state in self.states))
 
 
 def _sample_states(model: Model, training: SampleSet) -> _SampledStates:
@@ -168,9 +168,12 @@ def _sample_states(model: Model, training: SampleSet) -> _SampledStates:
             W.append(block.W.reshape(*block.tau.shape, -1)[picked])
             tau.append(block.tau[picked])
             states.append((q, block.dq[picked], block.ddq[picked]))
-            weightless = still.regressor(q, np.zeros_like(q), np.zeros_like(q))
+            weightless = still.compute_regressor(q, np.zeros_like(q), np.zeros_like(q))
             pulls.append(
-                [d.regressor(q, np.zeros_like(q), np.zeros_like(q)) - weightless for d in along]
+                [
+                    d.compute_regressor(q, np.zeros_like(q), np.zeros_like(q)) - weightless
+                    for d in along
+                ]
             )
     q, dq, ddq = (np.concatenate(parts) for parts in zip(*states, strict=True))
     return _SampledStates(
@@ -211,8 +214,8 @@ def _compute_tilt_torques(
         parts: dict[int, list[FloatArray]] = {}
         for block in training.iterate_blocks():
             still = np.zeros_like(block.q)
-            K = tilted.regressor(block.q, still, still)
-            weightless = without.regressor(block.q, still, still)
+            K = tilted.compute_regressor(block.q, still, still)
+            weightless = without.compute_regressor(block.q, still, still)
             parts.setdefault(block.trajectory, []).append((K - weightless) @ model.values)
         found.append(tuple(np.concatenate(part) for part in parts.values()))
     return found

@@ -6,10 +6,10 @@ import numpy as np
 
 from paramreduce_cli.identification.processing import UNUSED
 from paramreduce_cli.identification.samples import LoggedSet
-from paramreduce_cli.multibody.base_parameters import affecting_parameters, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.observation import combined_factor
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.observation import combine_factors
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.records import BoolArray, FloatArray, MeasuredLog, Mechanism
 
 _STATES = 200
@@ -43,16 +43,16 @@ def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray)
         measured: Coordinates whose torques are measured, (n_dof,).
     """
     dynamics = Dynamics(mechanism, once=True)
-    states = random_states(mechanism, _STATES, np.random.default_rng(0))
-    K = dynamics.regressor(*states)[:, measured]
-    affects = affecting_parameters(mechanism, K)
-    base = base_parameters(
+    states = draw_states(mechanism, _STATES, np.random.default_rng(0))
+    K = dynamics.compute_regressor(*states)[:, measured]
+    affects = find_affecting_parameters(mechanism, K)
+    base = choose_base(
         K.reshape(-1, K.shape[2]), mechanism.preference_order, _RANK_TOLERANCE, affects
     )
     factors = LoggedSet(log.training, log, dynamics, "training part").compute_factors()
     scale = np.sqrt(np.sum(factors[..., -1] ** 2, axis=(0, 2)))
     scale = np.where(scale > 0, scale, np.inf)
-    W = combined_factor(factors, scale)[:, base.columns]
+    W = combine_factors(factors, scale)[:, base.columns]
     lengths = np.linalg.norm(W, axis=0)
     X = W / np.where(lengths > 0, lengths, 1.0)
     sizes = np.linalg.svd(X, compute_uv=False)

@@ -13,7 +13,7 @@ import numpy as np
 
 from paramreduce_cli.identification.estimation import LinearFit, fit_weighted
 from paramreduce_cli.identification.uncertainty import compute_score_covariance
-from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import FloatArray
 
 _SURE = 5.0
@@ -309,7 +309,7 @@ def _find_mistaken_columns(fitted: LinearFit, names: Sequence[str]) -> Iterator[
     def left(owner: Sequence[int], signs: FloatArray) -> float:
         A = np.concatenate([f[:, :p] for f in factors])
         y = np.concatenate([f[:, p + owner[j]] * signs[j] for j, f in enumerate(factors)])
-        solution = least_squares(np.column_stack([A, y]))
+        solution = solve_least_squares(np.column_stack([A, y]))
         return float(np.sum((y - A @ solution) ** 2))
 
     usual, plain = list(range(n_dof)), np.ones(n_dof)

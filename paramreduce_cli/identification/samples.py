@@ -16,8 +16,8 @@ from paramreduce_cli.multibody.observation import (
     ObservedSet,
     Span,
     StateBlock,
-    joint_factors,
-    spans,
+    compute_joint_factors,
+    make_spans,
 )
 from paramreduce_cli.records import Block, FloatArray, IntArray, MeasuredLog, MeasuredMotions
 
@@ -127,7 +127,7 @@ class LoggedSet:
     def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
         observed = ObservedSet(
-            spans([stretch.size for stretch in self._stretches]), self._read_states, self.dynamics,
+            make_spans([stretch.size for stretch in self._stretches]), self._read_states, self.dynamics,
             np.zeros(self.dynamics.mechanism.n_parameters), self.source,
         )  # fmt: skip
         for number, blocks in groupby(observed.iterate_blocks(), attrgetter("trajectory")):
@@ -195,4 +195,4 @@ class LoggedSet:
 
     def compute_factors(self) -> FloatArray:
         """Return the triangular factors by fold and joint."""
-        return joint_factors(self.iterate_blocks())
+        return compute_joint_factors(self.iterate_blocks())

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import FloatArray
 
 _ALIKE = 0.8
@@ -106,7 +106,7 @@ def _compute_misfit(W: FloatArray, tau: FloatArray, deviation: FloatArray) -> fl
     rows: FloatArray = weighted.reshape(-1, weighted.shape[2])
     # A triangular factor first: rows are many, and columns depend on each other.
     factor = np.asarray(np.linalg.qr(rows, mode="r"))
-    return float(np.sum((factor[:, -1] - factor[:, :-1] @ least_squares(factor)) ** 2))
+    return float(np.sum((factor[:, -1] - factor[:, :-1] @ solve_least_squares(factor)) ** 2))
 
 
 def hint_at_gravity(

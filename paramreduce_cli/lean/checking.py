@@ -41,10 +41,10 @@ def check_formulations(
     phi = np.zeros(mechanism.n_parameters)
     phi[kept] = rng.normal(size=kept.size)
     plain = Dynamics(dataclasses.replace(mechanism, loops=None))
-    M, delta = plain.direct(q, dq, phi)
+    M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
     rows, columns = np.tril_indices(mechanism.n_q)
     expected = {
-        "inverse": plain.inverse(q, dq, ddq, phi),
+        "inverse": plain.compute_torques(q, dq, ddq, phi),
         "direct": np.hstack([M[:, rows, columns], delta]),
     }
     inputs = [*np.broadcast_to(phi, (q.shape[0], phi.size)).T, *q.T, *dq.T, *ddq.T]

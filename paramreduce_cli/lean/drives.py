@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from paramreduce_cli.lean.algebra import Scalar
 from paramreduce_cli.lean.kinematics import Symbols
 from paramreduce_cli.lean.tree import Tree
-from paramreduce_cli.multibody.drives import OddFunctions, unit_force
+from paramreduce_cli.multibody.drives import OddFunctions, express_unit_force
 from paramreduce_cli.records import Kind
 
 _SCALARS = OddFunctions(Scalar.sign, Scalar.tanh)
@@ -29,7 +29,7 @@ def with_drives(
         force = symbols.number(0.0)
         for kind, position in columns.items():
             if moving or kind is not Kind.ROTOR:
-                unit = unit_force(kind, drive, states, _SCALARS)
+                unit = express_unit_force(kind, drive, states, _SCALARS)
                 force = force + symbols.parameter(position) * unit
         for i, weight in _weights(drive.weights.tolist()):
             result[i] = result[i] + weight * force

@@ -11,7 +11,7 @@ from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.model import lean_models
 from paramreduce_cli.lean.projection import projected_direct, projected_inverse
-from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.multibody.loops.closures import express_equations
 from paramreduce_cli.records import Model, ReducedModel, TermModel
 
 
@@ -149,7 +149,7 @@ class LeanFunctions:
         """What the position, velocity and acceleration problems of loops are made of."""
         mechanism = self._mechanism
         q, dq = ca.SX.sym("q", mechanism.n_q), ca.SX.sym("dq", mechanism.n_q)
-        equations = closure_equations(mechanism, q)
+        equations = express_equations(mechanism, q)
         jacobian = ca.jacobian(equations, q)
         gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
         d, z = list(mechanism.dependent), list(mechanism.independent)

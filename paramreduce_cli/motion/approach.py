@@ -188,7 +188,7 @@ class PathPlanner:
         if not quantities.constraints:
             return None
         try:
-            rows = quantities.rows(self._coordinates.positions(z, None))
+            rows = quantities.compute_rows(self._coordinates.compute_positions(z, None))
         except DataError as error:
             return str(error)
         if rows.max() <= 0:
@@ -201,9 +201,9 @@ class PathPlanner:
         limits = self._limits
         if not (np.isfinite(limits.torque).any() or np.isfinite(limits.power).any()):
             return True
-        q = self._coordinates.positions(z, None)
-        states = (q, *self._coordinates.rates(q, dz, ddz))
-        tau = self._dynamics.regressor(*states) @ self._model.values
+        q = self._coordinates.compute_positions(z, None)
+        states = (q, *self._coordinates.compute_rates(q, dz, ddz))
+        tau = self._dynamics.compute_regressor(*states) @ self._model.values
         slack = 1 + _ROUNDING
         kept = (np.abs(tau) <= limits.torque * slack) & (np.abs(tau * dz) <= limits.power * slack)
         return bool(kept.all())

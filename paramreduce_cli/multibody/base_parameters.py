@@ -1,4 +1,4 @@
-"""Base parameters: which columns of W are independent, and what the others are made of.
+"""Base parameters: the independent columns of W, and the dependent ones expressed in them.
 
 Found from random states, as in [Gautier1991], with ranks decided relative to the largest
 singular value of W with its columns scaled to unit length.
@@ -8,7 +8,7 @@ import numpy as np
 import scipy.linalg
 
 from paramreduce_cli.errors import Cause, NumericalError
-from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import (
     INERTIAL,
     BaseParameters,
@@ -27,7 +27,7 @@ _LENGTHS = {Kind.M: 2, Kind.MX: 1, Kind.MY: 1, Kind.MZ: 1}
 """Powers of a length in the effect of a parameter on a moment."""
 
 
-def affecting_columns(W: FloatArray) -> BoolArray:
+def find_affecting_columns(W: FloatArray) -> BoolArray:
     """Find the columns that are not zero to rounding beside the longest one, (n,)."""
     norms = np.linalg.norm(W, axis=0)
     largest = norms.max(initial=0.0)
@@ -35,7 +35,7 @@ def affecting_columns(W: FloatArray) -> BoolArray:
     return result
 
 
-def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
+def find_affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
     """Find the parameters whose effect on some joint is not zero to rounding.
 
     Effects are compared joint by joint, and in units in which the mechanism has the size one: so neither the
@@ -65,7 +65,7 @@ def affecting_parameters(mechanism: Mechanism, K: FloatArray) -> BoolArray:
     return np.any(norms > _AFFECTING_TOLERANCE * scale, axis=0)
 
 
-def base_parameters(
+def choose_base(
     W: FloatArray, preference: IntArray, tolerance: float, affects: BoolArray | None = None
 ) -> BaseParameters:
     """Choose independent columns greedily and express the others in them.
@@ -83,7 +83,7 @@ def base_parameters(
         NumericalError: The greedy choice and the singular values disagree, so that no rank can
             be told.
     """
-    affects = affecting_columns(W) if affects is None else affects
+    affects = find_affecting_columns(W) if affects is None else affects
     affecting = np.flatnonzero(affects)
     norms = np.linalg.norm(W[:, affecting], axis=0)
     scaled = W[:, affecting] / norms
@@ -93,7 +93,7 @@ def base_parameters(
 
     compressed: FloatArray = np.linalg.qr(W, mode="r")  # type: ignore[assignment]
     wanted = preference[np.isin(preference, affecting)]
-    taken = independent_columns(compressed, wanted, tolerance)
+    taken = select_independent(compressed, wanted, tolerance)
     if len(taken) != rank:
         raise NumericalError(
             f"at {tolerance:g} the rank is not clear: {rank} by singular values, {len(taken)} by "
@@ -101,10 +101,10 @@ def base_parameters(
             Cause.RANK,
         )
     columns = np.array(taken, dtype=np.int64)
-    return BaseParameters(columns, regrouping(W, columns, affects), singular, gap)
+    return BaseParameters(columns, compute_regrouping(W, columns, affects), singular, gap)
 
 
-def regrouping(W: FloatArray, columns: IntArray, affects: BoolArray) -> FloatArray:
+def compute_regrouping(W: FloatArray, columns: IntArray, affects: BoolArray) -> FloatArray:
     """Express all other columns in the independent ones, W_others = W_columns beta.
 
     Args:

@@ -1,4 +1,4 @@
-"""What drives add to the torques: inertia of rotors, friction, constants and springs.
+"""Torques of drives: inertia of rotors, friction, constant forces and springs.
 
 A drive acts along one motion, whose position, speed and acceleration are those of the coordinates
 summed with its weights; a force f along it is weight times f on each coordinate, by virtual work.
@@ -16,7 +16,7 @@ from paramreduce_cli.records import Drive, FloatArray, Kind, Mechanism
 
 
 class OddFunctions(NamedTuple):
-    """Functions of the scalars in use."""
+    """The functions sign and tanh of the scalars in use."""
 
     sign: Callable[[Any], Any]
     tanh: Callable[[Any], Any]
@@ -29,8 +29,10 @@ friction take a fifth of the time then and have a fifth less kappa, by the true 
 CASADI = OddFunctions(ca.sign, ca.tanh)
 
 
-def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
-    """The force along a drive's motion for a unit value of one of its parameters.
+def express_unit_force(
+    kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions
+) -> Any:
+    """Return the force along a drive's motion for a unit value of one of its parameters.
 
     Args:
         kind: Of the parameter, one of :data:`paramreduce_cli.records.DRIVE`.
@@ -46,13 +48,14 @@ def unit_force(kind: Kind, drive: Drive, states: Sequence[Sequence[Any]], odd: O
     return _FORCES[kind](drive, states, odd)
 
 
-def _friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
-    speed = along(drive, states[1])
+def _express_friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    speed = sum_along(drive, states[1])
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 
 
-def smoothed(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
-    """The same with the sign in Coulomb friction rounded off, so that it has a slope to follow.
+def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
+    """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; without such friction the
+    mechanism itself.
 
     One without such friction is returned as it is.
 
@@ -73,16 +76,16 @@ def smoothed(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
     return replace(mechanism, drives=drives)
 
 
-def along(drive: Drive, values: Sequence[Any]) -> Any:
-    """The sum of coordinates, or of their derivatives, with the drive's weights."""
+def sum_along(drive: Drive, values: Sequence[Any]) -> Any:
+    """Return the sum of coordinates, or of their derivatives, with the drive's weights."""
     return sum(weight * values[i] for i, weight in enumerate(drive.weights.tolist()) if weight)
 
 
 _FORCES: dict[Kind, Callable[[Drive, Sequence[Sequence[Any]], OddFunctions], Any]] = {
-    Kind.ROTOR: lambda drive, states, odd: along(drive, states[2]),
-    Kind.VISCOUS: lambda drive, states, odd: along(drive, states[1]),
-    Kind.COULOMB: _friction_sign,
+    Kind.ROTOR: lambda drive, states, odd: sum_along(drive, states[2]),
+    Kind.VISCOUS: lambda drive, states, odd: sum_along(drive, states[1]),
+    Kind.COULOMB: _express_friction_sign,
     Kind.OFFSET: lambda drive, states, odd: 1.0,
-    Kind.STIFFNESS: lambda drive, states, odd: along(drive, states[0]) - drive.rest,
+    Kind.STIFFNESS: lambda drive, states, odd: sum_along(drive, states[0]) - drive.rest,
 }
 """Force along a drive's motion for a unit value of each parameter; states are q, dq and ddq."""

@@ -1,4 +1,4 @@
-"""The numeric model of a mechanism, evaluated for many states at once.
+"""Numeric dynamics of a mechanism, evaluated for many states at once.
 
 The regressor of the open tree, projected on the independent coordinates where there are loops,
 and compiled; everything else follows from it, as it is linear in the accelerations too.
@@ -18,7 +18,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.multibody.loops.projection import Projection
-from paramreduce_cli.multibody.regressor import tree_regressor
+from paramreduce_cli.multibody.regressor import express_regressor
 from paramreduce_cli.records import FloatArray, IntArray, Mechanism
 
 SINGULAR_MASS = 1e-10
@@ -27,7 +27,7 @@ round-off then."""
 
 
 class Dynamics:
-    """Inverse and direct dynamics and their regressors in independent coordinates.
+    """The inverse and direct dynamics of a mechanism, and their regressors, in independent coordinates.
 
     Args:
         mechanism: The mechanism; its standard parameters stay free.
@@ -44,20 +44,23 @@ class Dynamics:
     def _loop(self) -> Projection | None:
         return None if self.mechanism.loops is None else Projection(self.mechanism)
 
-    def _symbols(self, *names: str) -> list[ca.MX]:
-        """Of q, which is that of the loops, and of more of its size."""
+    def _make_symbols(self, *names: str) -> list[ca.MX]:
+        """Return the symbol q, shared with the loops if there are any, and further symbols of its size."""
         q, *more = (ca.MX.sym(name, self.mechanism.n_q) for name in ("q", *names))
         return [q if self._loop is None else self._loop.q, *more]
 
     @cached_property
     def _regressor(self) -> BatchFunction:
-        states = self._symbols("dq", "ddq")
-        tree = tree_regressor(self.mechanism)
-        KT = tree(*states) if self._loop is None else self._loop.projected(tree, *states[1:])
+        """Compiled regressor of one sample, transposed."""
+        states = self._make_symbols("dq", "ddq")
+        tree = express_regressor(self.mechanism)
+        KT = (
+            tree(*states) if self._loop is None else self._loop.project_regressor(tree, *states[1:])
+        )
         return BatchFunction(states, [KT], once=self._once)
 
-    def regressor(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
-        """Single-sample observation matrices K with tau = K phi [Atkeson1986].
+    def compute_regressor(self, q: FloatArray, dq: FloatArray, ddq: FloatArray) -> FloatArray:
+        """Return the regressor of every sample, K with tau = K phi [Atkeson1986].
 
         Args:
             q: Generalised coordinates, (n_samples, n_q), rad or m.
@@ -70,10 +73,10 @@ class Dynamics:
         (K,) = self._regressor(q, dq, ddq)
         return K.reshape(-1, self.n_dof, self.n_parameters)
 
-    def inverse(
+    def compute_torques(
         self, q: FloatArray, dq: FloatArray, ddq: FloatArray, phi: FloatArray
     ) -> FloatArray:
-        """Torques of a motion in the independent coordinates, N m or N.
+        """Return the torques of a motion in the independent coordinates, N m or N.
 
         Args:
             q: Generalised coordinates, (n_samples, n_q), rad or m.
@@ -84,12 +87,12 @@ class Dynamics:
         Returns:
             (n_samples, n_dof) or (n_samples, n_dof, n_models)
         """
-        return self.regressor(q, dq, ddq) @ phi
+        return self.compute_regressor(q, dq, ddq) @ phi
 
-    def direct(
+    def compute_mass_matrix_and_bias(
         self, q: FloatArray, dq: FloatArray, phi: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Mass matrix and bias, tau = M ddz + delta.
+        """Return the mass matrix and the bias, with tau = M ddz + delta.
 
         Args:
             q: Generalised coordinates, (n_samples, n_q), rad or m.
@@ -103,13 +106,17 @@ class Dynamics:
         # At rest, so that what the velocities need does not cancel: near singular configurations
         # of loops it is large.
         rest = np.zeros_like(q)
-        tangent, drift = self._tangent_and_drift(q, dq)
-        weight = self.inverse(q, rest, rest, phi)
-        columns = [self.inverse(q, rest, unit, phi) - weight for unit in tangent.transpose(2, 0, 1)]
-        return np.stack(columns, axis=2), self.inverse(q, dq, drift, phi)
+        tangent, drift = self._compute_tangent_and_drift(q, dq)
+        weight = self.compute_torques(q, rest, rest, phi)
+        columns = [
+            self.compute_torques(q, rest, unit, phi) - weight for unit in tangent.transpose(2, 0, 1)
+        ]
+        return np.stack(columns, axis=2), self.compute_torques(q, dq, drift, phi)
 
-    def _tangent_and_drift(self, q: FloatArray, dq: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """R, (n_samples, n_q, n_dof), and b, (n_samples, n_q), with ddq = R ddz + b."""
+    def _compute_tangent_and_drift(
+        self, q: FloatArray, dq: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return R, (n_samples, n_q, n_dof), and b, (n_samples, n_q), with ddq = R ddz + b."""
         if self._loop is None:
             return np.broadcast_to(np.eye(self.n_dof), (*q.shape, self.n_dof)), np.zeros_like(q)
         tangent, drift = self._rates(q, dq)
@@ -119,24 +126,24 @@ class Dynamics:
     def _rates(self) -> BatchFunction:
         """R, row by row, and b of a mechanism with loops."""
         assert self._loop is not None
-        q, dq = self._symbols("dq")
-        R, b = self._loop.whole_tangent, self._loop.whole_drift(dq)
+        q, dq = self._make_symbols("dq")
+        R, b = self._loop.whole_tangent, self._loop.express_whole_drift(dq)
         return BatchFunction([q, dq], [R.T, b], once=self._once)
 
-    def observation(self, columns: IntArray) -> ObservationFunction:
-        """W of a set of columns along a trajectory, and its adjoint."""
-        tree = tree_regressor(self.mechanism, columns.tolist())
+    def make_observation(self, columns: IntArray) -> ObservationFunction:
+        """Return the function that gives columns of W along a trajectory, and its adjoint."""
+        tree = express_regressor(self.mechanism, columns.tolist())
         loop = self._loop
         if loop is None:
-            states = self._symbols("dq", "ddq")
+            states = self._make_symbols("dq", "ddq")
             return ObservationFunction(states, tree(*states), lambda q_bar: q_bar)
         dz, ddz = ca.MX.sym("dz", self.n_dof), ca.MX.sym("ddz", self.n_dof)
-        KT = loop.projected(tree, *loop.rates(dz, ddz))
-        return ObservationFunction([loop.q, dz, ddz], KT, loop.pulled)
+        KT = loop.project_regressor(tree, *loop.express_rates(dz, ddz))
+        return ObservationFunction([loop.q, dz, ddz], KT, loop.pull_back)
 
 
 class ObservationFunction:
-    """Chosen columns of W for a trajectory, with the gradient of any function of W.
+    """A function that gives some columns of W along a trajectory, and the gradient of any function of W.
 
     Args:
         states: Symbols of q, dz and ddz.
@@ -152,8 +159,8 @@ class ObservationFunction:
         q_bar, dz_bar, ddz_bar = (ca.gradient(inner, state) for state in states)
         self._adjoint = BatchFunction([*states, ca.vec(seed)], [pulled(q_bar), dz_bar, ddz_bar])
 
-    def forward(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
-        """W, (n_samples * n_dof, n_columns).
+    def evaluate(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
+        """Return W, (n_samples * n_dof, n_columns).
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).
@@ -163,7 +170,7 @@ class ObservationFunction:
         (K,) = self._forward(q, dz, ddz)
         return K.reshape(-1, self.n_columns)
 
-    def adjoint(
+    def pull_back(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray, W_bar: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Pull a derivative with respect to W back to the independent coordinates.

@@ -1,4 +1,4 @@
-"""Inverse dynamics by the recursive Newton-Euler method, symbolically.
+"""Symbolic inverse dynamics by the recursive Newton-Euler method.
 
 The recursion of [Luh1980] in body frames, with first moments and inertias about the frame
 origins, so that the torques are linear in the standard parameters [Khosla1985]. It is written as
@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Matrix, Vector, add, apply, cross, dot, scale
-from paramreduce_cli.multibody.drives import CASADI, unit_force
-from paramreduce_cli.multibody.kinematics import JointMotion, motions
+from paramreduce_cli.multibody.drives import CASADI, express_unit_force
+from paramreduce_cli.multibody.kinematics import JointMotion, make_joint_motions
 from paramreduce_cli.records import BASE, INERTIAL, Mechanism, Rigid
 
 ZERO: Vector = (ca.SX(0), ca.SX(0), ca.SX(0))
@@ -19,7 +19,7 @@ ZERO: Vector = (ca.SX(0), ca.SX(0), ca.SX(0))
 
 @dataclass(frozen=True)
 class FrameRates:
-    """Velocity and acceleration of a frame, in its own components."""
+    """The velocity and acceleration of a frame, in its own components."""
 
     omega: Vector
     """Angular velocity, rad/s."""
@@ -28,16 +28,16 @@ class FrameRates:
     acceleration: Vector
     """Of the origin, less gravity, m/s^2."""
 
-    def at(self, r: Vector) -> Vector:
-        """Acceleration of a point that is fixed in the frame at r."""
+    def accelerate_point(self, r: Vector) -> Vector:
+        """Return the acceleration of a point that is fixed in the frame at r."""
         swing = add(cross(self.omega_dot, r), cross(self.omega, cross(self.omega, r)))
         return add(self.acceleration, swing)
 
 
-def inverse_dynamics(
+def express_torques(
     mechanism: Mechanism, q: ca.SX, dq: ca.SX, ddq: ca.SX, phi: ca.SX
 ) -> list[ca.SX]:
-    """Joint torques and forces of the open tree for a motion.
+    """Return the joint torques and forces of the open tree for a motion, as expressions.
 
     Args:
         mechanism: The tree; its loops are left open.
@@ -49,16 +49,16 @@ def inverse_dynamics(
     Returns:
         One expression per joint, N m or N.
     """
-    joints = motions(mechanism, q)
-    rates = _rates(mechanism, joints, dq, ddq)
+    joints = make_joint_motions(mechanism, q)
+    rates = _propagate_rates(mechanism, joints, dq, ddq)
     forces, moments = [ZERO] * mechanism.n_q, [ZERO] * mechanism.n_q
     tau = [ca.SX(0)] * mechanism.n_q
     for i in reversed(range(mechanism.n_q)):
         force, moment = forces[i], moments[i]
         for rigid in mechanism.list_rigid_parts(i):
-            own_force, own_moment = _inertial_wrench(rigid, phi, rates[i])
+            own_force, own_moment = _express_inertial_wrench(rigid, phi, rates[i])
             force, moment = add(force, own_force), add(moment, own_moment)
-        tau[i] = _along(joints[i], force, moment)
+        tau[i] = _project_on_joint(joints[i], force, moment)
         parent = mechanism.bodies[i].parent
         if parent != BASE:
             force, moment = joints[i].to_parent(force), joints[i].to_parent(moment)
@@ -67,15 +67,15 @@ def inverse_dynamics(
     states = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
     for drive in mechanism.drives:
         for kind, column in mechanism.find_drive_columns(drive).items():
-            along = phi[column] * unit_force(kind, drive, states, CASADI)
+            along = phi[column] * express_unit_force(kind, drive, states, CASADI)
             tau = [t + weight * along for t, weight in zip(tau, drive.weights, strict=True)]
     return tau
 
 
-def _rates(
+def _propagate_rates(
     mechanism: Mechanism, joints: list[JointMotion], dq: ca.SX, ddq: ca.SX
 ) -> list[FrameRates]:
-    """Velocities and accelerations from the base outwards."""
+    """Return the velocities and accelerations of all frames, from the base outwards."""
     x, y, z = (-mechanism.gravity).tolist()
     base = FrameRates(ZERO, ZERO, (ca.SX(x), ca.SX(y), ca.SX(z)))
     result: list[FrameRates] = []
@@ -83,34 +83,36 @@ def _rates(
         body = joint.body
         before = base if body.parent == BASE else result[body.parent]
         omega, omega_dot = joint.to_body(before.omega), joint.to_body(before.omega_dot)
-        axis = joint.axis()
+        axis = joint.get_axis()
         if body.joint == "revolute":
             spin = scale(dq[i], axis)
             omega_dot = add(omega_dot, add(scale(ddq[i], axis), cross(omega, spin)))
             omega = add(omega, spin)
-            hinge = joint.to_body(before.at(joint.place()))
-            acceleration = FrameRates(omega, omega_dot, hinge).at(joint.arm())
+            hinge = joint.to_body(before.accelerate_point(joint.get_origin()))
+            acceleration = FrameRates(omega, omega_dot, hinge).accelerate_point(joint.get_arm())
         else:
             sliding = add(scale(ddq[i], axis), scale(2 * dq[i], cross(omega, axis)))
-            acceleration = add(joint.to_body(before.at(joint.origin)), sliding)
+            acceleration = add(joint.to_body(before.accelerate_point(joint.origin)), sliding)
         result.append(FrameRates(omega, omega_dot, acceleration))
     return result
 
 
-def _inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
-    """Force and moment about the origin of the body it moves with that keep it on its motion."""
+def _express_inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
+    """Return force and moment about the origin of the carrying body that keep a rigid part on its motion."""
     turn, place = rigid.frame[:3, :3], rigid.frame[:3, 3].tolist()
     back = turn.T.tolist()
     own = FrameRates(
-        apply(back, rates.omega), apply(back, rates.omega_dot), apply(back, rates.at(place))
+        apply(back, rates.omega),
+        apply(back, rates.omega_dot),
+        apply(back, rates.accelerate_point(place)),
     )
-    force, moment = _own_wrench(rigid, phi, own)
+    force, moment = _express_own_wrench(rigid, phi, own)
     force, moment = apply(turn.tolist(), force), apply(turn.tolist(), moment)
     return force, add(moment, cross(place, force))
 
 
-def _own_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
-    """The same about the origin of its own frame, and in that."""
+def _express_own_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
+    """Return force and moment about the origin of the part's own frame, in that frame."""
     values = [phi[column] for column in (rigid.columns[kind] for kind in INERTIAL)]
     m, d, (xx, xy, xz, yy, yz, zz) = values[0], values[1:4], values[4:]
     tensor: Matrix = ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
@@ -120,20 +122,22 @@ def _own_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Ve
     return add(scale(m, a), swing), add(spin, cross(d, a))
 
 
-def _along(joint: JointMotion, force: Vector, moment: Vector) -> ca.SX:
-    """Component of a wrench about the body's origin along the joint."""
+def _project_on_joint(joint: JointMotion, force: Vector, moment: Vector) -> ca.SX:
+    """Return the component of a wrench about the body's origin along the joint."""
     if joint.body.joint == "prismatic":
-        return dot(joint.axis(), force)
-    return dot(joint.axis(), add(moment, cross(joint.arm(), force)))
+        return dot(joint.get_axis(), force)
+    return dot(joint.get_axis(), add(moment, cross(joint.get_arm(), force)))
 
 
-def direct_dynamics(mechanism: Mechanism, q: ca.SX, dq: ca.SX, phi: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Mass matrix and bias forces of the open tree, from its inverse dynamics.
+def express_mass_matrix_and_bias(
+    mechanism: Mechanism, q: ca.SX, dq: ca.SX, phi: ca.SX
+) -> tuple[ca.SX, ca.SX]:
+    """Return the mass matrix and the bias forces of the open tree, from its inverse dynamics.
 
     Returns:
         M = d tau / d ddq, (n_q, n_q), and delta = tau at ddq = 0, (n_q,), with
         tau = M ddq + delta.
     """
     ddq = ca.SX.sym("ddq", mechanism.n_q)
-    tau = ca.vertcat(*inverse_dynamics(mechanism, q, dq, ddq, phi))
+    tau = ca.vertcat(*express_torques(mechanism, q, dq, ddq, phi))
     return ca.jacobian(tau, ddq), ca.substitute(tau, ddq, ca.SX.zeros(mechanism.n_q))

@@ -1,9 +1,9 @@
-"""Several stored sample sets as one."""
+"""A sample set that consists of several stored ones."""
 
 from collections.abc import Iterator, Sequence
 from typing import Protocol
 
-from paramreduce_cli.multibody.observation import joined_factors
+from paramreduce_cli.multibody.observation import join_factors
 from paramreduce_cli.records import Block, FloatArray, SampleSet
 
 
@@ -19,10 +19,10 @@ class StoredStates(SampleSet, Protocol):
 
 
 class JoinedSet:
-    """Consecutive parts of a sample set that was computed from states, one after the other.
+    """A sample set of consecutive parts.
 
     Args:
-        parts: In their order.
+        parts: Parts in their order.
     """
 
     recomputable = True
@@ -33,7 +33,7 @@ class JoinedSet:
 
     @property
     def n_samples(self) -> int:
-        """How many samples it yields in all."""
+        """Number of samples."""
         return sum(part.n_samples for part in self._parts)
 
     def iterate_blocks(self) -> Iterator[Block]:
@@ -42,10 +42,10 @@ class JoinedSet:
             yield from part.iterate_blocks()
 
     def iterate_states(self) -> Iterator[Block]:
-        """The same with observation matrices of no rows."""
+        """Yield the samples with observation matrices without rows."""
         for part in self._parts:
             yield from part.iterate_states()
 
     def compute_factors(self) -> FloatArray:
-        """Triangular factors per trajectory and joint, from those of the parts."""
-        return joined_factors((part.first, part.compute_factors()) for part in self._parts)
+        """Return the triangular factors by trajectory and joint, from those of the parts."""
+        return join_factors((part.first, part.compute_factors()) for part in self._parts)

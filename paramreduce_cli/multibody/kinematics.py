@@ -1,4 +1,4 @@
-"""Rotations and positions along the tree, symbolically and in numbers."""
+"""Rotations and positions along the tree, as expressions and as numbers."""
 
 from dataclasses import dataclass
 
@@ -12,7 +12,7 @@ from paramreduce_cli.robots.frames import count_quarter_turns
 
 @dataclass(frozen=True)
 class JointMotion:
-    """How vectors move between a body's frame and its parent's, at one coordinate.
+    """A motion of one joint at a coordinate: it transforms vectors between a body's frame and its parent's.
 
     Rotations are applied factor by factor, which costs fewer operations than their product.
     """
@@ -24,37 +24,37 @@ class JointMotion:
     """Of the body's frame, in the parent's frame, m."""
 
     def to_body(self, a: Vector) -> Vector:
-        """Components in the body's frame of a vector given in the parent's."""
+        """Return the components in the body's frame of a vector given in the parent's."""
         x, y, z = apply(self.body.parent_to_joint[:3, :3].T.tolist(), a)
         turned = (self.cosine * x + self.sine * y, self.cosine * y - self.sine * x, z)
         return apply(self.body.joint_to_body[:3, :3].T.tolist(), turned)
 
     def to_parent(self, a: Vector) -> Vector:
-        """Components in the parent's frame of a vector given in the body's."""
+        """Return the components in the parent's frame of a vector given in the body's."""
         x, y, z = apply(self.body.joint_to_body[:3, :3].tolist(), a)
         turned = (self.cosine * x - self.sine * y, self.cosine * y + self.sine * x, z)
         return apply(self.body.parent_to_joint[:3, :3].tolist(), turned)
 
-    def axis(self) -> Vector:
-        """The joint's axis in the body's frame."""
+    def get_axis(self) -> Vector:
+        """Return the joint's axis in the body's frame."""
         x, y, z = self.body.joint_to_body[2, :3].tolist()
         return (ca.SX(x), ca.SX(y), ca.SX(z))
 
-    def place(self) -> Vector:
-        """The joint's origin at rest, in the parent's frame, m."""
+    def get_origin(self) -> Vector:
+        """Return the joint's origin at rest in the parent's frame, m."""
         x, y, z = self.body.parent_to_joint[:3, 3].tolist()
         return (ca.SX(x), ca.SX(y), ca.SX(z))
 
-    def arm(self) -> Vector:
-        """From a fixed point of the joint's axis to the body's origin, in the body's frame, m."""
+    def get_arm(self) -> Vector:
+        """Return the vector from a fixed point of the joint's axis to the body's origin, in the body's frame, m."""
         offset = self.body.joint_to_body[:3, :3].T @ self.body.joint_to_body[:3, 3]
         return (ca.SX(offset[0]), ca.SX(offset[1]), ca.SX(offset[2]))
 
 
-def joint_motion(body: Body, z: ca.SX) -> JointMotion:
-    """The motion of one joint at coordinate ``z``."""
+def make_joint_motion(body: Body, z: ca.SX) -> JointMotion:
+    """Return the motion of one joint at coordinate ``z``."""
     if body.joint == "revolute":
-        (c, s), slide = joint_cosine_and_sine(z, body.offset), ca.SX(0)
+        (c, s), slide = express_cosine_and_sine(z, body.offset), ca.SX(0)
     else:
         c, s, slide = ca.SX(1), ca.SX(0), z + body.offset
     after = body.joint_to_body[:3, 3].tolist()
@@ -67,8 +67,8 @@ def joint_motion(body: Body, z: ca.SX) -> JointMotion:
     return JointMotion(body, c, s, origin)
 
 
-def joint_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
-    """Of z + offset; whole quarter turns cost nothing and are exact."""
+def express_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
+    """Return cosine and sine of z + offset; whole quarter turns are exact and cost no operations."""
     quarters = count_quarter_turns(offset)
     if quarters is None:
         return ca.cos(z + offset), ca.sin(z + offset)
@@ -78,13 +78,13 @@ def joint_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
     return c, s
 
 
-def motions(mechanism: Mechanism, q: ca.SX) -> list[JointMotion]:
-    """One motion per body at the generalised coordinates ``q`` (n_q,)."""
-    return [joint_motion(body, q[i]) for i, body in enumerate(mechanism.bodies)]
+def make_joint_motions(mechanism: Mechanism, q: ca.SX) -> list[JointMotion]:
+    """Return one motion per body at the generalised coordinates ``q``, (n_q,)."""
+    return [make_joint_motion(body, q[i]) for i, body in enumerate(mechanism.bodies)]
 
 
-def point_in_base(joints: list[JointMotion], body: int, point: FloatArray) -> Vector:
-    """Position in the base frame of a point given in the frame of a body, m.
+def transform_point(joints: list[JointMotion], body: int, point: FloatArray) -> Vector:
+    """Return the position in the base frame of a point given in the frame of a body, m.
 
     Args:
         joints: One motion per body of the mechanism.
@@ -99,8 +99,8 @@ def point_in_base(joints: list[JointMotion], body: int, point: FloatArray) -> Ve
     return position
 
 
-def direction_in_base(joints: list[JointMotion], body: int, direction: FloatArray) -> Vector:
-    """Components in the base frame of a direction given in the frame of a body."""
+def transform_direction(joints: list[JointMotion], body: int, direction: FloatArray) -> Vector:
+    """Return the components in the base frame of a direction given in the frame of a body."""
     x, y, z = np.asarray(direction).tolist()
     components: Vector = (ca.SX(x), ca.SX(y), ca.SX(z))
     while body != BASE:
@@ -109,8 +109,8 @@ def direction_in_base(joints: list[JointMotion], body: int, direction: FloatArra
     return components
 
 
-def body_poses(mechanism: Mechanism, q: FloatArray) -> FloatArray:
-    """Poses of the body frames in the base frame.
+def compute_body_poses(mechanism: Mechanism, q: FloatArray) -> FloatArray:
+    """Return the poses of the body frames in the base frame.
 
     Args:
         mechanism: Whose bodies are placed.

@@ -1,4 +1,4 @@
-"""Observation matrices of long motions, block by block, compressed as they pass.
+"""Observation matrices of long motions, block by block, compressed to triangular factors.
 
 The triangular factor R of [W | tau] has the same least-squares fits as the matrix itself;
 one is kept for every trajectory and joint, so that any weighting of joints and any choice
@@ -32,7 +32,7 @@ _FACTORISED_AT_ONCE = 600
 
 @dataclass(frozen=True)
 class StateBlock:
-    """Consecutive states of one trajectory, and torques where they were measured."""
+    """A block of consecutive states of one trajectory, with torques if they were measured."""
 
     trajectory: int
     time: FloatArray
@@ -46,7 +46,7 @@ class StateBlock:
 
 @dataclass(frozen=True)
 class Span:
-    """Consecutive samples of one trajectory, few enough to be evaluated at a time."""
+    """A span of consecutive samples of one trajectory, few enough to be evaluated at once."""
 
     trajectory: int
     start: int
@@ -57,8 +57,8 @@ StatesAt = Callable[[Span], StateBlock]
 """Gives the states of a span."""
 
 
-def spans(lengths: Iterable[int]) -> list[Span]:
-    """All samples of trajectories of some lengths, in order."""
+def make_spans(lengths: Iterable[int]) -> list[Span]:
+    """Return spans of all samples of trajectories of some lengths, in order."""
     return [
         Span(trajectory, start, min(start + BLOCK_SAMPLES, length))
         for trajectory, length in enumerate(lengths)
@@ -85,14 +85,14 @@ class ObservedSet:
 
     @property
     def n_samples(self) -> int:
-        """How many samples it yields in all."""
+        """Number of samples."""
         return sum(span.stop - span.start for span in self.spans)
 
     def iterate_states(self) -> Iterator[StateBlock]:
         """Yield the states in order; every call starts anew."""
         return map(self.at, self.spans)
 
-    def pieces(self) -> Iterator[ObservedSet]:
+    def iterate_pieces(self) -> Iterator[ObservedSet]:
         """Yield the set as trajectories, long ones in pieces where the set is divisible."""
         most = PIECE_SAMPLES // BLOCK_SAMPLES if self.divisible else len(self.spans)
         for _, own in itertools.groupby(self.spans, lambda span: span.trajectory):
@@ -103,6 +103,7 @@ class ObservedSet:
     @cached_property
     def _coordinates(self) -> Coordinates:
         # Late: all kinds of mechanisms, of which looking at a file needs nothing.
+        """Map from the independent coordinates to all of them."""
         from paramreduce_cli.multibody.loops.coordinates import Coordinates
 
         return Coordinates(self.dynamics.mechanism)
@@ -119,44 +120,44 @@ class ObservedSet:
             if s.trajectory != trajectory:
                 trajectory, before = s.trajectory, nothing
             try:
-                q, before = self._followed(s, before)
+                q, before = self._follow(s, before)
             except DataError as error:
                 raise DataError(f"{self.source}, trajectory {trajectory + 1}: {error}") from error
-            dq, ddq = self._coordinates.rates(q, s.dz, s.ddz)
-            K = self.dynamics.regressor(q, dq, ddq)
+            dq, ddq = self._coordinates.compute_rates(q, s.dz, s.ddz)
+            K = self.dynamics.compute_regressor(q, dq, ddq)
             tau = K @ self.phi if s.tau is None else s.tau
             W = K.reshape(-1, K.shape[2])
             yield Block(s.trajectory, s.time, s.z, s.dz, s.ddz, tau, q, dq, ddq, W)
 
-    def _followed(
+    def _follow(
         self, s: StateBlock, before: tuple[FloatArray, FloatArray]
     ) -> tuple[FloatArray, tuple[FloatArray, FloatArray]]:
-        """Generalised coordinates of a block, and time and place of its end, to go on from there."""
+        """Return the generalised coordinates of a block, and time and position of its end, to continue from there."""
         if self.dynamics.mechanism.loops is None:
             return s.z, before
         way = s.z if s.way is None else s.way
         finer = way.shape[0] // s.z.shape[0]
         steps = np.arange(way.shape[0]) / finer
         time = np.interp(steps, np.arange(s.time.size), s.time)
-        q = self._coordinates.positions(way, before[1][0] if before[1].size else None)
+        q = self._coordinates.compute_positions(way, before[1][0] if before[1].size else None)
         times, path = np.concatenate([before[0], time]), np.concatenate([before[1], q])
         self._coordinates.check_motion(times, path)
         return q[::finer], (time[-1:], q[-1:])
 
     def compute_factors(self) -> FloatArray:
-        """Triangular factors per trajectory and joint."""
-        return joint_factors(self.iterate_blocks())
+        """Return the triangular factors by trajectory and joint."""
+        return compute_joint_factors(self.iterate_blocks())
 
 
 class FactorAccumulator:
-    """Collects the triangular factors of blocks as they pass by."""
+    """An accumulator of the triangular factors of blocks."""
 
     def __init__(self) -> None:
         self._factors: dict[int, list[FloatArray]] = {}
         self._waiting: list[Block] = []
 
     def add(self, block: Block) -> None:
-        """Take the rows of one block in."""
+        """Add the rows of one block."""
         if self._waiting and self._waiting[0].trajectory != block.trajectory:
             self._factorise()
         self._waiting.append(block)
@@ -164,6 +165,7 @@ class FactorAccumulator:
             self._factorise()
 
     def _factorise(self) -> None:
+        """Compress the waiting rows into the factors."""
         first = self._waiting[0]
         n_dof, n = first.tau.shape[1], first.W.shape[1]
         factors = self._factors.setdefault(first.trajectory, [np.zeros((0, n + 1))] * n_dof)
@@ -177,12 +179,12 @@ class FactorAccumulator:
                 rows = stacked[start : start + len(w)]
                 rows[:, :n], rows[:, n] = w[:, j], block.tau[:, j]
                 start += len(w)
-            factors[j] = _reduced(stacked)
+            factors[j] = _reduce(stacked)
         self._waiting = []
 
-    def result(self) -> FloatArray:
-        """(n_trajectories, n_dof, n + 1, n + 1) from the first trajectory that there is to the last, padded with zero
-        rows; without trajectories for no blocks.
+    def get_factors(self) -> FloatArray:
+        """Return the factors, (n_trajectories, n_dof, n + 1, n + 1), from the first trajectory that has samples to the
+        last, padded with zero rows; without trajectories if there were no blocks.
         """
         if self._waiting:
             self._factorise()
@@ -192,12 +194,12 @@ class FactorAccumulator:
         none = [np.zeros((0, factor.shape[1])) for factor in some]
         numbers = range(min(self._factors), max(self._factors) + 1)
         return np.array(
-            [[_square(factor) for factor in self._factors.get(k, none)] for k in numbers]
+            [[_make_square(factor) for factor in self._factors.get(k, none)] for k in numbers]
         )
 
 
-def joint_factors(blocks: Iterable[Block]) -> FloatArray:
-    """Triangular factors of [W | tau] per trajectory and joint.
+def compute_joint_factors(blocks: Iterable[Block]) -> FloatArray:
+    """Return the triangular factors of [W | tau] by trajectory and joint.
 
     Returns:
         (n_trajectories, n_dof, n_parameters + 1, n_parameters + 1)
@@ -205,11 +207,11 @@ def joint_factors(blocks: Iterable[Block]) -> FloatArray:
     accumulator = FactorAccumulator()
     for block in blocks:
         accumulator.add(block)
-    return accumulator.result()
+    return accumulator.get_factors()
 
 
-def joined_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
-    """Triangular factors of all rows, from those of parts of them.
+def join_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
+    """Return the triangular factors of all rows, from those of parts of the rows.
 
     Args:
         parts: Of consecutive parts of the samples: the number of the first trajectory in it, and the factors from
@@ -226,7 +228,7 @@ def joined_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
                 found[number] = more
             else:
                 found[number] = np.array(
-                    [_square(np.vstack(rows)) for rows in zip(own, more, strict=True)]
+                    [_make_square(np.vstack(rows)) for rows in zip(own, more, strict=True)]
                 )
     return (
         np.array([found[number] for number in sorted(found)]) if found else np.zeros((0, 0, 0, 0))
@@ -234,30 +236,31 @@ def joined_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
 
 
 def append_rows(factor: FloatArray, rows: FloatArray) -> FloatArray:
-    """Triangular factor of [factor; rows]."""
-    return _reduced(np.vstack([factor, rows]))
+    """Return the triangular factor of [factor; rows]."""
+    return _reduce(np.vstack([factor, rows]))
 
 
-def _reduced(stacked: FloatArray) -> FloatArray:
-    """The triangular factor of rows, or the rows themselves where they are few."""
-    return _triangular(stacked) if stacked.shape[0] > stacked.shape[1] else stacked
+def _reduce(stacked: FloatArray) -> FloatArray:
+    """Return the triangular factor of rows, or the rows themselves if they are few."""
+    return _factorise(stacked) if stacked.shape[0] > stacked.shape[1] else stacked
 
 
-def _triangular(rows: FloatArray) -> FloatArray:
+def _factorise(rows: FloatArray) -> FloatArray:
     result: FloatArray = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
     return result
 
 
-def _square(factor: FloatArray) -> FloatArray:
+def _make_square(factor: FloatArray) -> FloatArray:
+    """Return the triangular factor as a square matrix, padded with zero rows."""
     size = factor.shape[1]
-    triangular = _triangular(factor)
+    triangular = _factorise(factor)
     result = np.zeros((size, size))
     result[: triangular.shape[0]] = triangular
     return result
 
 
-def combined_factor(factors: FloatArray, nominal_torque: FloatArray | None) -> FloatArray:
-    """Triangular factor of all rows together, each joint's divided by its nominal torque.
+def combine_factors(factors: FloatArray, nominal_torque: FloatArray | None) -> FloatArray:
+    """Return the triangular factor of all rows together, each joint's divided by its nominal torque.
 
     Args:
         factors: Per trajectory and joint, (n_trajectories, n_dof, k, k).
@@ -271,11 +274,11 @@ def combined_factor(factors: FloatArray, nominal_torque: FloatArray | None) -> F
     result = np.zeros((0, k))
     for trajectory in weighted:
         result = append_rows(result, trajectory.reshape(-1, k))
-    return _square(result)
+    return _make_square(result)
 
 
-def thinned_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
-    """Every so many samples of each trajectory."""
+def decimate_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
+    """Yield one of so many samples of each trajectory."""
     trajectory, start = -1, 0
     for block in blocks:
         if block.trajectory != trajectory:
@@ -291,8 +294,8 @@ def thinned_blocks(blocks: Iterable[Block], every: int) -> Iterator[Block]:
         yield Block(trajectory=trajectory, W=block.W[rows], **states)
 
 
-def standard_deviation(arrays: Iterable[FloatArray]) -> FloatArray:
-    """Of the columns over all arrays together, merged pair by pair [Chan1983]."""
+def compute_standard_deviation(arrays: Iterable[FloatArray]) -> FloatArray:
+    """Return the standard deviation of the columns over all arrays together, merged pair by pair [Chan1983]."""
     count, mean, spread = 0, np.zeros(1), np.zeros(1)
     for array in arrays:
         n, own_mean = array.shape[0], array.mean(axis=0)

@@ -1,4 +1,4 @@
-"""What is left of columns once their parts along others are taken out."""
+"""Orthogonalisation of columns, and least squares."""
 
 from math import sqrt
 
@@ -11,7 +11,7 @@ DEPENDENT = 1e-9
 
 
 class Orthogonaliser:
-    """Columns of unit length, and a vector, without their parts along the columns taken.
+    """A set of unit columns and a vector, without their components along the columns taken.
 
     Modified Gram-Schmidt: a column that is taken is orthogonalised once more, and its direction is
     removed from all others.
@@ -33,8 +33,8 @@ class Orthogonaliser:
         self._basis = np.empty(X.shape[::-1])
         self._rank = 0
 
-    def squared_lengths(self) -> FloatArray:
-        """Of what is left of each column, zero where it is dependent, (n,)."""
+    def compute_squared_lengths(self) -> FloatArray:
+        """Return the squared lengths of what is left of the columns, zero for dependent ones, (n,)."""
         squared = np.einsum("ij,ij->j", self.X, self.X)
         squared[squared <= self._dependent**2] = 0.0
         return squared
@@ -56,14 +56,14 @@ class Orthogonaliser:
         return True
 
 
-def unit_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Columns divided by their lengths, (k, n), and the lengths, (n,), one for columns of zeros."""
+def normalise_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return columns divided by their lengths, (k, n), and the lengths, (n,), which are 1 for columns of zeros."""
     lengths = np.linalg.norm(W, axis=0)
     lengths = np.where(lengths > 0, lengths, 1.0)
     return W / lengths, lengths
 
 
-def independent_columns(W: FloatArray, wanted: IntArray, dependent: float = DEPENDENT) -> list[int]:
+def select_independent(W: FloatArray, wanted: IntArray, dependent: float = DEPENDENT) -> list[int]:
     """Take columns in the order wanted, leaving out those that depend on columns taken before.
 
     Args:
@@ -72,15 +72,15 @@ def independent_columns(W: FloatArray, wanted: IntArray, dependent: float = DEPE
         dependent: A column depends on others when no more than this share of its length is
             left of it.
     """
-    rest = Orthogonaliser(unit_columns(W[:, wanted])[0], dependent=dependent)
+    rest = Orthogonaliser(normalise_columns(W[:, wanted])[0], dependent=dependent)
     return [int(column) for j, column in enumerate(wanted) if rest.take(j)]
 
 
-def least_squares(factor: FloatArray) -> FloatArray:
-    """The parameters of smallest norm that fit best, (n,), from rows or a factor of [W | chi], (k, n + 1).
+def solve_least_squares(factor: FloatArray) -> FloatArray:
+    """Return the parameters of smallest norm that fit best, (n,), from rows or a factor of [W | chi], (k, n + 1).
 
-    Columns are scaled to unit length first, so that units play no part.
+    Columns are scaled to unit length first, so that units do not matter.
     """
-    X, lengths = unit_columns(factor[:, :-1])
+    X, lengths = normalise_columns(factor[:, :-1])
     solution: FloatArray = np.linalg.lstsq(X, factor[:, -1], rcond=DEPENDENT)[0] / lengths
     return solution

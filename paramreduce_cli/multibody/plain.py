@@ -1,4 +1,4 @@
-"""Inverse and direct dynamics by plain recursion, as expressions: to be counted, or simulated."""
+"""Inverse and direct dynamics by textbook recursion, as expressions to be counted or simulated."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import casadi as ca
 import numpy as np
 
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.multibody.inverse_dynamics import direct_dynamics, inverse_dynamics
+from paramreduce_cli.multibody.inverse_dynamics import express_mass_matrix_and_bias, express_torques
 from paramreduce_cli.multibody.loops.projection import Projection
 from paramreduce_cli.records import FloatArray, Mechanism, ReducedModel
 
 
 class PlainDynamics:
-    """The textbook's recursion, with the standard parameters as inputs.
+    """The textbook recursion of a mechanism's dynamics.
 
     Args:
         mechanism: The mechanism.
@@ -28,34 +28,34 @@ class PlainDynamics:
     @cached_property
     def _tau_q(self) -> ca.SX:
         """Forces of the open tree, d_q."""
-        return ca.vertcat(
-            *inverse_dynamics(self.mechanism, self._q, self._dq, self._ddq, self._phi)
-        )
+        return ca.vertcat(*express_torques(self.mechanism, self._q, self._dq, self._ddq, self._phi))
 
     @cached_property
     def _direct_q(self) -> tuple[ca.SX, ca.SX]:
         """M_qq and delta_q of the open tree."""
-        return direct_dynamics(self.mechanism, self._q, self._dq, self._phi)
+        return express_mass_matrix_and_bias(self.mechanism, self._q, self._dq, self._phi)
 
     @cached_property
     def programs(self) -> tuple[Program, Program]:
         """d_q and [M_qq | delta_q], M's lower triangle row by row; inputs are phi, q, dq and ddq."""
-        return self._counted([], self._tau_q, *self._direct_q)
+        return self._make_programs([], self._tau_q, *self._direct_q)
 
     @cached_property
     def _independent_programs(self) -> tuple[Program, Program]:
-        """The same of d_z = R' d_q, M_zz = R' M_qq R and delta_z = R' (delta_q + M_qq b)."""
+        """Programs of d_z = R' d_q, M_zz = R' M_qq R and delta_z = R' (delta_q + M_qq b)."""
         if self.mechanism.loops is None:
             return self.programs
         loop = Projection(self.mechanism)
         (M, delta), R = self._direct_q, loop.R
         inputs = [loop.R_d, loop.b_d]
-        return self._counted(inputs, R.T @ self._tau_q, R.T @ (M @ R), R.T @ (delta + M @ loop.b))
+        return self._make_programs(
+            inputs, R.T @ self._tau_q, R.T @ (M @ R), R.T @ (delta + M @ loop.b)
+        )
 
-    def _counted(
+    def _make_programs(
         self, loop: list[ca.SX], tau: ca.SX, M: ca.SX, delta: ca.SX
     ) -> tuple[Program, Program]:
-        """Straight-line programs of IDM and [M | delta], M's lower triangle; phi comes first."""
+        """Return the programs of IDM and of [M | delta] with M's lower triangle; phi comes first among the inputs."""
         lower = [M[i, j] for i in range(M.shape[0]) for j in range(i + 1)]
         q, dq, ddq = self._q, self._dq, self._ddq
         inverse = ca.Function("d", [self._phi, q, dq, ddq, *loop], [tau])
@@ -65,7 +65,7 @@ class PlainDynamics:
     def count_operations(
         self, model: ReducedModel, *, signs_free: bool = True, independent: bool = False
     ) -> tuple[int, int]:
-        """Operations of IDM and [M | delta] of a model, parameters as inputs.
+        """Return the operations of IDM and of [M | delta] of a model, with parameters as inputs.
 
         Args:
             model: Which parameters are kept.
@@ -80,8 +80,8 @@ class PlainDynamics:
             direct.count(dropped, same=model.ties, signs_free=signs_free),
         )
 
-    def accelerations(self, phi: FloatArray) -> ca.Function:
-        """Accelerations of an open tree by coordinates, velocities and torques, of symbols.
+    def express_accelerations(self, phi: FloatArray) -> ca.Function:
+        """Return the accelerations of an open tree as a function of coordinates, velocities and torques.
 
         Args:
             phi: Values of the standard parameters, (n_parameters,).

@@ -14,9 +14,9 @@ from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.expressions.vectors import Vector, cross, dot, subtract
 from paramreduce_cli.multibody.kinematics import (
     JointMotion,
-    direction_in_base,
-    motions,
-    point_in_base,
+    make_joint_motions,
+    transform_direction,
+    transform_point,
 )
 from paramreduce_cli.multibody.loops.projection import Projection
 from paramreduce_cli.records import DISTANCES, Constraint, FloatArray, Mechanism
@@ -28,7 +28,7 @@ _NEAR = 0.1
 
 
 class Quantities:
-    """Evaluate constraints on many configurations.
+    """A set of bounded quantities of a mechanism, evaluated on many configurations.
 
     Args:
         mechanism: Whose quantities they are.
@@ -44,8 +44,9 @@ class Quantities:
 
     @cached_property
     def _values(self) -> BatchFunction:
+        """Compiled quantities in their units."""
         q, measures = self._symbols
-        return BatchFunction([q], [ca.vertcat(*map(_natural, measures, self.constraints))])
+        return BatchFunction([q], [ca.vertcat(*map(_express_quantity, measures, self.constraints))])
 
     @cached_property
     def _rows(self) -> BatchFunction:
@@ -53,9 +54,10 @@ class Quantities:
 
     @cached_property
     def _jacobian(self) -> BatchFunction:
+        """Compiled derivatives of the rows by the independent coordinates."""
         q, loop = self._symbols[0], self._projection
         by_q = ca.jacobian(self._bounded, q)
-        by_z = by_q if loop is None else loop.pulled(by_q.T).T
+        by_z = by_q if loop is None else loop.pull_back(by_q.T).T
         return BatchFunction([q], [by_z.T])
 
     @cached_property
@@ -66,8 +68,10 @@ class Quantities:
     def _symbols(self) -> tuple[ca.MX, list[ca.MX]]:
         """Coordinates and one smooth measure for each constraint."""
         q = ca.SX.sym("q", self.mechanism.n_q)
-        joints = motions(self.mechanism, q)
-        inner = ca.Function("measures", [q], [_measure(joints, q, c) for c in self.constraints])
+        joints = make_joint_motions(self.mechanism, q)
+        inner = ca.Function(
+            "measures", [q], [_express_measure(joints, q, c) for c in self.constraints]
+        )
         loop = self._projection
         symbol = ca.MX.sym("q", self.mechanism.n_q) if loop is None else loop.q
         measures = inner.call([symbol])
@@ -79,98 +83,103 @@ class Quantities:
 
     @cached_property
     def _bounded(self) -> ca.MX:
+        """Rows of all bounds, as an expression."""
         pairs = zip(self._symbols[1], self.constraints, strict=True)
-        return ca.vertcat(*(row for pair in pairs for row in _bounded_rows(*pair)))
+        return ca.vertcat(*(row for pair in pairs for row in _express_rows(*pair)))
 
-    def values(self, q: FloatArray) -> FloatArray:
-        """The quantities in their units, (n_samples, n_constraints), at q (n_samples, n_q)."""
+    def compute_values(self, q: FloatArray) -> FloatArray:
+        """Return the quantities in their units, (n_samples, n_constraints), at q, (n_samples, n_q)."""
         if not self.constraints:
             return np.zeros((q.shape[0], 0))
         return self._values(q)[0]
 
-    def rows(self, q: FloatArray) -> FloatArray:
-        """Rows that are at most zero where the bounds hold, (n_samples, n_rows)."""
+    def compute_rows(self, q: FloatArray) -> FloatArray:
+        """Return rows that are at most zero where the bounds hold, (n_samples, n_rows)."""
         if not self.constraints:
             return np.zeros((q.shape[0], 0))
         return self._rows(q)[0]
 
-    def jacobian(self, q: FloatArray) -> FloatArray:
-        """Derivatives of the rows by the independent coordinates, (n_samples, n_rows, n_dof)."""
+    def compute_jacobian(self, q: FloatArray) -> FloatArray:
+        """Return the derivatives of the rows by the independent coordinates, (n_samples, n_rows, n_dof)."""
         shape = (q.shape[0], self.owners.size, self.mechanism.n_dof)
         if not self.constraints:
             return np.zeros(shape)
         return self._jacobian(q)[0].reshape(shape)
 
 
-def _measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.SX:
-    """A smooth function of the quantity: cosine of an angle, square of a distance."""
+def _express_measure(joints: list[JointMotion], q: ca.SX, constraint: Constraint) -> ca.SX:
+    """Return a smooth function of the quantity: the cosine of an angle, the square of a distance."""
     bodies, vectors = constraint.bodies, constraint.vectors
     if constraint.kind == "coordinate":
         return q[bodies[0]]
     if constraint.kind == "angle":
         a, b = (
-            direction_in_base(joints, body, vector / np.linalg.norm(vector))
+            transform_direction(joints, body, vector / np.linalg.norm(vector))
             for body, vector in zip(bodies, vectors, strict=True)
         )
         return dot(a, b)
     if constraint.kind == "singularity":
         return ca.SX(0)
     if constraint.kind == "clearance":
-        return _nearest(joints, constraint)
+        return _express_nearest(joints, constraint)
     if constraint.kind == "above-plane":
-        return _lowest(joints, constraint)
-    start = point_in_base(joints, bodies[1], vectors[1])
-    end = point_in_base(joints, bodies[0], vectors[0])
+        return _express_lowest(joints, constraint)
+    start = transform_point(joints, bodies[1], vectors[1])
+    end = transform_point(joints, bodies[0], vectors[0])
     gap = subtract(end, start)
     if constraint.kind == "distance":
         return dot(gap, gap)
     axis = vectors[2] / np.linalg.norm(vectors[2])
-    across = cross(direction_in_base(joints, bodies[1], axis), gap)
+    across = cross(transform_direction(joints, bodies[1], axis), gap)
     return dot(across, across)
 
 
-def _nearest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
-    """Smooth minimum over pairs of spheres of squared distances, one where they just keep the gap."""
+def _express_nearest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
+    """Return a smooth minimum over pairs of spheres of their squared distances, scaled to 1 where they just keep the
+    gap.
+    """
     (a, b), (points_a, radii_a, points_b, radii_b) = constraint.bodies, constraint.vectors
     ends_a, ends_b = (
-        [point_in_base(joints, body, point) for point in points]
+        [transform_point(joints, body, point) for point in points]
         for body, points in ((a, points_a), (b, points_b))
     )
     shares = [
-        _squared(subtract(p, q)) / (r + s + constraint.lower) ** 2
+        _square_length(subtract(p, q)) / (r + s + constraint.lower) ** 2
         for p, r in zip(ends_a, radii_a.tolist(), strict=True)
         for q, s in zip(ends_b, radii_b.tolist(), strict=True)
     ]
-    return _smooth_minimum(shares)
+    return _express_smooth_minimum(shares)
 
 
-def _lowest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
-    """Smooth minimum of what spheres of a body are above a plane beyond the gap, in units of :data:`_NEAR`."""
+def _express_lowest(joints: list[JointMotion], constraint: Constraint) -> ca.SX:
+    """Return a smooth minimum of the heights of a body's spheres above a plane beyond the gap, in units of
+    :data:`_NEAR`.
+    """
     points, radii, (foot, normal) = constraint.vectors
     heights = []
     for point, radius in zip(points, radii.tolist(), strict=True):
-        centre = point_in_base(joints, constraint.bodies[0], point)
+        centre = transform_point(joints, constraint.bodies[0], point)
         height = sum(
             n * (c - f) for n, c, f in zip(normal.tolist(), centre, foot.tolist(), strict=True)
         )
         heights.append((height - radius - constraint.lower) / _NEAR)
-    return _smooth_minimum(heights)
+    return _express_smooth_minimum(heights)
 
 
-def _squared(vector: Vector) -> ca.SX:
+def _square_length(vector: Vector) -> ca.SX:
     return dot(vector, vector)
 
 
-def _smooth_minimum(values: list[ca.SX]) -> ca.SX:
-    """Never above the smallest value."""
+def _express_smooth_minimum(values: list[ca.SX]) -> ca.SX:
+    """Return a smooth minimum, which is never above the smallest value."""
     if len(values) == 1:
         return values[0]
     least = ca.mmin(ca.vertcat(*values))
     return least - ca.log(sum(ca.exp(_SHARP * (least - value)) for value in values)) / _SHARP
 
 
-def _natural(measure: ca.MX, constraint: Constraint) -> ca.MX:
-    """The quantity in its unit."""
+def _express_quantity(measure: ca.MX, constraint: Constraint) -> ca.MX:
+    """Return the quantity in its unit."""
     if constraint.kind == "angle":
         return ca.acos(ca.fmin(ca.fmax(measure, -1), 1))
     if constraint.kind == "clearance":
@@ -181,7 +190,8 @@ def _natural(measure: ca.MX, constraint: Constraint) -> ca.MX:
     return ca.sqrt(measure) if constraint.kind in DISTANCES else measure
 
 
-def _bounded_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
+def _express_rows(measure: ca.MX, constraint: Constraint) -> list[ca.MX]:
+    """Return the rows of a constraint's bounds."""
     upper, lower = constraint.upper, constraint.lower
     has_upper, has_lower = upper < np.inf, lower > -np.inf
     if constraint.kind == "angle":

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import FloatArray, Mechanism
 
@@ -13,10 +13,11 @@ _NEAREST = 0.1
 outweigh all others."""
 
 
-def random_states(
+def draw_states(
     mechanism: Mechanism, count: int, rng: np.random.Generator
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """States anywhere: whole turns, slides as long as the mechanism, normal speeds and accelerations.
+    """Return random states: angles anywhere, slides as long as the mechanism, normally distributed speeds and
+    accelerations.
 
     Those of loops are reached from the assembly by random moves, as far as these go without
     coming near a singular configuration.
@@ -30,7 +31,7 @@ def random_states(
         q, dq, ddq, each (count, n_q).
     """
     bodies = [mechanism.bodies[k] for k in mechanism.independent]
-    longest = _extent(mechanism)
+    longest = _estimate_length(mechanism)
     reach = np.array([np.pi if body.joint == "revolute" else longest for body in bodies])
     shape = (count, mechanism.n_dof)
     z = rng.uniform(-1, 1, size=shape) * reach
@@ -39,19 +40,19 @@ def random_states(
         return z, dz, ddz
     coordinates, independent = Coordinates(mechanism), list(mechanism.independent)
     assembly = mechanism.loops.assembly
-    least = _NEAREST * float(coordinates.distance(assembly[None])[0])
+    least = _NEAREST * float(coordinates.compute_distance(assembly[None])[0])
     moves = rng.uniform(0, 1, size=(count, 1)) * z
     q = np.tile(assembly, (count, 1))
     for share in _SHARES:
         reached, _ = coordinates.follow(assembly[independent] + share * moves, q)
-        safe = coordinates.distance(reached) >= least
+        safe = coordinates.compute_distance(reached) >= least
         q[safe] = reached[safe]
-    return coordinates.states(q[:, independent], dz, ddz, start=q)
+    return coordinates.compute_states(q[:, independent], dz, ddz, start=q)
 
 
-def _extent(mechanism: Mechanism) -> float:
-    """A length that is typical of the mechanism, m; one if its bodies are all in one place."""
+def _estimate_length(mechanism: Mechanism) -> float:
+    """Return a typical length of the mechanism, m; 1 if all its bodies are in one place."""
     if mechanism.lengths:
         return max(abs(length.value) for length in mechanism.lengths)
     q = np.zeros(mechanism.n_q) if mechanism.loops is None else mechanism.loops.assembly
-    return float(np.ptp(body_poses(mechanism, q)[:, :3, 3], axis=0).max()) or 1.0
+    return float(np.ptp(compute_body_poses(mechanism, q)[:, :3, 3], axis=0).max()) or 1.0

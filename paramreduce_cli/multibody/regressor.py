@@ -1,4 +1,4 @@
-"""Torques of a tree as a linear map of its parameters, joint by joint and body by body.
+"""Regressor of a tree: its torques as a linear map of its parameters.
 
 In components of the base frame a joint sees the bodies beyond it only through its screw, and
 a body is seen by all joints before it through one matrix: the force, and the moment about the
@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.multibody.drives import CASADI, unit_force
-from paramreduce_cli.multibody.kinematics import joint_cosine_and_sine
+from paramreduce_cli.multibody.drives import CASADI, express_unit_force
+from paramreduce_cli.multibody.kinematics import express_cosine_and_sine
 from paramreduce_cli.records import BASE, INERTIAL, Body, FloatArray, Mechanism
 
 _FLAT = 500
@@ -24,8 +24,8 @@ _FrameState = tuple[ca.MX, ...]
 the acceleration of the origin less gravity."""
 
 
-def tree_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -> ca.Function:
-    """The regressor of an open tree.
+def express_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -> ca.Function:
+    """Return the regressor of an open tree.
 
     Args:
         mechanism: The tree; its loops are left open.
@@ -37,50 +37,58 @@ def tree_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -
     """
     wanted = list(range(mechanism.n_parameters)) if columns is None else list(columns)
     q, dq, ddq = (ca.MX.sym(name, mechanism.n_q) for name in ("q", "dq", "ddq"))
-    states, screws = _outwards(mechanism, q, dq, ddq)
-    wrench = _unit_wrenches()
+    states, screws = _propagate_states(mechanism, q, dq, ddq)
+    wrench = _make_unit_wrenches()
     parts: list[ca.MX] = []
     order: list[int] = []
     for rigid in mechanism.rigid:
         present = {kind: c for kind, c in rigid.columns.items() if c in wanted}
         if present:
-            state = _moved(states[rigid.body], rigid.frame)
+            state = _move_frame(states[rigid.body], rigid.frame)
             parts.append(wrench(*state)[:, [INERTIAL.index(kind) for kind in present]])
             order += present.values()
     inertial = sorted(order, key=wanted.index)
     wrenches = ca.horzcat(*parts)[:, [order.index(c) for c in inertial]] if parts else ca.MX(6, 0)
-    reached = _reached(mechanism)
+    reached = _find_carrying_joints(mechanism)
     maps = wrenches.T @ ca.horzcat(*screws) * ca.MX(ca.sparsify(ca.DM(reached[inertial])))
-    driven = {c: row for c, row in _driven(mechanism, q, dq, ddq).items() if c in wanted}
+    driven = {
+        c: row for c, row in _express_drive_rows(mechanism, q, dq, ddq).items() if c in wanted
+    }
     rows = ca.vertcat(maps, *driven.values())
     place = {c: k for k, c in enumerate([*inertial, *driven])}
     function = ca.Function("regressor", [q, dq, ddq], [rows[[place[c] for c in wanted], :]])
     return function.expand() if reached[inertial].sum() <= _FLAT else function
 
 
-def _driven(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -> dict[int, ca.MX]:
-    """Rows of drives' parameters, (1, n_q) each, by column."""
+def _express_drive_rows(mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX) -> dict[int, ca.MX]:
+    """Return the rows of the drives' parameters, (1, n_q) each, by column."""
     vectors = [[x[i] for i in range(mechanism.n_q)] for x in (q, dq, ddq)]
     rows = {}
     for drive in mechanism.drives:
         weights = ca.MX(ca.sparsify(ca.DM(drive.weights[None])))
         for kind, column in mechanism.find_drive_columns(drive).items():
-            rows[column] = unit_force(kind, drive, vectors, CASADI) * weights
+            rows[column] = express_unit_force(kind, drive, vectors, CASADI) * weights
     return rows
 
 
-def _moved(state: _FrameState, frame: FloatArray) -> _FrameState:
-    """State of a frame that is fixed in another one."""
+def _move_frame(state: _FrameState, frame: FloatArray) -> _FrameState:
+    """Return the state of a frame that is fixed in another one."""
     if np.array_equal(frame, np.eye(4)):
         return state
-    R, p, omega, omega_dot, a = symbols = _frame_symbols()
+    R, p, omega, omega_dot, a = symbols = _make_frame_symbols()
     arm = R @ frame[:3, 3]
-    moved = [R @ frame[:3, :3], p + arm, omega, omega_dot, a + _swing(omega, omega_dot, arm)]
+    moved = [
+        R @ frame[:3, :3],
+        p + arm,
+        omega,
+        omega_dot,
+        a + _express_swing(omega, omega_dot, arm),
+    ]
     return tuple(ca.Function("moved", symbols, moved).call(list(state)))
 
 
-def _reached(mechanism: Mechanism) -> np.ndarray:
-    """One where the body of a parameter is beyond a joint, (n_parameters, n_q)."""
+def _find_carrying_joints(mechanism: Mechanism) -> np.ndarray:
+    """Return 1 where the body of a parameter is beyond a joint, (n_parameters, n_q)."""
     result = np.zeros((mechanism.n_parameters, mechanism.n_q))
     for rigid in mechanism.rigid:
         columns, joint = list(rigid.columns.values()), rigid.body
@@ -90,73 +98,83 @@ def _reached(mechanism: Mechanism) -> np.ndarray:
     return result
 
 
-def _outwards(
+def _propagate_states(
     mechanism: Mechanism, q: ca.MX, dq: ca.MX, ddq: ca.MX
 ) -> tuple[list[_FrameState], list[ca.MX]]:
-    """States of the bodies' frames, and screws of the joints, (6,)."""
+    """Return the states of the bodies' frames, and the screws of the joints, (6,) each."""
     still = ca.MX(3, 1)
     base = (ca.MX(ca.DM.eye(3)), still, still, still, ca.MX(ca.DM(-mechanism.gravity)))
     states: list[_FrameState] = []
     screws = []
     for i, body in enumerate(mechanism.bodies):
         before = base if body.parent == BASE else states[body.parent]
-        *state, screw = _joint_step(body)(*before, q[i], dq[i], ddq[i])
+        *state, screw = _make_joint_step(body)(*before, q[i], dq[i], ddq[i])
         states.append(tuple(state))
         screws.append(screw)
     return states, screws
 
 
-def _frame_symbols() -> list[ca.SX]:
+def _make_frame_symbols() -> list[ca.SX]:
     vectors = (ca.SX.sym(name, 3) for name in ("p", "omega", "omega_dot", "a"))
     return [ca.SX.sym("R", 3, 3), *vectors]
 
 
-def _joint_step(body: Body) -> ca.Function:
-    """From the state of the frame before to that of a body's own, and the screw between."""
-    R, p, omega, omega_dot, a = before = _frame_symbols()
+def _make_joint_step(body: Body) -> ca.Function:
+    """Return the function from the state of the frame before to that of a body's frame, and the screw between."""
+    R, p, omega, omega_dot, a = before = _make_frame_symbols()
     q, dq, ddq = (ca.SX.sym(name) for name in ("q", "dq", "ddq"))
     at_joint, to_body = body.parent_to_joint, body.joint_to_body
     place = R @ at_joint[:3, 3]
     R = R @ at_joint[:3, :3]
     z = R[:, 2]
-    a = a + _swing(omega, omega_dot, place)
+    a = a + _express_swing(omega, omega_dot, place)
     p = p + place
     if body.joint == "revolute":
         screw = ca.vertcat(ca.cross(p, z), z)
         omega_dot = omega_dot + z * ddq + ca.cross(omega, z * dq)
         omega = omega + z * dq
-        c, s = joint_cosine_and_sine(q, body.offset)
+        c, s = express_cosine_and_sine(q, body.offset)
         R = ca.horzcat(R[:, 0] * c + R[:, 1] * s, R[:, 1] * c - R[:, 0] * s, z)
     else:
         screw = ca.vertcat(z, ca.SX(3, 1))
         slide = z * (q + body.offset)
-        a = a + _swing(omega, omega_dot, slide) + z * ddq + 2 * dq * ca.cross(omega, z)
+        a = a + _express_swing(omega, omega_dot, slide) + z * ddq + 2 * dq * ca.cross(omega, z)
         p = p + slide
     arm = R @ to_body[:3, 3]
-    state = [R @ to_body[:3, :3], p + arm, omega, omega_dot, a + _swing(omega, omega_dot, arm)]
+    state = [
+        R @ to_body[:3, :3],
+        p + arm,
+        omega,
+        omega_dot,
+        a + _express_swing(omega, omega_dot, arm),
+    ]
     outputs = [ca.densify(value) for value in (*state, screw)]
     return ca.Function("joint", [*before, q, dq, ddq], ca.cse(outputs))
 
 
-def _swing(omega: ca.SX, omega_dot: ca.SX, r: ca.SX) -> ca.SX:
-    """What turning adds to the acceleration of a point at r."""
+def _express_swing(omega: ca.SX, omega_dot: ca.SX, r: ca.SX) -> ca.SX:
+    """Return what rotation adds to the acceleration of a point at r."""
     return ca.cross(omega_dot, r) + ca.cross(omega, ca.cross(omega, r))
 
 
-def _unit_wrenches() -> ca.Function:
-    """Force, and moment about the base's origin, for unit values of each kind of parameter, (6, 10)."""
-    R, p, omega, omega_dot, a = state = _frame_symbols()
+def _make_unit_wrenches() -> ca.Function:
+    """Return the function that gives force, and moment about the base's origin, for unit values of each parameter, (6,
+    10).
+    """
+    R, p, omega, omega_dot, a = state = _make_frame_symbols()
     turning = ca.skew(omega_dot) + ca.skew(omega) @ ca.skew(omega)
     forces = ca.horzcat(a, turning @ R, ca.SX(3, 6))
     in_body, in_body_dot = R.T @ omega, R.T @ omega_dot
-    spins = _tensor_times(in_body_dot) + ca.skew(in_body) @ _tensor_times(in_body)
+    spins = _express_tensor_product(in_body_dot) + ca.skew(in_body) @ _express_tensor_product(
+        in_body
+    )
     moments = ca.horzcat(ca.SX(3, 1), -ca.skew(a) @ R, R @ spins)
     wrenches = ca.vertcat(forces, moments + ca.skew(p) @ forces)
     return ca.Function("wrenches", state, ca.cse([ca.densify(wrenches)]))
 
 
-def _tensor_times(v: ca.SX) -> ca.SX:
-    """I v as a linear map of Ixx, Ixy, Ixz, Iyy, Iyz, Izz, (3, 6)."""
+def _express_tensor_product(v: ca.SX) -> ca.SX:
+    """Return I v as a linear map of Ixx, Ixy, Ixz, Iyy, Iyz, Izz, (3, 6)."""
     x, y, z = v[0], v[1], v[2]
     rows = ([x, y, z, 0, 0, 0], [0, x, 0, y, z, 0], [0, 0, x, 0, y, z])
     return ca.vertcat(*(ca.horzcat(*row) for row in rows))

@@ -1,4 +1,4 @@
-"""Linear relations between parameters as readable text.
+"""Regrouping relations between parameters as readable text.
 
 A coefficient that is a simple function of the geometry is printed as such, but only where the
 function still fits when the geometry is changed; everything else stays a number.
@@ -21,8 +21,8 @@ _MOST_PRINTED = 12
 Lengths = Mapping[str, float]
 
 
-def candidates(lengths: Lengths) -> dict[str, float]:
-    """Simple functions of named lengths, by their text, simplest first."""
+def list_functions(lengths: Lengths) -> dict[str, float]:
+    """Return simple functions of named lengths by their text, the simplest first."""
     values = {"": 1.0, "2": 2.0}
     for name, value in lengths.items():
         values[name] = value
@@ -33,12 +33,12 @@ def candidates(lengths: Lengths) -> dict[str, float]:
         values[f"2 {one} {two}"] = 2 * x * y
     for count in (2, 3):
         for chosen in itertools.combinations(lengths.items(), count):
-            values |= _sums_of_squares(chosen)
+            values |= _list_square_sums(chosen)
     return values
 
 
-def _sums_of_squares(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
-    """Sums and differences of the squares of some lengths; the first one positive."""
+def _list_square_sums(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
+    """Return the sums and differences of the squares of some lengths; the first one is positive."""
     result = {}
     for signs in itertools.product((1, -1), repeat=len(lengths) - 1):
         text, value = f"{lengths[0][0]}^2", lengths[0][1] ** 2
@@ -49,10 +49,8 @@ def _sums_of_squares(lengths: Sequence[tuple[str, float]]) -> dict[str, float]:
     return result
 
 
-def named_coefficient(
-    values: FloatArray, texts: Sequence[str], functions: FloatArray
-) -> str | None:
-    """Text of the function of the geometry that a coefficient is, with its sign.
+def name_coefficient(values: FloatArray, texts: Sequence[str], functions: FloatArray) -> str | None:
+    """Return the text of the function of the geometry that a coefficient is, with its sign, or None.
 
     Args:
         values: The coefficient for each of several geometries, (n_geometries,).
@@ -70,10 +68,10 @@ def named_coefficient(
     return f"{'-' if negative else '+'} {texts[k]}".rstrip()
 
 
-def regrouping_expressions(
+def format_regrouping(
     names: Sequence[str], kept: IntArray, beta: Sequence[FloatArray], lengths: Sequence[Lengths]
 ) -> list[str]:
-    """Base parameters in terms of standard ones, coefficients named where geometry explains them.
+    """Return the base parameters in terms of standard ones, with coefficients named if the geometry explains them.
 
     Args:
         names: Of all parameters, (n,).
@@ -81,14 +79,14 @@ def regrouping_expressions(
         beta: For several geometries of the same structure, the real one first, each (r, n - r).
         lengths: Of the same geometries, by name.
     """
-    found = [candidates(entry) for entry in lengths]
+    found = [list_functions(entry) for entry in lengths]
     texts, functions = list(found[0]), np.array([list(entry.values()) for entry in found])
 
     def term(row: int, column: int) -> str:
         values = np.array([b[row, column] for b in beta])
-        return named_coefficient(values, texts, functions) or signed_number(values[0])
+        return name_coefficient(values, texts, functions) or format_signed(values[0])
 
-    return _expressions(names, kept, beta[0], term)
+    return _format_expressions(names, kept, beta[0], term)
 
 
 def approximate_expressions(
@@ -107,24 +105,22 @@ def approximate_expressions(
     """
 
     def term(i: int, j: int) -> str:
-        return signed_number(float(beta[i, j]))
+        return format_signed(float(beta[i, j]))
 
     if known is None:
-        return _expressions(names, kept, beta, term)
+        return _format_expressions(names, kept, beta, term)
     others = np.setdiff1d(np.arange(len(names)), kept)
     parts = np.abs(beta * known[others])
     wholes = np.abs(known[kept]) + parts.sum(axis=1)
     shares = parts / np.maximum(wholes, np.finfo(float).tiny)[:, None]
     return [
-        _largest_first(
-            [f"{term(i, j)} {names[k]}" for j, k in enumerate(others)], own, names[column]
-        )
+        _format_sum([f"{term(i, j)} {names[k]}" for j, k in enumerate(others)], own, names[column])
         for i, (column, own) in enumerate(zip(kept, shares, strict=True))
     ]
 
 
-def _largest_first(terms: Sequence[str], shares: FloatArray, first: str) -> str:
-    """A sum whose smallest terms are counted.
+def _format_sum(terms: Sequence[str], shares: FloatArray, first: str) -> str:
+    """Return a sum with its largest terms first, whose smallest terms are only counted.
 
     Args:
         terms: With their signs.
@@ -142,16 +138,17 @@ def _largest_first(terms: Sequence[str], shares: FloatArray, first: str) -> str:
     return f"{text} and {them} {100 * remaining[printed]:.1g} %"
 
 
-def signed_number(value: float) -> str:
-    """Such as ``- 0.4318``; one is left out."""
+def format_signed(value: float) -> str:
+    """Return a number with its sign, such as ``- 0.4318``; a factor of 1 is left out."""
     if abs(abs(value) - 1.0) <= _MATCH:
         return "-" if value < 0 else "+"
     return f"{'-' if value < 0 else '+'} {abs(value):.6g}"
 
 
-def _expressions(
+def _format_expressions(
     names: Sequence[str], kept: IntArray, beta: FloatArray, term: Callable[[int, int], str]
 ) -> list[str]:
+    """Return the base parameters as sums of standard parameters."""
     others = [names[k] for k in np.setdiff1d(np.arange(len(names)), kept)]
     result = []
     for i, column in enumerate(kept):

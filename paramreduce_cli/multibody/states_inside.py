@@ -1,4 +1,4 @@
-"""Random states inside limits and constraints, on which models are looked at that hold within."""
+"""Random states inside limits and constraints, on which models are tested."""
 
 from collections.abc import Sequence
 from functools import cached_property
@@ -22,11 +22,11 @@ States = tuple[FloatArray, FloatArray, FloatArray]
 
 
 class StatesInside:
-    """Random states whose coordinates are drawn each by itself inside its limits.
+    """A sampler of random states inside limits and constraints.
 
-    Positions of loops are reached from known ones by random moves, each taken where the loops can be
-    followed, and come no nearer to a singular configuration than these; velocities and then
-    accelerations are shortened until those of the dependent coordinates are inside their limits, too.
+    Positions of loops are reached from known ones by random moves, as far as the loops can be followed and come no
+    nearer to a singular configuration than the known ones. Velocities, then accelerations are shortened until those of
+    the dependent coordinates are inside their limits too.
 
     Args:
         mechanism: The mechanism.
@@ -56,10 +56,10 @@ class StatesInside:
     @cached_property
     def _nearest(self) -> float:
         """Distance to singularity of the known position that is nearest to one."""
-        return float(self._coordinates.distance(self._known).min())
+        return float(self._coordinates.compute_distance(self._known).min())
 
-    def drawn(self, count: int, rng: np.random.Generator, *, corners: bool = False) -> States:
-        """q, dq and ddq, each (count, n_q); fewer where so many are not found.
+    def draw(self, count: int, rng: np.random.Generator, *, corners: bool = False) -> States:
+        """Return q, dq and ddq, (count, n_q) each; fewer states if so many are not found.
 
         Args:
             count: Number of states.
@@ -67,33 +67,33 @@ class StatesInside:
             corners: Whether every coordinate is at one of its limits; positions of loops never are.
         """
         if self._mechanism.loops is not None:
-            q = self._moved(count, rng)
-            return self._shortened(q, self._anywhere(len(q), rng, corners))
+            q = self._walk(count, rng)
+            return self._shorten(q, self._draw_independent(len(q), rng, corners))
         kept = np.empty((0, *self._lower.shape))
         for _ in range(_DRAWS):
-            some = self._anywhere(count, rng, corners)
-            kept = np.concatenate([kept, some[self._allowed(some[:, 0])]])[:count]
+            some = self._draw_independent(count, rng, corners)
+            kept = np.concatenate([kept, some[self._are_inside(some[:, 0])]])[:count]
             if len(kept) == count:
                 break
         return kept[:, 0], kept[:, 1], kept[:, 2]
 
-    def _anywhere(self, count: int, rng: np.random.Generator, corners: bool) -> FloatArray:
-        """Independent ones between the limits, or at them, (count, 3, n_dof)."""
+    def _draw_independent(self, count: int, rng: np.random.Generator, corners: bool) -> FloatArray:
+        """Return independent coordinates and their derivatives between the limits, or at them, (count, 3, n_dof)."""
         lower, upper = self._lower[:, self._independent], self._upper[:, self._independent]
         shape = (count, *lower.shape)
         if corners:
             return np.where(rng.random(shape) < 0.5, lower, upper)
         return rng.uniform(lower, upper, size=shape)
 
-    def _allowed(self, q: FloatArray) -> BoolArray:
-        """Whether positions keep to limits and constraints, (n_samples,)."""
+    def _are_inside(self, q: FloatArray) -> BoolArray:
+        """Return whether positions keep limits and constraints, (n_samples,)."""
         inside = ((q >= self._lower[0]) & (q <= self._upper[0])).all(axis=1)
         if self._mechanism.loops is not None:
-            inside &= self._coordinates.distance(q) >= self._nearest
-        return np.asarray(inside & (self._quantities.rows(q) <= 0).all(axis=1))
+            inside &= self._coordinates.compute_distance(q) >= self._nearest
+        return np.asarray(inside & (self._quantities.compute_rows(q) <= 0).all(axis=1))
 
-    def _moved(self, count: int, rng: np.random.Generator) -> FloatArray:
-        """Positions of loops that were reached, (count, n_q)."""
+    def _walk(self, count: int, rng: np.random.Generator) -> FloatArray:
+        """Return positions of loops that were reached, (count, n_q)."""
         lower, upper = self._lower[0, self._independent], self._upper[0, self._independent]
         q = self._known[rng.integers(len(self._known), size=count)]
         for _ in range(_MOVES):
@@ -102,26 +102,28 @@ class StatesInside:
             z = q[:, self._independent] + moves
             tried = np.flatnonzero(((z >= lower) & (z <= upper)).all(axis=1))
             found, way = self._coordinates.follow(z[tried], q[tried])
-            taken = (way == 1) & self._allowed(found)
+            taken = (way == 1) & self._are_inside(found)
             q[tried[taken]] = found[taken]
-        return q[self._allowed(q)]
+        return q[self._are_inside(q)]
 
-    def _shortened(self, q: FloatArray, drawn: FloatArray) -> States:
-        """States at positions q of loops, with velocities and accelerations as drawn, (n_samples, 3, n_dof), or shorter."""
-        rates, (_, dz, ddz) = self._coordinates.rates, np.moveaxis(drawn, 1, 0)
+    def _shorten(self, q: FloatArray, drawn: FloatArray) -> States:
+        """Return states at positions q of loops, with velocities and accelerations as drawn, (n_samples, 3, n_dof), or
+        shorter.
+        """
+        rates, (_, dz, ddz) = self._coordinates.compute_rates, np.moveaxis(drawn, 1, 0)
         still = np.zeros_like(dz)
         dq, _ = rates(q, dz, still)
-        dz = dz * _shares(dq, self._lower[1], self._upper[1])
+        dz = dz * _compute_shares(dq, self._lower[1], self._upper[1])
         _, drift = rates(q, dz, still)  # grows with the square of the velocities
-        dz = dz * np.sqrt(_shares(drift, _DRIFT * self._lower[2], _DRIFT * self._upper[2]))
+        dz = dz * np.sqrt(_compute_shares(drift, _DRIFT * self._lower[2], _DRIFT * self._upper[2]))
         _, drift = rates(q, dz, still)
         _, ddq = rates(q, dz, ddz)
-        ddz = ddz * _shares(ddq - drift, self._lower[2] - drift, self._upper[2] - drift)
+        ddz = ddz * _compute_shares(ddq - drift, self._lower[2] - drift, self._upper[2] - drift)
         return (q, *rates(q, dz, ddz))
 
 
-def _shares(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
-    """Of rates, (n_samples, n_q), that are inside limits around zero, one at the most, (n_samples, 1)."""
+def _compute_shares(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+    """Return the shares of rates, (n_samples, n_q), that are inside limits around zero, one at most, (n_samples, 1)."""
     bound = np.where(rates > 0, upper, lower)
     shares = np.divide(bound, rates, out=np.ones_like(rates), where=rates != 0)
     return np.asarray(np.clip(shares, 0.0, 1.0).min(axis=1, keepdims=True))

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import DEPENDENT, independent_columns
+from paramreduce_cli.multibody.orthogonal import DEPENDENT, select_independent
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.problem import SelectionProblem
 
@@ -30,7 +30,7 @@ def fit(problem: SelectionProblem, subset: IntArray) -> Fit:
     """
     others = np.setdiff1d(np.arange(problem.W.shape[1]), subset)
     right = np.column_stack([problem.W[:, others], problem.chi])
-    dependent = len(independent_columns(problem.W, subset)) < subset.size
+    dependent = len(select_independent(problem.W, subset)) < subset.size
     cut = DEPENDENT if dependent else None
     solution, *_ = np.linalg.lstsq(problem.X[:, subset], right, rcond=cut)
     solution = solution / problem.lengths[subset, None]

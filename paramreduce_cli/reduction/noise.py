@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from paramreduce_cli.multibody.observation import combined_factor
-from paramreduce_cli.multibody.orthogonal import DEPENDENT, least_squares
+from paramreduce_cli.multibody.observation import combine_factors
+from paramreduce_cli.multibody.orthogonal import DEPENDENT, solve_least_squares
 from paramreduce_cli.records import FloatArray
 
 _ROUNDS = 5
@@ -36,10 +36,10 @@ def estimate_joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int)
     """
     noise = scale.copy()
     measured = np.isfinite(scale)
-    rank = np.linalg.matrix_rank(combined_factor(factors, noise)[:, :-1], rtol=DEPENDENT)
+    rank = np.linalg.matrix_rank(combine_factors(factors, noise)[:, :-1], rtol=DEPENDENT)
     free = max(0.1, 1 - rank / (n_samples * np.count_nonzero(measured)))
     for _ in range(_ROUNDS):
-        parameters = least_squares(combined_factor(factors, noise))
+        parameters = solve_least_squares(combine_factors(factors, noise))
         left = compute_residual_rms(factors, parameters, n_samples) / np.sqrt(free)
         # A joint that is fitted without any residual would take all the weight.
         left = np.maximum(left, 1e-6 * scale)

@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import unit_columns
+from paramreduce_cli.multibody.orthogonal import normalise_columns
 from paramreduce_cli.records import FloatArray, IntArray
 
 FULL_PRECISION = 1e-13
@@ -65,7 +65,7 @@ class SelectionProblem:
 
     @cached_property
     def _normalised(self) -> tuple[FloatArray, FloatArray]:
-        return unit_columns(self.W)
+        return normalise_columns(self.W)
 
     @property
     def X(self) -> FloatArray:

@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.multibody.base_parameters import affecting_columns
+from paramreduce_cli.multibody.base_parameters import find_affecting_columns
 from paramreduce_cli.records import BoolArray, FloatArray, Model, Run, Samples
 from paramreduce_cli.reduction.grouping import Group, GroupedColumns, group_columns
 from paramreduce_cli.reduction.problem import SelectionProblem
@@ -60,8 +60,8 @@ def _compute_lengths(W: FloatArray) -> FloatArray:
 
 def _find_affecting(W: FloatArray, values: FloatArray | None) -> BoolArray:
     """Return which columns have an effect, (n,), also by what each contributes if its value is known."""
-    affecting = affecting_columns(W)
-    return affecting if values is None else affecting | affecting_columns(W * values)
+    affecting = find_affecting_columns(W)
+    return affecting if values is None else affecting | find_affecting_columns(W * values)
 
 
 def _warn_of_small_columns(W: FloatArray, affecting: BoolArray, names: tuple[str, ...]) -> None:

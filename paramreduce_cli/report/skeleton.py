@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.records import BASE, Body, FloatArray, Kind, Mechanism, Model
 
 _AXIS = 0.05
@@ -34,7 +34,7 @@ class Skeleton:
 def skeleton(model: Model, q: FloatArray) -> Skeleton:
     """The pose at generalised coordinates q, (n_q,)."""
     mechanism = model.mechanism
-    poses = body_poses(mechanism, q)
+    poses = compute_body_poses(mechanism, q)
     joints = [
         body.parent_to_joint if body.parent == BASE else poses[body.parent] @ body.parent_to_joint
         for body in mechanism.bodies

@@ -10,14 +10,14 @@ from paramreduce_cli.errors import ConfigError, DataError, NumericalError, Param
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.formulations import formulations
 from paramreduce_cli.multibody.base_parameters import (
-    affecting_parameters,
-    base_parameters,
-    regrouping,
+    choose_base,
+    compute_regrouping,
+    find_affecting_parameters,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled, find_assembly_modes
-from paramreduce_cli.multibody.random_states import random_states
-from paramreduce_cli.multibody.relations import regrouping_expressions
+from paramreduce_cli.multibody.loops.assembly import assemble, find_assembly_modes
+from paramreduce_cli.multibody.random_states import draw_states
+from paramreduce_cli.multibody.relations import format_regrouping
 from paramreduce_cli.records import (
     BaseParameters,
     BoolArray,
@@ -46,10 +46,10 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     The ranks are decided on seeded random states. An interruption leaves nothing: it takes less than
     a minute for thirty joints.
     """
-    mechanism = assembled(robot.build_mechanism())
+    mechanism = assemble(robot.build_mechanism())
     rng = np.random.default_rng(_SEED)
-    states = random_states(mechanism, _STATES, rng)
-    K = Dynamics(mechanism).regressor(*states)
+    states = draw_states(mechanism, _STATES, rng)
+    K = Dynamics(mechanism).compute_regressor(*states)
     measured = robot.find_measured()
     W = K[:, measured].reshape(-1, K.shape[2])
     values = robot.get_values()
@@ -63,8 +63,8 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
             "nominal_torque in the config, in N m (N for a prismatic joint).",
             ("nominal_torque",),
         )
-    affects = affecting_parameters(mechanism, K[:, measured])
-    base = base_parameters(W, _order_columns(model, mechanism), model.rank_tolerance, affects)
+    affects = find_affecting_parameters(mechanism, K[:, measured])
+    base = choose_base(W, _order_columns(model, mechanism), model.rank_tolerance, affects)
     _check_named(model, mechanism, base)
     _say_other_modes(robot, model, mechanism, base)
     texts = _format_expressions(robot, mechanism, base, affects, states, rng)
@@ -93,11 +93,11 @@ def _say_other_modes(
     counts = []
     for mode in find_assembly_modes(mechanism):
         try:
-            states = random_states(mode, _STATES // 2, np.random.default_rng(_SEED))
-            K = Dynamics(mode).regressor(*states)[:, robot.find_measured()]
-            affects = affecting_parameters(mode, K)
+            states = draw_states(mode, _STATES // 2, np.random.default_rng(_SEED))
+            K = Dynamics(mode).compute_regressor(*states)[:, robot.find_measured()]
+            affects = find_affecting_parameters(mode, K)
             W = K.reshape(-1, K.shape[2])
-            found = base_parameters(W, _order_columns(model, mode), model.rank_tolerance, affects)
+            found = choose_base(W, _order_columns(model, mode), model.rank_tolerance, affects)
         except (NumericalError, DataError):
             continue
         counts.append(found.columns.size)
@@ -139,11 +139,11 @@ def _format_expressions(
     betas, geometries = [base.beta], [mechanism]
     for _ in range(_CHANGED_GEOMETRIES if mechanism.lengths else 0):
         changed = robot.stretch(lambda length: length * rng.uniform(0.8, 1.25)).build_mechanism()
-        K = Dynamics(changed, once=True).regressor(*states)[:, robot.find_measured()]
-        betas.append(regrouping(K.reshape(-1, K.shape[2]), base.columns, affects))
+        K = Dynamics(changed, once=True).compute_regressor(*states)[:, robot.find_measured()]
+        betas.append(compute_regrouping(K.reshape(-1, K.shape[2]), base.columns, affects))
         geometries.append(changed)
     lengths = [{length.name: length.value for length in entry.lengths} for entry in geometries]
-    return regrouping_expressions(mechanism.parameter_names, base.columns, betas, lengths)
+    return format_regrouping(mechanism.parameter_names, base.columns, betas, lengths)
 
 
 def _order_columns(model: ModelSection, mechanism: Mechanism) -> IntArray:

@@ -10,8 +10,8 @@ from paramreduce_cli.identification import consistency as physics
 from paramreduce_cli.identification.comparison import compare_held_out
 from paramreduce_cli.identification.estimation import LinearFit, collect_rows, fit_robustly
 from paramreduce_cli.identification.hints import find_hints
-from paramreduce_cli.multibody.observation import combined_factor
-from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.multibody.observation import combine_factors
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import (
     Block,
     Consistency,
@@ -103,7 +103,7 @@ def _estimate_model(
     assert held_out is not None
     columns = _make_expansion(chosen)
     factors = _merge_factors(training.compute_factors(), columns)
-    values = least_squares(combined_factor(factors, deviation))
+    values = solve_least_squares(combine_factors(factors, deviation))
     if wanted.estimator == "robust":
         values, deviation = fit_robustly(
             lambda: (
@@ -151,7 +151,7 @@ def _cross_validate(factors: FloatArray, deviation: FloatArray) -> FloatArray:
     measured = np.isfinite(deviation)
     found = []
     for k in range(len(factors) if len(factors) > 1 else 0):
-        values = least_squares(combined_factor(np.delete(factors, k, axis=0), deviation))
+        values = solve_least_squares(combine_factors(np.delete(factors, k, axis=0), deviation))
         own = factors[k, measured]
         left = own[..., -1] - own[..., :-1] @ values
         found.append(np.linalg.norm(left) / (np.linalg.norm(own[..., -1]) or 1.0))
@@ -172,7 +172,7 @@ def _fit_consistent(
         return None
     held_out = samples.validation
     assert held_out is not None
-    factor = combined_factor(samples.estimation.compute_factors(), deviation)
+    factor = combine_factors(samples.estimation.compute_factors(), deviation)
     known = physics.list_constraints(model.mechanism, model.values, factor)
     try:
         standard = physics.fit_consistent(factor, known, wanted.consistency)

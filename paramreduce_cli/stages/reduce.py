@@ -15,11 +15,11 @@ from paramreduce_cli.judgement.torque import NormErrors, compute_torque_errors
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (
-    combined_factor,
-    standard_deviation,
-    thinned_blocks,
+    combine_factors,
+    compute_standard_deviation,
+    decimate_blocks,
 )
-from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import (
     PROVING,
     Columns,
@@ -74,14 +74,14 @@ def reduce(
     weights = _choose_weights(reduction, samples)
     grouped = make_columns(reduction, samples)
     columns = grouped.columns
-    factor = merge_factor(combined_factor(samples.estimation.compute_factors(), weights), columns)
+    factor = merge_factor(combine_factors(samples.estimation.compute_factors(), weights), columns)
     problem = make_problem(factor, model, grouped, samples.values)
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
         raise DataError(
             f"{rows} rows are too few for {problem.candidates.size} parameters; bring more samples."
         )
-    rank = len(independent_columns(problem.W, problem.candidates_by_preference))
+    rank = len(select_independent(problem.W, problem.candidates_by_preference))
     _warn_of_rank(rank, model, columns)
     kept = KeptProofs(items, factor, by_subtrees=reduction.best_subset.parts == "subtrees")
     most = len(problem.columns)
@@ -153,7 +153,9 @@ def _choose_weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
         n_dof = next(iter(samples.estimation.iterate_blocks())).tau.shape[1]
         return np.where(np.isinf(weights), np.inf, 1.0) if weights is not None else np.ones(n_dof)
     if weights is None:
-        weights = standard_deviation(block.tau for block in samples.estimation.iterate_blocks())
+        weights = compute_standard_deviation(
+            block.tau for block in samples.estimation.iterate_blocks()
+        )
     if wanted.weighting == "noise":
         found = samples.estimation
         weights = estimate_joint_noise(found.compute_factors(), weights, found.n_samples)
@@ -202,12 +204,12 @@ def _make_criterion_inputs(
 
     def accelerations(most: int) -> AccelerationData:
         """Samples spread evenly over the estimation set."""
-        direct = dynamics().direct
+        direct = dynamics().compute_mass_matrix_and_bias
         nominal = samples.nominal_acceleration
         if nominal is None:
             raise DataError("samples.h5 holds no /nominal_acceleration; accelerations need it.")
         every = max(1, -(-samples.estimation.n_samples // most))
-        blocks = list(thinned_blocks(samples.estimation.iterate_blocks(), every))
+        blocks = list(decimate_blocks(samples.estimation.iterate_blocks(), every))
         q, dq, ddz, tau = (
             np.concatenate([getattr(block, key) for block in blocks])
             for key in ("q", "dq", "ddz", "tau")

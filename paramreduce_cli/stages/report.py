@@ -161,10 +161,10 @@ def _compute_states(model: Model, motion: ShownMotion) -> dict[str, FloatArray]:
     if mechanism.loops is None:
         return {"q": motion.z, "dq": motion.dz, "ddq": motion.ddz}
     coordinates = Coordinates(mechanism)
-    dq, ddq = coordinates.rates(motion.q, motion.dz, motion.ddz)
+    dq, ddq = coordinates.compute_rates(motion.q, motion.dz, motion.ddz)
     dependent = list(mechanism.dependent)
-    R = coordinates.tangent(motion.q)[:, dependent]
-    b = coordinates.rates(motion.q, motion.dz, np.zeros_like(motion.ddz))[1][:, dependent]
+    R = coordinates.compute_tangent(motion.q)[:, dependent]
+    b = coordinates.compute_rates(motion.q, motion.dz, np.zeros_like(motion.ddz))[1][:, dependent]
     return {"q": motion.q, "dq": dq, "ddq": ddq, "R": R, "b": b}
 
 
@@ -235,7 +235,7 @@ def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> 
         wanted = [expand_per_joint(pose, model.mechanism.n_dof) for pose in section.poses]
         coordinates = Coordinates(model.mechanism, once=True)
         try:
-            return [coordinates.states(*[z[None]] * 3)[0][0] for z in wanted]
+            return [coordinates.compute_states(*[z[None]] * 3)[0][0] for z in wanted]
         except DataError as error:
             raise ConfigError(str(error), ("report", "poses")) from error
     picks = np.linspace(0, motion.time.size, _POSES, endpoint=False).astype(int)

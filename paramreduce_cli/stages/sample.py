@@ -32,8 +32,8 @@ from paramreduce_cli.multibody.observation import (
     Span,
     StateBlock,
     StatesAt,
-    spans,
-    standard_deviation,
+    compute_standard_deviation,
+    make_spans,
 )
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.told import ToldSet
@@ -121,7 +121,7 @@ def _combine_items(
     pieces: dict[str, ObservedSet] = {}
     for name, one in computed.items():
         if isinstance(one, ObservedSet):
-            pieces |= {f"{name}-{k:06d}": piece for k, piece in enumerate(one.pieces())}
+            pieces |= {f"{name}-{k:06d}": piece for k, piece in enumerate(one.iterate_pieces())}
     if items.part.is_whole and not any(key in items.kept for key in pieces):
         return None
 
@@ -193,8 +193,8 @@ def _complete_series(
         z, dz, ddz = basis.evaluate(coefficients)
         excess = np.max([limits.lower - z, z - limits.upper, np.abs(dz) - limits.velocity])
         if excess <= _IMAGE_ROUNDING:
-            q, _, _ = coordinates.states(z, dz, ddz)
-            excess = quantities.rows(q).max(initial=-np.inf)
+            q, _, _ = coordinates.compute_states(z, dz, ddz)
+            excess = quantities.compute_rows(q).max(initial=-np.inf)
         if excess > _IMAGE_ROUNDING:
             raise ConfigError(
                 "the image of a trajectory leaves the limits or constraints under trajectories, so "
@@ -217,7 +217,7 @@ def _sample_series(
     motions = trajectories.test_point_to_point if name == "test" else ()
     finer = 1 if model.mechanism.loops is None else -(-FINER * trajectories.points // points)
     return ObservedSet(
-        spans([points] * (len(series) + len(motions))),
+        make_spans([points] * (len(series) + len(motions))),
         _chain_states(
             len(series),
             _series_states(series, trajectories.period, points, finer),
@@ -247,7 +247,7 @@ def _sample_recording(
     begun = np.flatnonzero(np.diff(recording.time) < 0) + 1
     starts = np.concatenate([[0], begun, [recording.time.size]])
     return ObservedSet(
-        spans(np.diff(starts)),
+        make_spans(np.diff(starts)),
         _read_recorded_states(recording, starts),
         dynamics,
         model.values,
@@ -296,7 +296,7 @@ def _sample_simulation(
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
         tell(Progress(f"simulate motions of the {name} set", done + 1, runs))
     return ObservedSet(
-        spans([time.size] * len(motions)),
+        make_spans([time.size] * len(motions)),
         _read_motion_states(motions),
         dynamics,
         model.values,
@@ -415,7 +415,7 @@ def _compute_nominal_torque(model: Model, estimation: ComputedSet | JoinedSet) -
     """Return the nominal torques of the config, or the standard deviations over the estimation set."""
     if model.nominal_torque_given:
         return model.nominal_torque
-    deviation = standard_deviation(_iterate_torques(estimation))
+    deviation = compute_standard_deviation(_iterate_torques(estimation))
     deviation[np.isinf(model.nominal_torque)] = np.inf
     return _check_scale(deviation, model, "nominal_torque", "torque")
 
@@ -427,7 +427,7 @@ def _compute_nominal_acceleration(
     given = sampling.nominal_acceleration
     if given != "standard-deviation":
         return expand_per_joint(given, model.mechanism.n_dof)
-    deviation = standard_deviation(block.ddz for block in estimation.iterate_states())
+    deviation = compute_standard_deviation(block.ddz for block in estimation.iterate_states())
     if deviation.any():
         # Of a joint that never moves in a recording there is no scale, and no error to divide by it.
         deviation[deviation == 0] = 1.0

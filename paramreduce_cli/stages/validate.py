@@ -18,7 +18,11 @@ from paramreduce_cli.judgement.torque import NormErrors, compute_joint_errors, c
 from paramreduce_cli.judgement.verdict import find_model_warnings, judge_model
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.observation import combined_factor, joint_factors, thinned_blocks
+from paramreduce_cli.multibody.observation import (
+    combine_factors,
+    compute_joint_factors,
+    decimate_blocks,
+)
 from paramreduce_cli.multibody.told import told
 from paramreduce_cli.records import (
     Block,
@@ -215,13 +219,15 @@ def _measure(
                 return iter([blocks])
             return (own for _, own in groupby(blocks, lambda block: block.trajectory))
 
-        spread = thinned_blocks(told_of("accelerations"), -(-n // _MOST_ACCELERATIONS))
+        spread = decimate_blocks(told_of("accelerations"), -(-n // _MOST_ACCELERATIONS))
         torques = [
             compute_torque_errors(part, models.values, reduction.nominal_torque)
             for part in parts(told_of("torques"))
         ]
         accelerations = [
-            compute_acceleration_errors(part, dynamics.direct, models.values, nominal)
+            compute_acceleration_errors(
+                part, dynamics.compute_mass_matrix_and_bias, models.values, nominal
+            )
             for part in parts(spread)
         ]
         return list(zip(torques, accelerations, strict=True))
@@ -406,7 +412,7 @@ def _cross_validate(
     weights = reduction.nominal_torque
 
     def factor(part: FloatArray) -> FloatArray:
-        return merge_factor(combined_factor(part, weights), grouped.columns)
+        return merge_factor(combine_factors(part, weights), grouped.columns)
 
     folds = [
         (factor(np.delete(factors, k, axis=0)), factor(factors[k : k + 1]))
@@ -452,7 +458,7 @@ def _measure_stability(
     heuristic = SelectionMethod.parse(selected.heuristic).heuristic
 
     def factor(factors: FloatArray) -> FloatArray:
-        return merge_factor(combined_factor(factors, weights), grouped.columns)
+        return merge_factor(combine_factors(factors, weights), grouped.columns)
 
     def chosen(other: SelectionProblem) -> IntArray:
         task = SelectionTask(TorqueObjective(other), selected.n, smallest=selected.n, effort=quick)
@@ -469,7 +475,7 @@ def _measure_stability(
     rows = samples.estimation.n_samples * weights.size
     for every in _THINNED:
         if rows // every >= 2 * problem.candidates.size:
-            blocks = thinned_blocks(samples.estimation.iterate_blocks(), every)
+            blocks = decimate_blocks(samples.estimation.iterate_blocks(), every)
             thinned = DataVariant(DataChange.THINNED, every)
-            variants.append((thinned, factor(joint_factors(blocks))))
+            variants.append((thinned, factor(compute_joint_factors(blocks))))
     return measure_stability(problem, variants, chosen, run.progress)

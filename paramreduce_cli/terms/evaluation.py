@@ -12,7 +12,7 @@ import numpy as np
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.observation import thinned_blocks
+from paramreduce_cli.multibody.observation import decimate_blocks
 from paramreduce_cli.multibody.states_inside import States, StatesInside
 from paramreduce_cli.records import (
     Block,
@@ -128,7 +128,9 @@ class Evaluator:
 
     def decimate(self, part: SampleSet, most: int) -> TermSamples:
         """Return so many samples of a set at most, evenly spread."""
-        return self._make_samples(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // most)))
+        return self._make_samples(
+            decimate_blocks(part.iterate_blocks(), -(-part.n_samples // most))
+        )
 
     def _make_samples(self, blocks: Iterable[Block]) -> TermSamples:
         return make_samples(
@@ -159,7 +161,7 @@ class Evaluator:
         part = self._samples.test
         if part is None:
             return []
-        blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED))
+        blocks = decimate_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED))
         motions = groupby(blocks, lambda block: block.trajectory)
         return [self._make_samples(own) for _, own in motions]
 
@@ -182,7 +184,7 @@ class Evaluator:
         for part in (self._samples.estimation, self._samples.validation):
             blocks: list[Block] = []
             if part is not None:
-                blocks = list(thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED)))
+                blocks = list(decimate_blocks(part.iterate_blocks(), -(-part.n_samples // _JUDGED)))
             result.append([self._make_samples(some) for some in _group_blocks(blocks)])
         return result
 
@@ -211,7 +213,7 @@ class Evaluator:
         dynamics = Dynamics(self._model.mechanism, once=True)
         return [
             self._make_samples(
-                [self._make_block(some, dynamics.inverse(*some, self._model.values))]
+                [self._make_block(some, dynamics.compute_torques(*some, self._model.values))]
             )
             for some in self._sample_states(_TORQUES)
         ]
@@ -232,7 +234,7 @@ class Evaluator:
         if not self.direct:
             return None
         halves = (
-            self._inside.drawn(some, self._rng, corners=corners)
+            self._inside.draw(some, self._rng, corners=corners)
             for some, corners in ((count // 2, False), (count - count // 2, True))
         )
         q, dq, ddq = (np.vstack(pair) for pair in zip(*halves, strict=True))
@@ -250,7 +252,7 @@ class Evaluator:
     def _inside(self) -> StatesInside:
         """Sampler of states inside the limits and constraints."""
         part = self._samples.estimation
-        blocks = thinned_blocks(part.iterate_blocks(), -(-part.n_samples // _KNOWN))
+        blocks = decimate_blocks(part.iterate_blocks(), -(-part.n_samples // _KNOWN))
         known = np.concatenate([b.q for b in blocks])
         lower, upper = self._bounds
         return StatesInside(self._model.mechanism, lower, upper, self._constraints, known)
@@ -259,7 +261,7 @@ class Evaluator:
         """Yield so many random states, some at a time; fewer if loops are hard to assemble."""
         count = count if self._model.mechanism.loops is None else _OF_LOOPS
         for start in range(0, count, _AT_ONCE):
-            some = self._inside.drawn(min(_AT_ONCE, count - start), self._rng)
+            some = self._inside.draw(min(_AT_ONCE, count - start), self._rng)
             if len(some[0]):
                 yield some
 

@@ -218,7 +218,7 @@ def make_samples(
     states = [q.T, dq.T, ddq.T]
     tangent = None
     if mechanism.loops is not None:
-        tangent = coordinates.tangent(q)
+        tangent = coordinates.compute_tangent(q)
     if tangent is not None and projected:
         dependent, independent = list(mechanism.dependent), list(mechanism.independent)
         R = tangent[:, dependent]

@@ -19,7 +19,7 @@ import yaml
 
 from paramreduce_cli.artifacts.store import load_file
 from paramreduce_cli.lean.formulations import formulations
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import ProofStatus, Reduction
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
@@ -167,11 +167,11 @@ def of_searches():
     """Searches for formulations of arms with right angles."""
     for n, limit in ((6, 5), (7, 7), (8, 10)):
         mechanism = chain(n)
-        K = Dynamics(mechanism).regressor(*random_states(mechanism, 500))
+        K = Dynamics(mechanism).compute_regressor(*random_states(mechanism, 500))
         W = K.reshape(-1, K.shape[2])
-        base = base_parameters(W, mechanism.preference_order, 1e-8)
+        base = choose_base(W, mechanism.preference_order, 1e-8)
         started = time.process_time()
-        formulations(mechanism, affecting_columns(W), base.columns)
+        formulations(mechanism, find_affecting_columns(W), base.columns)
         yield f"search for formulations, {n} joints", time.process_time() - started, limit, "CPU s"
 
 

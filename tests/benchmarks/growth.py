@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.lean.formulations import formulations
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
 from tests.conftest import dh, mechanism_of, random_states
 from tests.selecting import found, problem
@@ -41,11 +41,11 @@ def of_joints(n):
     """CPU seconds by what is done with a chain of so many joints."""
     mechanism = chain(n)
     dynamics, states = Dynamics(mechanism), random_states(mechanism, STATES)
-    dynamics.regressor(*states)  # compiles
-    K, regressor = seconds(lambda: dynamics.regressor(*states), 5)
+    dynamics.compute_regressor(*states)  # compiles
+    K, regressor = seconds(lambda: dynamics.compute_regressor(*states), 5)
     W = K.reshape(-1, K.shape[2])
-    base, ranks = seconds(lambda: base_parameters(W, mechanism.preference_order, 1e-8))
-    affecting = affecting_columns(W)
+    base, ranks = seconds(lambda: choose_base(W, mechanism.preference_order, 1e-8))
+    affecting = find_affecting_columns(W)
     _, searched = seconds(lambda: formulations(mechanism, affecting, base.columns))
     return {
         f"regressor of {STATES} states": regressor,

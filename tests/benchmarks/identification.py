@@ -11,7 +11,7 @@ import numpy as np
 from paramreduce_cli.identification.estimation import Rows, fit_weighted
 from paramreduce_cli.identification.residual_hints import find_residual_hints
 from paramreduce_cli.identification.torque_hints import hint_at_gravity, hint_at_unit
-from paramreduce_cli.multibody.orthogonal import least_squares
+from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import INERTIAL
 from tests.simulated_logs import RATE, along_axes, arm, coloured, simulated
 
@@ -93,7 +93,7 @@ def list_hints(case, log, tau, deviation):
     W, pulls = W * kept, pulls * kept
     bodies = [k for k, p in enumerate(mechanism.parameters) if p.kind in INERTIAL]
     rows = (W / deviation[:, None]).reshape(-1, W.shape[2])
-    standard = least_squares(np.column_stack([rows, (tau[some] / deviation).ravel()]))
+    standard = solve_least_squares(np.column_stack([rows, (tau[some] / deviation).ravel()]))
     yield from hint_at_gravity(W, pulls, tau[some], deviation, mechanism.gravity)
     yield from hint_at_unit(W[:, :, bodies] @ values[bodies], W[:, :, bodies] @ standard[bodies])
 

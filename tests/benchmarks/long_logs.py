@@ -70,7 +70,7 @@ def write_log(folder, n_samples):
     parts = []
     for start in range(0, n_samples, 10_000):
         states = evaluate_basis(11.3, 5, time[start : start + 10_000]).evaluate(series)
-        parts.append((*states, dynamics.regressor(*states) @ phi))
+        parts.append((*states, dynamics.compute_regressor(*states) @ phi))
     z, dz, ddz, tau = (np.concatenate(part) for part in zip(*parts, strict=True))
     tau += rng.normal(size=tau.shape)
     np.savez(folder / "log.npz", t=time, q=z, dq=dz, ddq=ddz, tau=tau)

@@ -71,8 +71,8 @@ def test_the_best_motion_keeps_all_bounds_between_the_grid_points(case):
     z, dz, _ = evaluate_basis(settings.period, harmonics, times).evaluate(found.coefficients)
     limits = settings.limits
     assert ((z >= limits.lower) & (z <= limits.upper) & (np.abs(dz) <= limits.velocity)).all()
-    q = Coordinates(excitation.coordinates.mechanism).positions(z, None)
-    values = Quantities(excitation.coordinates.mechanism, constraints).values(q)
+    q = Coordinates(excitation.coordinates.mechanism).compute_positions(z, None)
+    values = Quantities(excitation.coordinates.mechanism, constraints).compute_values(q)
     assert (values >= [c.lower for c in constraints]).all()
     assert (values <= [c.upper for c in constraints]).all()
     extremes = np.column_stack([values.min(axis=0), values.max(axis=0)])
@@ -113,5 +113,7 @@ def test_a_crank_that_turns_fully_is_followed_all_the_way(write_config):
         found = optimise_trajectory(excitation, settings, [seed])
         assert np.isfinite(found.kappa)
         assert found.reach[0] > 0.9
-    distance = Coordinates(model.mechanism).distance(model.mechanism.loops.assembly[None])[0]
+    distance = Coordinates(model.mechanism).compute_distance(model.mechanism.loops.assembly[None])[
+        0
+    ]
     assert 0 < distance < 1

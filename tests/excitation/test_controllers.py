@@ -117,7 +117,7 @@ def test_noise_of_torques_weights_the_rows():
     rng = np.random.default_rng(0)
     z, dz, ddz = rng.normal(size=(3, 40, 2))
     dynamics = Dynamics(model.mechanism)
-    W = dynamics.regressor(z, dz, ddz)[..., model.base.columns] / noise[:, None]
+    W = dynamics.compute_regressor(z, dz, ddz)[..., model.base.columns] / noise[:, None]
     W = W.reshape(80, -1)
     unit = W / np.linalg.norm(W, axis=0)
     found = weighted.compute_condition_numbers(z, dz, ddz)
@@ -162,7 +162,7 @@ def test_distances_are_never_overestimated(ur10):
     quantities = Quantities(mechanism, constraints)
     rng = np.random.default_rng(0)
     q = rng.uniform(-np.pi, np.pi, (60, 6))
-    values, rows = quantities.values(q), quantities.rows(q)
+    values, rows = quantities.compute_values(q), quantities.compute_rows(q)
     pairs = [c.bodies for c in constraints if c.kind == "clearance"]
     assert pairs
     seen = 0

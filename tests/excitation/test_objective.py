@@ -66,7 +66,7 @@ def test_variants_by_their_definitions(parts):
     dynamics, base, excitation = parts
     basis, limits, _ = basis_and_limits()
     states = basis.evaluate(limits.scale_to_limits(np.random.default_rng(3).normal(size=(6, 9))))
-    W = dynamics.regressor(*states).reshape(-1, 60) / np.tile(NOMINAL, 100)[:, None]
+    W = dynamics.compute_regressor(*states).reshape(-1, 60) / np.tile(NOMINAL, 100)[:, None]
     Wb = W[:, base.columns]
     equilibrated = Wb / np.abs(Wb).max(axis=0)
     equilibrated = equilibrated / np.abs(equilibrated).max(axis=1, keepdims=True)
@@ -117,9 +117,9 @@ def test_trajectories_follow_a_rounded_sign_and_are_measured_by_the_true_one():
     excitation = build_excitation(make_task(config.trajectories, model))
     rng = np.random.default_rng(0)
     states = tuple(rng.normal(size=(3, 50, 2)))
-    expected = Dynamics(model.mechanism).regressor(*states)[..., model.base.columns]
+    expected = Dynamics(model.mechanism).compute_regressor(*states)[..., model.base.columns]
     assert np.array_equal(excitation.measured(*states), expected.reshape(100, -1))
-    smooth = excitation.observation.forward(*states).reshape(expected.shape)
+    smooth = excitation.observation.evaluate(*states).reshape(expected.shape)
     friction = model.mechanism.parameter_names.index("fc_z_upper")
     rounded = np.tanh(states[1][:, 0] / (0.02 * 3))  # the velocity limit is 3 rad/s
     assert smooth[:, 0, list(model.base.columns).index(friction)] == pytest.approx(rounded)

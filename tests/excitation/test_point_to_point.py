@@ -16,7 +16,7 @@ from paramreduce_cli.excitation.point_to_point import (
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.observation import spans
+from paramreduce_cli.multibody.observation import make_spans
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.records import PointToPoint
 
@@ -86,7 +86,7 @@ def test_motions_take_no_more_torque_or_power_than_there_is():
     assert slower, "the limits bind, so that this test shows something"
     for motion in motions:
         z, dz, ddz = evaluate_point_to_point(motion, sample_point_to_point_times(motion, 2001))
-        tau = np.abs(Dynamics(model.mechanism).inverse(z, dz, ddz, model.values))
+        tau = np.abs(Dynamics(model.mechanism).compute_torques(z, dz, ddz, model.values))
         assert (tau <= 1.001 * limits.torque).all()
         assert (tau * np.abs(dz) <= 1.001 * limits.power).all()
 
@@ -102,12 +102,12 @@ def test_motions_of_loops_keep_to_constraints_and_can_be_sampled():
     assert motions
     coordinates, quantities = Coordinates(model.mechanism), Quantities(model.mechanism, constraints)
     at = evaluate_along(motions, 20, 4)
-    for span in spans([20] * len(motions)):
+    for span in make_spans([20] * len(motions)):
         block = at(span)
         assert block.way.shape == (80, home.size)
         np.testing.assert_allclose(block.way[::4], block.z, atol=1e-12)
-        q = coordinates.positions(block.way, None)
-        assert (quantities.rows(q) <= 1e-9).all()
+        q = coordinates.compute_positions(block.way, None)
+        assert (quantities.compute_rows(q) <= 1e-9).all()
 
 
 def test_fewer_motions_are_found_where_straight_lines_are_not_free():

@@ -88,7 +88,7 @@ def test_loops_stay_closed(simulated):
     if model.mechanism.loops is None:
         pytest.skip("has no loops")
     block = next(iter(samples.validation.iterate_blocks()))
-    again = Coordinates(model.mechanism).positions(block.z, None)
+    again = Coordinates(model.mechanism).compute_positions(block.z, None)
     assert again == pytest.approx(block.q, abs=1e-9)
 
 

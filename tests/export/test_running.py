@@ -9,7 +9,7 @@ from paramreduce_cli.export.running import RunningModel, speed
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.reduction.models import make_full_model
 
 
@@ -20,10 +20,10 @@ def test_torques_are_those_of_plain_recursion(robot, compiled, monkeypatch):
         monkeypatch.setattr(running, "load", lambda *_: None)
     _, model = config_and_model(robot)
     mechanism, chosen = model.mechanism, make_full_model(model)
-    states = random_states(mechanism, 20, np.random.default_rng(0))
-    wanted = Dynamics(mechanism).inverse(*states, chosen.standard)
+    states = draw_states(mechanism, 20, np.random.default_rng(0))
+    wanted = Dynamics(mechanism).compute_torques(*states, chosen.standard)
     if mechanism.loops is not None:
-        R = Coordinates(mechanism).tangent(states[0])[:, list(mechanism.dependent)]
+        R = Coordinates(mechanism).compute_tangent(states[0])[:, list(mechanism.dependent)]
         states = (*states, R)
     found = RunningModel(model, chosen)
     assert found.language == ("C" if compiled else "Python")
@@ -41,17 +41,19 @@ def test_mass_matrix_and_remainder_give_the_same_torques(robot, compiled, monkey
         monkeypatch.setattr(running, "load", lambda *_: None)
     _, model = config_and_model(robot)
     mechanism, chosen = model.mechanism, make_full_model(model)
-    q, dq, ddq = random_states(mechanism, 20, np.random.default_rng(0))
+    q, dq, ddq = draw_states(mechanism, 20, np.random.default_rng(0))
     z = list(mechanism.independent)
     states = {"q": q, "dq": dq, "ddq": ddq}
     if mechanism.loops is not None:
         coordinates, dependent = Coordinates(mechanism), list(mechanism.dependent)
-        still = coordinates.rates(q, dq[:, z], np.zeros((20, len(z))))[1]
-        states |= {"R": coordinates.tangent(q)[:, dependent], "b": still[:, dependent]}
+        still = coordinates.compute_rates(q, dq[:, z], np.zeros((20, len(z))))[1]
+        states |= {"R": coordinates.compute_tangent(q)[:, dependent], "b": still[:, dependent]}
     found = RunningModel(model, chosen, Exported.DDM)
     given = found(*(states[name] for name in found.takes))
     n = len(z)
     M, delta = given[:, : n * n].reshape(-1, n, n), given[:, n * n :]
     tau = np.einsum("kij,kj->ki", M, ddq[:, z]) + delta
-    assert tau == pytest.approx(Dynamics(mechanism).inverse(q, dq, ddq, chosen.standard), abs=1e-9)
+    assert tau == pytest.approx(
+        Dynamics(mechanism).compute_torques(q, dq, ddq, chosen.standard), abs=1e-9
+    )
     assert speed({"full": found}, states).seconds["full"] > 0

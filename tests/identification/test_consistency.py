@@ -12,7 +12,7 @@ from paramreduce_cli.identification.consistency import (
     list_constraints,
 )
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 
 pytest.importorskip("cvxpy")
 
@@ -23,7 +23,7 @@ def problem(robot="two_link", noise=0.0, known=1.0, seed=0):
     mechanism = config.build_mechanism()
     truth = config.get_values()
     rng = np.random.default_rng(seed)
-    W = Dynamics(mechanism, once=True).regressor(*random_states(mechanism, 200, rng))
+    W = Dynamics(mechanism, once=True).compute_regressor(*draw_states(mechanism, 200, rng))
     W = W.reshape(-1, truth.size)
     tau = W @ truth
     size = max(noise, 1e-3) * np.std(tau)

@@ -10,7 +10,7 @@ from paramreduce_cli.identification import samples
 from paramreduce_cli.identification.processing import UNUSED, process_logs
 from paramreduce_cli.identification.samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.observation import combined_factor
+from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.records import MeasuredLog, Model, RawLog, RawLogs
 
 
@@ -41,7 +41,7 @@ def test_torques_and_columns_pass_the_same_filter(arm):
     log = made(two_link_log(), state_cutoff=20, torque_cutoff=5)
     found, fold = gathered(LoggedSet(log.training, log, arm, "x"))
     m = log.training
-    K = arm.regressor(m.z, m.dz, m.ddz)
+    K = arm.compute_regressor(m.z, m.dz, m.ddz)
     from paramreduce_cli.identification import filters
 
     taps = filters.design_low_pass(5, log.rate)
@@ -83,7 +83,7 @@ def test_an_exact_model_stays_exact(arm, cutoff):
     """Friction with steps too, as its columns pass the same filter."""
     log = made(two_link_log(noise=0.0), state_cutoff="none", torque_cutoff=cutoff, outliers="keep")
     found = LoggedSet(log.training, log, arm, "x")
-    factor = combined_factor(found.compute_factors(), None)
+    factor = combine_factors(found.compute_factors(), None)
     left = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=None)[0]
     error = np.linalg.norm(factor[:, -1] - factor[:, :-1] @ left) / np.linalg.norm(factor[:, -1])
     assert error < 2e-4  # differentiated speeds are the only error

@@ -9,7 +9,7 @@ from robot_files import FOUR_BAR
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import NumericalError
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 
 pin = pytest.importorskip("pinocchio")
@@ -89,7 +89,7 @@ def closed_mechanism(output):
     config = load_config(output)
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # the guess that was written is one
-        return config, assembled(config.build_mechanism())
+        return config, assemble(config.build_mechanism())
 
 
 def check_against_pinocchio(path, config, mechanism, pairs):
@@ -104,8 +104,8 @@ def check_against_pinocchio(path, config, mechanism, pairs):
         home + rng.uniform(-0.05, 0.05, (6, home.size)),
         *rng.uniform(-1, 1, (2, 6, home.size)),
     )
-    states = coordinates.states(z, dz, ddz)
-    own = Dynamics(mechanism, once=True).inverse(*states, config.get_values())
+    states = coordinates.compute_states(z, dz, ddz)
+    own = Dynamics(mechanism, once=True).compute_torques(*states, config.get_values())
     order = [model.joints[model.getJointId(name)] for name in mechanism.generalised_names]
     for q, dq, ddq, tau in zip(*states, own, strict=True):
         full, speed, acceleration = pin.neutral(model), np.zeros(model.nv), np.zeros(model.nv)
@@ -164,7 +164,7 @@ def test_a_four_bar_whose_ends_are_joined(invoke, tmp_path, kind):
     )
     config = load_config(output)
     with pytest.warns(match="equations that close the loops 2 are independent"):
-        mechanism = assembled(config.build_mechanism())
+        mechanism = assemble(config.build_mechanism())
     assert config.description.bodies.independent == ["q_crank"]
     check_against_pinocchio(path, config, mechanism, [("end", "top")])
 
@@ -315,7 +315,7 @@ def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, t
     with pytest.warns(
         match=r"do not close with zero for q1; they are closed with all coordinates free to move, at guess: \{"
     ):
-        found = assembled(load_config(output).build_mechanism())
+        found = assemble(load_config(output).build_mechanism())
     assert abs(found.loops.assembly[found.independent[0]]) > 0.1
     output.write_text(
         "\n".join(lines).replace(
@@ -323,7 +323,7 @@ def test_a_guess_of_zeros_lets_the_driven_coordinates_move_and_says_so(invoke, t
         )
     )
     with pytest.raises(NumericalError, match=r"cannot be closed from the guess with q1 = 0\.01"):
-        assembled(load_config(output).build_mechanism())
+        assemble(load_config(output).build_mechanism())
 
 
 def test_lists_for_all_coordinates_are_cut_to_the_independent_ones(tmp_path, invoke):

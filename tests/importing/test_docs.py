@@ -11,8 +11,8 @@ from robot_files import FOUR_BAR
 
 from paramreduce_cli.config import load_config
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.loops.assembly import assemble
+from paramreduce_cli.multibody.random_states import draw_states
 
 ROOT = Path(__file__).parents[2]
 QUICK = [
@@ -44,11 +44,11 @@ def test_closures_over_an_imported_tree(tmp_path, invoke):
     path.write_text(text)
     config = load_config(path)
     with pytest.warns(match="follow from the others"):
-        mechanism = assembled(config.build_mechanism())
+        mechanism = assemble(config.build_mechanism())
     assert mechanism.n_dof == 1
     oracle, phi = Lagrange(mechanism), config.get_values()
-    states = random_states(mechanism, 10, np.random.default_rng(0))
-    found = Dynamics(mechanism).inverse(*states, phi)
+    states = draw_states(mechanism, 10, np.random.default_rng(0))
+    found = Dynamics(mechanism).compute_torques(*states, phi)
     for tau, q, dq, ddq in zip(found, *states, strict=True):
         R = tangent(oracle, mechanism.independent, q)
         expected = R.T @ np.array(oracle.tau(q, dq, ddq, phi)).ravel()

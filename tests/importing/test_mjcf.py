@@ -13,7 +13,7 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.reading import read_robot
 from paramreduce_cli.importing.writing import format_config
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 
 mujoco = pytest.importorskip("mujoco")
@@ -107,7 +107,9 @@ def mujoco_torques(path, states, friction=True):
 
 
 def own_torques(config, states):
-    return Dynamics(config.build_mechanism(), once=True).inverse(*states, config.get_values())
+    return Dynamics(config.build_mechanism(), once=True).compute_torques(
+        *states, config.get_values()
+    )
 
 
 def test_torques_are_those_of_mujoco(tmp_path):
@@ -192,9 +194,9 @@ def test_equalities_become_closures(tmp_path):
     ]
     assert tree.independent == ["left", "right"]
     with pytest.warns(match="follow from the others"):
-        mechanism = assembled(config.build_mechanism())
+        mechanism = assemble(config.build_mechanism())
     z = np.array([[0.05, -0.1]])
-    q = Coordinates(mechanism).positions(z, None)
+    q = Coordinates(mechanism).compute_positions(z, None)
     names = list(mechanism.generalised_names)
     assert q[0, names.index("pointer")] == pytest.approx(0.1 - 2 * 0.05)
     model = mujoco.MjModel.from_xml_path(str(path))

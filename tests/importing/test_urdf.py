@@ -18,11 +18,11 @@ from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.importing.reading import read_robot
 from paramreduce_cli.importing.urdf import read_urdf
 from paramreduce_cli.importing.writing import format_config
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.records import INERTIAL
 from paramreduce_cli.robots.drives import DriveSection
 
@@ -58,7 +58,9 @@ def pinocchio_torques(model, states):
 
 
 def own_torques(config, states):
-    return Dynamics(config.build_mechanism(), once=True).inverse(*states, config.get_values())
+    return Dynamics(config.build_mechanism(), once=True).compute_torques(
+        *states, config.get_values()
+    )
 
 
 def states_of(n, count=20):
@@ -134,13 +136,13 @@ def test_a_joint_that_follows_another_adds_its_torque_to_it(tmp_path):
     path = written(tmp_path, following('<mimic joint="shoulder" multiplier="-0.5" offset="0.1"/>'))
     config = loaded(path, tmp_path)
     assert config.description.bodies.list_independent_coordinates() == ["shoulder", "grip"]
-    mechanism = assembled(config.build_mechanism())
+    mechanism = assemble(config.build_mechanism())
     z, dz, ddz = states_of(2)
     S, offset = np.array([[1, 0], [-0.5, 0], [0, 1]]), np.array([0, 0.1, 0])
     model = pin.buildModelFromUrdf(str(written(tmp_path, ARM)))
     expected = pinocchio_torques(model, (z @ S.T + offset, dz @ S.T, ddz @ S.T)) @ S
-    states = Coordinates(mechanism).states(z, dz, ddz)
-    found = Dynamics(mechanism, once=True).inverse(*states, config.get_values())
+    states = Coordinates(mechanism).compute_states(z, dz, ddz)
+    found = Dynamics(mechanism, once=True).compute_torques(*states, config.get_values())
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
@@ -204,14 +206,12 @@ def test_base_counts_of_robots(tmp_path, file, kept, fixed_counts, floating_coun
     choice = {"locked": locked, "floating": floating, "uncoupled": True}
     config = loaded(ROBOTS / file, tmp_path, **choice)
     mechanism = config.build_mechanism()
-    states = random_states(mechanism, 150, np.random.default_rng(0))
-    K = Dynamics(mechanism, once=True).regressor(*states)
+    states = draw_states(mechanism, 150, np.random.default_rng(0))
+    K = Dynamics(mechanism, once=True).compute_regressor(*states)
     W = K.reshape(-1, K.shape[2])
     W = W[:, [parameter.kind in INERTIAL for parameter in mechanism.parameters]]
-    base = base_parameters(
-        W, mechanism.preference_order[mechanism.preference_order < W.shape[1]], 1e-8
-    )
-    found = (W.shape[1], int(affecting_columns(W).sum()), base.columns.size)
+    base = choose_base(W, mechanism.preference_order[mechanism.preference_order < W.shape[1]], 1e-8)
+    found = (W.shape[1], int(find_affecting_columns(W).sum()), base.columns.size)
     assert found == (floating_counts if floating else fixed_counts)
 
 
@@ -348,7 +348,7 @@ def test_parameters_go_back_into_the_file(tmp_path, invoke):
         (rotor,) = re.findall(r"no place for it: Ia_grip = (\S+)\.", " ".join(said.split()))
         drives = config.drives | {"grip": DriveSection(inertia=float(rotor))}
         config = config.model_copy(update={"drives": drives})
-        expected = Dynamics(mechanism, once=True).inverse(*states, phi)
+        expected = Dynamics(mechanism, once=True).compute_torques(*states, phi)
         assert own_torques(config, states) == pytest.approx(expected, rel=1e-9, abs=1e-9)
 
 

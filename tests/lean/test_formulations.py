@@ -41,7 +41,7 @@ def compared(mechanism, choices, rng, samples=30):
     q, dq, ddq = rng.normal(size=(3, samples, mechanism.n_q))
     phi = rng.normal(size=mechanism.n_parameters)
     plain = Dynamics(mechanism, once=True)
-    M, delta = plain.direct(q, dq, phi)
+    M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
     inputs = [*np.tile(phi, (samples, 1)).T, *q.T, *dq.T, *ddq.T]
     tree = lean_tree(mechanism)
 
@@ -52,7 +52,7 @@ def compared(mechanism, choices, rng, samples=30):
     rows, columns = np.tril_indices(mechanism.n_q)
     direct = np.hstack([M[:, rows, columns], delta])
     return (
-        relative(evaluated(inverse_outputs), plain.inverse(q, dq, ddq, phi)),
+        relative(evaluated(inverse_outputs), plain.compute_torques(q, dq, ddq, phi)),
         relative(evaluated(direct_outputs), direct),
     )
 
@@ -124,8 +124,10 @@ def test_a_wrong_formulation_is_an_error(puma, monkeypatch):
     rng = np.random.default_rng(0)
     states = tuple(rng.normal(size=(3, 10, 6)))
     kept = np.flatnonzero(puma.affecting)
-    right = checking.Dynamics.inverse
-    monkeypatch.setattr(checking.Dynamics, "inverse", lambda self, *a: right(self, *a) * (1 + 1e-8))
+    right = checking.Dynamics.compute_torques
+    monkeypatch.setattr(
+        checking.Dynamics, "compute_torques", lambda self, *a: right(self, *a) * (1 + 1e-8)
+    )
     with pytest.raises(FormulationError, match="off by 1"):
         checking.check_formulations(puma.mechanism, puma.formulations, kept, states, rng)
 
@@ -178,7 +180,7 @@ def test_lean_models_never_take_more_than_plain_recursion(seed, puma):
 def test_lean_models_take_less_than_textbooks(name, puma):
     mechanism = MECHANISMS[name]()
     rng = np.random.default_rng(0)
-    K = Dynamics(mechanism, once=True).regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
+    K = Dynamics(mechanism, once=True).compute_regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
     affecting = np.abs(K).max(axis=(0, 1)) > 1e-9
     kept = np.flatnonzero(affecting)
     found = formulations(mechanism, affecting, kept)
@@ -230,7 +232,7 @@ def test_the_textbook_oracle_is_the_same_dynamics(name):
     phi = rng.normal(size=mechanism.n_parameters)
     symbols = [ca.SX.sym("x", len(x)) for x in (q, dq, ddq, phi)]
     found = ca.Function("d", symbols, [textbook.torques(mechanism, *symbols, mechanism.gravity)])
-    expected = Dynamics(mechanism, once=True).inverse(q[None], dq[None], ddq[None], phi)[0]
+    expected = Dynamics(mechanism, once=True).compute_torques(q[None], dq[None], ddq[None], phi)[0]
     assert found(q, dq, ddq, phi).full().ravel() == pytest.approx(expected, rel=1e-12, abs=1e-11)
 
 

@@ -12,14 +12,14 @@ from oracles.lagrange import Lagrange, forward_dynamics, tangent
 from paramreduce_cli.errors import DataError, NumericalError, ParamreduceWarning
 from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.multibody import regressor
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.multibody.loops.assembly import _kept, assembled
+from paramreduce_cli.multibody.kinematics import compute_body_poses
+from paramreduce_cli.multibody.loops.assembly import _choose_equations, assemble
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.records import Constraint, Mechanism
 from paramreduce_cli.robots import Description, Robot
 from paramreduce_cli.robots.frames import translate
@@ -32,18 +32,18 @@ REACH = {"hexaglide": 0.03, "five_bar": 0.2, "four_bar": 0.8, "rssr": 0.8, "delt
 @pytest.fixture(scope="module", params=CLOSED_LOOPS)
 def case(request):
     config = config_of(request.param)
-    mechanism = assembled(config.build_mechanism())
+    mechanism = assemble(config.build_mechanism())
     rng = np.random.default_rng(3)
     phi = config.get_values() + rng.normal(size=mechanism.n_parameters) * 1e-2
     return mechanism, Lagrange(mechanism), phi
 
 
 def closed(robot):
-    return assembled(config_of(robot).build_mechanism())
+    return assemble(config_of(robot).build_mechanism())
 
 
 def states_of(mechanism, count=4):
-    return random_states(mechanism, count, np.random.default_rng(1))
+    return draw_states(mechanism, count, np.random.default_rng(1))
 
 
 def motion(mechanism, points, seed=0):
@@ -52,7 +52,7 @@ def motion(mechanism, points, seed=0):
     coefficients = rng.normal(size=(mechanism.n_dof, 5)) * REACH[mechanism.robot] / 3
     coefficients[:, 0] = mechanism.loops.assembly[list(mechanism.independent)]
     basis = evaluate_basis(2 * np.pi, 2, sample_times(2 * np.pi, points))
-    return basis.time, Coordinates(mechanism).states(*basis.evaluate(coefficients))
+    return basis.time, Coordinates(mechanism).compute_states(*basis.evaluate(coefficients))
 
 
 def test_states_satisfy_the_closures_and_their_derivatives(case):
@@ -69,7 +69,7 @@ def test_states_satisfy_the_closures_and_their_derivatives(case):
 def test_torques_against_lagrange(case):
     mechanism, oracle, phi = case
     states = states_of(mechanism)
-    found = Dynamics(mechanism).inverse(*states, phi)
+    found = Dynamics(mechanism).compute_torques(*states, phi)
     for k, (q, dq, ddq) in enumerate(zip(*states, strict=True)):
         R = tangent(oracle, mechanism.independent, q)
         expected = R.T @ np.array(oracle.tau(q, dq, ddq, phi)).ravel()
@@ -80,7 +80,7 @@ def test_mass_matrix_bias_and_accelerations_against_the_kkt_system(case):
     mechanism, oracle, phi = case
     independent = list(mechanism.independent)
     q_all, dq_all, _ = states_of(mechanism)
-    all_M, all_delta = Dynamics(mechanism).direct(q_all, dq_all, phi)
+    all_M, all_delta = Dynamics(mechanism).compute_mass_matrix_and_bias(q_all, dq_all, phi)
     rng = np.random.default_rng(2)
     for k, (q, dq) in enumerate(zip(q_all, dq_all, strict=True)):
         M, delta = all_M[k], all_delta[k]
@@ -106,7 +106,7 @@ def test_power_balance(case):
     energy = np.array(oracle.energy.map(points)(q.T, dq.T, np.tile(phi, (points, 1)).T)).ravel()
     frequency = 1j * np.fft.rfftfreq(points, 1 / points)
     rate = np.fft.irfft(frequency * np.fft.rfft(energy), points)
-    tau = Dynamics(mechanism).inverse(q, dq, ddq, phi)
+    tau = Dynamics(mechanism).compute_torques(q, dq, ddq, phi)
     power = np.einsum("kj,kj->k", tau, dq[:, list(mechanism.independent)])
     assert np.abs(power).max() > 1e-3
     assert np.abs(rate - power).max() < 1e-7 * np.abs(power).max()
@@ -115,7 +115,7 @@ def test_power_balance(case):
 def test_base_count_is_the_rank_of_the_oracles_observation_matrix(case):
     mechanism, oracle, phi = case
     rows = []
-    for q, dq, ddq in zip(*random_states(mechanism, 60, np.random.default_rng(5)), strict=True):
+    for q, dq, ddq in zip(*draw_states(mechanism, 60, np.random.default_rng(5)), strict=True):
         R = tangent(oracle, mechanism.independent, q)
         rows.append(R.T @ np.array(oracle.tau_by_phi(q, dq, ddq, phi)))
     W = np.vstack(rows)
@@ -123,16 +123,16 @@ def test_base_count_is_the_rank_of_the_oracles_observation_matrix(case):
     live = lengths > 1e-10 * lengths.max()
     singular = np.linalg.svd(W[:, live] / lengths[live], compute_uv=False)
     rank = int(np.sum(singular > 1e-9 * singular[0]))
-    states = random_states(mechanism, 300, np.random.default_rng(0))
-    K = Dynamics(mechanism).regressor(*states).reshape(-1, mechanism.n_parameters)
-    base = base_parameters(K, mechanism.preference_order, 1e-9)
-    assert (affecting_columns(K).sum(), base.columns.size) == (live.sum(), rank)
+    states = draw_states(mechanism, 300, np.random.default_rng(0))
+    K = Dynamics(mechanism).compute_regressor(*states).reshape(-1, mechanism.n_parameters)
+    base = choose_base(K, mechanism.preference_order, 1e-9)
+    assert (find_affecting_columns(K).sum(), base.columns.size) == (live.sum(), rank)
 
 
 def test_a_point_mass_at_a_spherical_joint_may_belong_to_either_body():
     """The six null vectors: a unit mass at the end of a bar, taken from the platform."""
     mechanism = closed("hexaglide")
-    W = Dynamics(mechanism).regressor(*states_of(mechanism, 40)).reshape(-1, 70)
+    W = Dynamics(mechanism).compute_regressor(*states_of(mechanism, 40)).reshape(-1, 70)
     W = W / np.linalg.norm(W, axis=0).max()
     names = mechanism.parameter_names
     for closure in mechanism.loops.closures:
@@ -156,9 +156,13 @@ def test_large_regressors_are_projected_as_matrices(monkeypatch):
 
     def results():
         dynamics = Dynamics(mechanism, once=True)
-        observation = dynamics.observation(columns)
-        W = observation.forward(q, *states)
-        return [dynamics.regressor(q, dq, ddq), W, *observation.adjoint(q, *states, W_bar)]
+        observation = dynamics.make_observation(columns)
+        W = observation.evaluate(q, *states)
+        return [
+            dynamics.compute_regressor(q, dq, ddq),
+            W,
+            *observation.pull_back(q, *states, W_bar),
+        ]
 
     scalars = results()
     monkeypatch.setattr(regressor, "_FLAT", -1)
@@ -169,16 +173,16 @@ def test_large_regressors_are_projected_as_matrices(monkeypatch):
 @pytest.mark.parametrize("name", CLOSED_LOOPS)
 def test_adjoint_of_observations_through_the_position_problem(name):
     mechanism = closed(name)
-    observation = Dynamics(mechanism).observation(np.arange(3, 8))
+    observation = Dynamics(mechanism).make_observation(np.arange(3, 8))
     coordinates = Coordinates(mechanism)
     q, dq, ddq = states_of(mechanism, 6)
     states = [part[:, list(mechanism.independent)] for part in (q, dq, ddq)]
     rng = np.random.default_rng(0)
     W_bar = rng.normal(size=(6 * mechanism.n_dof, 5))
-    bars = observation.adjoint(q, *states[1:], W_bar)
+    bars = observation.pull_back(q, *states[1:], W_bar)
 
     def value(z, dz, ddz):
-        return np.sum(observation.forward(coordinates.positions(z, q), dz, ddz) * W_bar)
+        return np.sum(observation.evaluate(coordinates.compute_positions(z, q), dz, ddz) * W_bar)
 
     for k, bar in enumerate(bars):
         direction = rng.normal(size=bar.shape)
@@ -203,24 +207,26 @@ def test_quantities_by_their_definitions_and_their_derivatives():
     mechanism = closed("five_bar")
     quantities = Quantities(mechanism, QUANTITIES)
     q, _, _ = states_of(mechanism, 5)
-    values = quantities.values(q)
+    values = quantities.compute_values(q)
     for k, one in enumerate(q):
-        poses = body_poses(mechanism, one)
+        poses = compute_body_poses(mechanism, one)
         end = (poses[1] @ [0.2, 0, 0, 1])[:3] - (poses[2] @ [0, 0.1, 0, 1])[:3]
         u, v = poses[0][:3, 0], poses[2][:3, :3] @ [0.6, 0.8, 0]
         seen = (poses[1] @ [0.3, 0.1, 0, 1])[:3] - [0.1, 0, 0]
         expected = [one[1], np.arccos(u @ v), np.linalg.norm(end), np.hypot(seen[0], seen[2])]
         assert values[k, :4] == pytest.approx(expected, rel=1e-12)
-    rows = quantities.rows(q)
+    rows = quantities.compute_rows(q)
     inside = (values >= [c.lower for c in QUANTITIES]) & (values <= [c.upper for c in QUANTITIES])
     for j in range(len(QUANTITIES)):
         own = rows[:, quantities.owners == j]
         assert np.array_equal((own <= 0).all(axis=1), inside[:, j])
-    jacobian = quantities.jacobian(q)
+    jacobian = quantities.compute_jacobian(q)
     coordinates = Coordinates(mechanism)
     z = q[:, list(mechanism.independent)]
     for j, direction in enumerate(np.eye(mechanism.n_dof)):
-        found = slope(lambda z: quantities.rows(coordinates.positions(z, q)), [z], direction)
+        found = slope(
+            lambda z: quantities.compute_rows(coordinates.compute_positions(z, q)), [z], direction
+        )
         assert jacobian[:, :, j] == pytest.approx(found, rel=1e-5, abs=1e-7)
 
 
@@ -229,8 +235,8 @@ def test_distance_to_singularity_is_zero_where_far_links_line_up():
     # Elbows so far apart that both far links lie on one line.
     half = np.arccos((0.45 - 0.15) / 0.35)
     q = np.array([np.pi - half, half - np.pi, half, -half])
-    assert Coordinates(mechanism).distance(q[None])[0] < 1e-8
-    assert Coordinates(mechanism).distance(mechanism.loops.assembly[None])[0] > 0.2
+    assert Coordinates(mechanism).compute_distance(q[None])[0] < 1e-8
+    assert Coordinates(mechanism).compute_distance(mechanism.loops.assembly[None])[0] > 0.2
 
 
 def test_a_turning_crank_stays_on_its_assembly_mode():
@@ -238,7 +244,7 @@ def test_a_turning_crank_stays_on_its_assembly_mode():
     coordinates = Coordinates(mechanism)
     time = np.linspace(0, 4 * np.pi, 400)
     z = (mechanism.loops.assembly[0] + time)[:, None]
-    q = coordinates.positions(z, None)
+    q = coordinates.compute_positions(z, None)
     coordinates.check_motion(time, q)
     assert np.abs(np.diff(q[:, 1:], axis=0)).max() < 0.1
     assert q[199, 0] - q[0, 0] > 6
@@ -250,7 +256,7 @@ def test_a_rocker_driven_over_its_dead_point_is_refused():
     mechanism = dataclasses.replace(mechanism, loops=driven)
     z = driven.assembly[2] + np.linspace(0, 2.0, 50)
     with pytest.raises(DataError, match="singular configuration or to the end of its reach"):
-        Coordinates(mechanism).positions(z[:, None], None)
+        Coordinates(mechanism).compute_positions(z[:, None], None)
 
 
 def test_follower_finds_what_a_fresh_start_finds():
@@ -264,13 +270,13 @@ def test_follower_finds_what_a_fresh_start_finds():
         z = basis.evaluate(coefficients)[0]
         found = follower(z)
         follower.keep()
-        assert found == pytest.approx(coordinates.positions(z, None), abs=1e-10)
+        assert found == pytest.approx(coordinates.compute_positions(z, None), abs=1e-10)
 
 
 def test_constraints_of_the_six_legged_robot_at_home():
     mechanism = closed("hexaglide")
     constraints = config_of("hexaglide").trajectories.build_constraints(mechanism)
-    values = Quantities(mechanism, constraints).values(mechanism.loops.assembly[None])[0]
+    values = Quantities(mechanism, constraints).compute_values(mechanism.loops.assembly[None])[0]
     assert values[0] == pytest.approx(0, abs=1e-9)
     assert values[1:] == pytest.approx(np.full(6, 0.424), abs=1e-3)
 
@@ -304,7 +310,7 @@ def chain_with(kind):
     else:
         open_tree = Description.model_validate({"tree": {"bodies": bodies}}).bodies
         mechanism = Mechanism("chain", open_tree.build_bodies(), (), np.zeros(3), (), ())
-        pose = body_poses(mechanism, q)[6] @ translate(*TOOL)
+        pose = compute_body_poses(mechanism, q)[6] @ translate(*TOOL)
         angles = rotation_steps(pose[:3, :3])
         closure["at"] = [[{"xyz": pose[:3, 3].tolist()}, *angles], TOOL]
         if kind == "universal":  # y of the last body across x of the base's frame
@@ -336,16 +342,16 @@ def rotation_steps(R):
 @pytest.mark.parametrize("kind", list(EQUATIONS))
 def test_every_kind_of_closure_against_lagrange(kind):
     robot = chain_with(kind)
-    mechanism = assembled(robot.build_mechanism())
+    mechanism = assemble(robot.build_mechanism())
     assert mechanism.n_dof == 7 - EQUATIONS[kind]
     oracle, phi = Lagrange(mechanism), robot.get_values()
     rng = np.random.default_rng(2)
     coordinates = Coordinates(mechanism)
     z0 = mechanism.loops.assembly[list(mechanism.independent)]
     z = z0 + rng.uniform(-0.02, 0.02, (5, mechanism.n_dof))
-    q, dq, ddq = coordinates.states(z, *rng.normal(size=(2, 5, mechanism.n_dof)))
+    q, dq, ddq = coordinates.compute_states(z, *rng.normal(size=(2, 5, mechanism.n_dof)))
     dynamics = Dynamics(mechanism, once=True)
-    torques = dynamics.inverse(q, dq, ddq, phi)
+    torques = dynamics.compute_torques(q, dq, ddq, phi)
     for k in range(5):
         gap, J, _ = (np.array(part) for part in oracle.closures(q[k], dq[k]))
         assert np.abs(gap).max() < 1e-11
@@ -358,13 +364,13 @@ def test_every_kind_of_closure_against_lagrange(kind):
 def test_coupled_joints_add_up_their_columns():
     """Of the open chain, with R = d q / d z."""
     robot = chain_with("coupling")
-    mechanism = assembled(robot.build_mechanism())
-    states = Coordinates(mechanism).states(*np.random.default_rng(0).normal(size=(3, 4, 6)))
+    mechanism = assemble(robot.build_mechanism())
+    states = Coordinates(mechanism).compute_states(*np.random.default_rng(0).normal(size=(3, 4, 6)))
     open_chain = dataclasses.replace(mechanism, loops=None)
-    whole = Dynamics(open_chain, once=True).regressor(*states)
+    whole = Dynamics(open_chain, once=True).compute_regressor(*states)
     R = np.vstack([np.eye(6), [-2, 0, 0, 0, 0, 0]])
     expected = np.einsum("qz,kqn->kzn", R, whole)
-    found = Dynamics(mechanism, once=True).regressor(*states)
+    found = Dynamics(mechanism, once=True).compute_regressor(*states)
     assert found == pytest.approx(expected, rel=1e-10, abs=1e-10)
 
 
@@ -375,11 +381,11 @@ def test_equations_that_follow_from_others_are_dropped():
     with pytest.warns(
         ParamreduceWarning, match=r"of the 5 equations .* 2 are independent; .*pin \(z\)"
     ):
-        hinged = assembled(config.build_mechanism())
+        hinged = assemble(config.build_mechanism())
     assert len(hinged.loops.kept) == 2
     plane = closed("four_bar")
     states = states_of(plane)
-    found, expected = (Dynamics(m, once=True).regressor(*states) for m in (hinged, plane))
+    found, expected = (Dynamics(m, once=True).compute_regressor(*states) for m in (hinged, plane))
     assert found == pytest.approx(expected, rel=1e-9, abs=1e-9 * np.abs(expected).max())
 
 
@@ -389,4 +395,4 @@ def test_equations_that_are_needed_elsewhere_are_not_dropped():
     here, there = np.zeros((2, 5, 3))
     here[0, 0] = here[1, 1] = there[0, 0] = there[2, 2] = 1.0
     with pytest.raises(NumericalError, match="not the same ones"):
-        _kept(mechanism, mechanism.loops, [here, there])
+        _choose_equations(mechanism, mechanism.loops, [here, there])

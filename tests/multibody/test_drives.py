@@ -13,12 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.choices import JointFormulation, to_data
-from paramreduce_cli.multibody.base_parameters import affecting_columns, base_parameters
-from paramreduce_cli.multibody.drives import along
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
+from paramreduce_cli.multibody.drives import sum_along
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.plain import PlainDynamics
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 from paramreduce_cli.records import Drive, Formulations, Kind, Parameter, Payload
 
 EVERYTHING = (Kind.ROTOR, Kind.VISCOUS, Kind.COULOMB, Kind.OFFSET, Kind.STIFFNESS)
@@ -62,14 +62,14 @@ def case(request):
     if name in MECHANISMS:
         mechanism = with_everything(MECHANISMS[name]())
         return mechanism, Lagrange(mechanism), tree_states(mechanism, 12)
-    mechanism = with_everything(assembled(config_of(name).build_mechanism()))
-    return mechanism, Lagrange(mechanism), random_states(mechanism, 6, np.random.default_rng(1))
+    mechanism = with_everything(assemble(config_of(name).build_mechanism()))
+    return mechanism, Lagrange(mechanism), draw_states(mechanism, 6, np.random.default_rng(1))
 
 
 def test_regressor_agrees_with_lagrange(case):
     mechanism, oracle, states = case
     phi = np.random.default_rng(2).uniform(0.5, 2, size=mechanism.n_parameters)
-    found = Dynamics(mechanism).regressor(*states)
+    found = Dynamics(mechanism).compute_regressor(*states)
     for K, q, dq, ddq in zip(found, *states, strict=True):
         expected = np.array(oracle.tau_by_phi(q, dq, ddq, phi))
         R = tangent(oracle, mechanism.independent, q)
@@ -81,10 +81,10 @@ def test_mass_matrix_and_bias_are_those_of_the_same_torques(case):
     q, dq, ddq = states
     phi = np.random.default_rng(3).uniform(0.5, 2, size=mechanism.n_parameters)
     dynamics = Dynamics(mechanism)
-    M, delta = dynamics.direct(q, dq, phi)
+    M, delta = dynamics.compute_mass_matrix_and_bias(q, dq, phi)
     z = list(mechanism.independent)
     together = np.einsum("kij,kj->ki", M, ddq[:, z]) + delta
-    assert relative(together, dynamics.inverse(q, dq, ddq, phi)) < 1e-11
+    assert relative(together, dynamics.compute_torques(q, dq, ddq, phi)) < 1e-11
     for own, at in zip(M, q, strict=True):
         R = tangent(oracle, mechanism.independent, at)
         assert relative(own, R.T @ np.array(oracle.mass_matrix(at, phi)) @ R) < 1e-10
@@ -102,8 +102,8 @@ def test_plain_recursion_is_the_same():
     mechanism = with_everything(MECHANISMS["tree"]())
     phi = np.random.default_rng(3).uniform(0.5, 2, size=mechanism.n_parameters)
     z, dz, ddz = tree_states(mechanism, 10)
-    tau = Dynamics(mechanism).inverse(z, dz, ddz, phi)
-    again = PlainDynamics(mechanism).accelerations(phi).map(10)(z.T, dz.T, tau.T).full().T
+    tau = Dynamics(mechanism).compute_torques(z, dz, ddz, phi)
+    again = PlainDynamics(mechanism).express_accelerations(phi).map(10)(z.T, dz.T, tau.T).full().T
     assert relative(again, ddz) < 1e-8
 
 
@@ -111,13 +111,13 @@ def test_adjoint_through_smooth_friction():
     mechanism = with_everything(MECHANISMS["tree"]())
     smooth = [dataclasses.replace(drive, smoothing=0.4) for drive in mechanism.drives]
     mechanism = dataclasses.replace(mechanism, drives=tuple(smooth))
-    observation = Dynamics(mechanism).observation(np.arange(40, mechanism.n_parameters))
+    observation = Dynamics(mechanism).make_observation(np.arange(40, mechanism.n_parameters))
     states = tree_states(mechanism, 4)
     rng = np.random.default_rng(3)
-    seed = rng.normal(size=observation.forward(*states).shape)
-    for which, gradient in enumerate(observation.adjoint(*states, seed)):
+    seed = rng.normal(size=observation.evaluate(*states).shape)
+    for which, gradient in enumerate(observation.pull_back(*states, seed)):
         direction = rng.normal(size=gradient.shape)
-        found = slope(lambda *s: np.sum(observation.forward(*s) * seed), states, direction, which)
+        found = slope(lambda *s: np.sum(observation.evaluate(*s) * seed), states, direction, which)
         assert found == pytest.approx(np.sum(gradient * direction), rel=1e-6, abs=1e-6)
 
 
@@ -143,7 +143,7 @@ def test_rotors_and_payloads_agree_with_pinocchio():
     expected = [
         pin.rnea(model, data, q + offsets, dq, ddq) for q, dq, ddq in zip(*states, strict=True)
     ]
-    assert relative(Dynamics(mechanism).inverse(*states, phi), np.array(expected)) < 1e-11
+    assert relative(Dynamics(mechanism).compute_torques(*states, phi), np.array(expected)) < 1e-11
 
 
 def test_friction_by_definition():
@@ -161,7 +161,7 @@ def test_friction_by_definition():
     phi = np.zeros(26)
     phi[20:] = 2.0, 3.0, 2.0, 3.0, 0.7, 5.0
     dq = np.array([[-0.3, 0.2], [0.0, 0.05], [1.0, 0.5]])
-    tau = Dynamics(mechanism).inverse(np.zeros((3, 2)), dq, np.ones((3, 2)), phi)
+    tau = Dynamics(mechanism).compute_torques(np.zeros((3, 2)), dq, np.ones((3, 2)), phi)
     both = 5.0 * np.sign(dq @ [1, -2])
     first = 2 * dq[:, 0] + 3 * np.sign(dq[:, 0]) + both
     second = 2 * dq[:, 1] + 3 * np.tanh(dq[:, 1] / 0.1) + 0.7 - 2 * both
@@ -174,9 +174,9 @@ def test_what_a_motor_behind_gears_adds():
     behind = {"motor": {"motion": {"z_1": 62.6}, "inertia": 2e-4, "viscous": 1e-3}}
     mechanism = mechanism_of(description, drives=behind)
     ones = np.ones((1, 1))
-    K = Dynamics(mechanism).regressor(ones, 2 * ones, 3 * ones)[0, 0, 10:]
+    K = Dynamics(mechanism).compute_regressor(ones, 2 * ones, 3 * ones)[0, 0, 10:]
     assert pytest.approx([3 * 62.6**2, 2 * 62.6**2]) == K
-    assert along(mechanism.drives[0], [0.5]) == pytest.approx(31.3)
+    assert sum_along(mechanism.drives[0], [0.5]) == pytest.approx(31.3)
 
 
 def test_base_of_the_puma_with_friction_and_rotors():
@@ -196,14 +196,14 @@ def test_base_of_the_puma_with_friction_and_rotors():
     live = lengths > 1e-10 * lengths.max()
     singular = np.linalg.svd(W[:, live] / lengths[live], compute_uv=False)
     rank = int(np.sum(singular > 1e-9 * singular[0]))
-    K = Dynamics(mechanism).regressor(*states).reshape(-1, 84)
-    base = base_parameters(K, mechanism.preference_order, 1e-9)
+    K = Dynamics(mechanism).compute_regressor(*states).reshape(-1, 84)
+    base = choose_base(K, mechanism.preference_order, 1e-9)
     assert base.columns.size == rank
     names = {mechanism.parameter_names[k] for k in base.columns}
     assert {f"{kind}_z_{k}" for kind in ("fv", "fc", "off") for k in range(1, 7)} <= names
     assert "Ia_z_1" not in names
     assert {"Ia_z_3", "Ia_z_4", "Ia_z_5", "Ia_z_6"} <= names
-    assert affecting_columns(K).sum() == live.sum()
+    assert find_affecting_columns(K).sum() == live.sum()
 
 
 def test_a_payload_in_the_bodys_frame_adds_nothing_to_the_base():
@@ -214,7 +214,7 @@ def test_a_payload_in_the_bodys_frame_adds_nothing_to_the_base():
     )
     counts = []
     for mechanism in (plain, loaded):
-        K = Dynamics(mechanism).regressor(*tree_states(mechanism, 60))
+        K = Dynamics(mechanism).compute_regressor(*tree_states(mechanism, 60))
         W = K.reshape(-1, mechanism.n_parameters)
-        counts.append(base_parameters(W, mechanism.preference_order, 1e-9).columns.size)
+        counts.append(choose_base(W, mechanism.preference_order, 1e-9).columns.size)
     assert counts[0] == counts[1]

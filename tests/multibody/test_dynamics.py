@@ -34,8 +34,8 @@ def test_inverse_and_direct_dynamics_agree_with_pinocchio(mechanism, seed):
     phi = random_parameters(mechanism, seed)
     z, dz, ddz = random_states(mechanism, 50, seed)
     torques = pinocchio_model.inverse_dynamics(mechanism, phi, z, dz, ddz)
-    assert relative(dynamics.inverse(z, dz, ddz, phi), torques) < 1e-12
-    found_M, found_bias = dynamics.direct(z, dz, phi)
+    assert relative(dynamics.compute_torques(z, dz, ddz, phi), torques) < 1e-12
+    found_M, found_bias = dynamics.compute_mass_matrix_and_bias(z, dz, phi)
     M, bias = pinocchio_model.mass_matrix_and_bias(mechanism, phi, z, dz)
     assert relative(found_M, M) < 1e-12
     assert relative(found_bias, bias) < 1e-12
@@ -45,7 +45,7 @@ def test_inverse_and_direct_dynamics_agree_with_pinocchio(mechanism, seed):
 def test_observation_matrix_agrees_with_pinocchio(make):
     mechanism = make()
     states = random_states(mechanism, 50)
-    found = Dynamics(mechanism).regressor(*states)
+    found = Dynamics(mechanism).compute_regressor(*states)
     assert relative(found, pinocchio_model.regressor(mechanism, *states)) < 1e-12
 
 
@@ -59,14 +59,14 @@ def test_many_joints_agree_with_pinocchio():
     ]  # fmt: skip
     mechanism = mechanism_of(dh(rows), [1.0, -2.0, -9.0])
     states = random_states(mechanism, 5)
-    found = Dynamics(mechanism).regressor(*states)
+    found = Dynamics(mechanism).compute_regressor(*states)
     assert relative(found, pinocchio_model.regressor(mechanism, *states)) < 1e-12
     columns = np.array([3, 25, 60, 199])
-    observation = Dynamics(mechanism).observation(columns)
-    assert relative(observation.forward(*states), found[..., columns].reshape(-1, 4)) < 1e-12
+    observation = Dynamics(mechanism).make_observation(columns)
+    assert relative(observation.evaluate(*states), found[..., columns].reshape(-1, 4)) < 1e-12
     seed, direction = np.random.default_rng(3).normal(size=(2, 100, 4)), states[1]
-    gradient = observation.adjoint(*states, seed[0])[0]
-    change = slope(lambda *s: np.sum(observation.forward(*s) * seed[0]), states, direction, 0)
+    gradient = observation.pull_back(*states, seed[0])[0]
+    change = slope(lambda *s: np.sum(observation.evaluate(*s) * seed[0]), states, direction, 0)
     assert change == pytest.approx(np.sum(gradient * direction), rel=1e-6)
 
 
@@ -76,31 +76,31 @@ def test_inverse_dynamics_agrees_with_lagrange(make):
     phi = random_parameters(mechanism, 7)
     states = random_states(mechanism, 10)
     expected = Lagrange(mechanism).tau.map(10)(*(s.T for s in states), np.tile(phi, (10, 1)).T)
-    assert relative(Dynamics(mechanism).inverse(*states, phi), expected.full().T) < 1e-12
+    assert relative(Dynamics(mechanism).compute_torques(*states, phi), expected.full().T) < 1e-12
 
 
 def test_inverse_and_direct_dynamics_are_one_model(mechanism):
     dynamics = Dynamics(mechanism)
     phi = random_parameters(mechanism, 1)
     z, dz, ddz = random_states(mechanism, 20)
-    M, bias = dynamics.direct(z, dz, phi)
+    M, bias = dynamics.compute_mass_matrix_and_bias(z, dz, phi)
     together = np.einsum("kij,kj->ki", M, ddz) + bias
-    tau = dynamics.inverse(z, dz, ddz, phi)
+    tau = dynamics.compute_torques(z, dz, ddz, phi)
     assert relative(together, tau) < 1e-12
-    again = PlainDynamics(mechanism).accelerations(phi).map(20)(z.T, dz.T, tau.T).full().T
+    again = PlainDynamics(mechanism).express_accelerations(phi).map(20)(z.T, dz.T, tau.T).full().T
     assert relative(again, ddz) < 1e-8
 
 
 def test_adjoint_is_the_derivative_of_the_observation_matrix(mechanism):
     columns = np.arange(10, 10 * mechanism.n_dof)
-    observation = Dynamics(mechanism).observation(columns)
+    observation = Dynamics(mechanism).make_observation(columns)
     states = random_states(mechanism, 4)
     rng = np.random.default_rng(3)
-    seed = rng.normal(size=observation.forward(*states).shape)
-    gradients = observation.adjoint(*states, seed)
+    seed = rng.normal(size=observation.evaluate(*states).shape)
+    gradients = observation.pull_back(*states, seed)
     for which, gradient in enumerate(gradients):
         direction = rng.normal(size=gradient.shape)
-        found = slope(lambda *s: np.sum(observation.forward(*s) * seed), states, direction, which)
+        found = slope(lambda *s: np.sum(observation.evaluate(*s) * seed), states, direction, which)
         assert found == pytest.approx(np.sum(gradient * direction), rel=1e-6, abs=1e-6)
 
 

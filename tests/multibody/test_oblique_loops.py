@@ -6,8 +6,8 @@ import pytest
 from loop_texts import SLIDER, load_text
 
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.multibody.loops.assembly import assembled
-from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.multibody.loops.assembly import assemble
+from paramreduce_cli.multibody.loops.closures import express_equations
 
 ANGLES = np.random.default_rng(0).uniform(-3, 3, size=(12, 3)).round(3).tolist()
 
@@ -16,10 +16,10 @@ ANGLES = np.random.default_rng(0).uniform(-3, 3, size=(12, 3)).round(3).tolist()
 def test_a_slider_has_two_equations_in_any_plane(tmp_path, angles):
     turns = ", ".join(f"{{r{axis}: {a}}}" for axis, a in zip("xyz", angles, strict=True))
     with pytest.warns(ParamreduceWarning, match="of the 5 equations that close the loops 2 are"):
-        mechanism = assembled(load_text(tmp_path, SLIDER, turns=turns).build_mechanism())
+        mechanism = assemble(load_text(tmp_path, SLIDER, turns=turns).build_mechanism())
     assert len(mechanism.loops.kept) == 2
     q = ca.SX.sym("q", 3)
-    phi = closure_equations(mechanism, q)
+    phi = express_equations(mechanism, q)
     jacobian = ca.Function("J", [q], [ca.jacobian(phi, q)])(mechanism.loops.assembly).full()
     kept = jacobian if len(jacobian) == 2 else jacobian[list(mechanism.loops.kept)]
     assert np.linalg.cond(kept) < 100

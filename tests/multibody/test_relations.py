@@ -2,8 +2,8 @@ import numpy as np
 
 from paramreduce_cli.multibody.relations import (
     approximate_expressions,
-    candidates,
-    named_coefficient,
+    list_functions,
+    name_coefficient,
 )
 
 GEOMETRIES = [{"a_3": 0.4318, "d_4": -0.4318}, {"a_3": 0.5, "d_4": -0.4}]
@@ -11,9 +11,9 @@ GEOMETRIES = [{"a_3": 0.4318, "d_4": -0.4318}, {"a_3": 0.5, "d_4": -0.4}]
 
 def name(function):
     values = np.array([function(g["a_3"], g["d_4"]) for g in GEOMETRIES])
-    found = [candidates(g) for g in GEOMETRIES]
+    found = [list_functions(g) for g in GEOMETRIES]
     functions = np.array([list(entry.values()) for entry in found])
-    return named_coefficient(values, list(found[0]), functions)
+    return name_coefficient(values, list(found[0]), functions)
 
 
 def test_functions_of_the_geometry_are_told_apart_by_changing_it():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import config_of, model_of
 
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities
 from paramreduce_cli.multibody.states_inside import StatesInside
@@ -17,7 +17,7 @@ def drawn(robot, bounds, constraints=(), known=None, count=500, **more):
     mechanism = model_of(robot).mechanism
     known = np.zeros((1, mechanism.n_q)) if known is None else known
     inside = StatesInside(mechanism, *bounds, constraints, known)
-    return mechanism, inside.drawn(count, np.random.default_rng(0), **more)
+    return mechanism, inside.draw(count, np.random.default_rng(0), **more)
 
 
 def test_coordinates_are_anywhere_inside_their_limits():
@@ -49,7 +49,7 @@ def test_constraints_are_kept_to_and_may_leave_nothing():
             assert len(q) == 0
             continue
         assert len(q) == 500, "as many as were asked for, though most are refused"
-        tip = np.array([(body_poses(mechanism, one)[1] @ [0.3, 0, 0, 1])[:3] for one in q])
+        tip = np.array([(compute_body_poses(mechanism, one)[1] @ [0.3, 0, 0, 1])[:3] for one in q])
         assert np.hypot(tip[:, 1], tip[:, 2]).max() <= upper + 1e-9
 
 
@@ -80,11 +80,11 @@ def test_states_of_loops_are_assembled_inside_limits_and_constraints(robot):
     again, way = coordinates.follow(z, q)
     assert np.all(way == 1)
     np.testing.assert_allclose(again, q, atol=1e-6)
-    assert coordinates.distance(q).min() >= coordinates.distance(known).min()
-    assert Quantities(mechanism, constraints).rows(q).max(initial=-1.0) <= 0
+    assert coordinates.compute_distance(q).min() >= coordinates.compute_distance(known).min()
+    assert Quantities(mechanism, constraints).compute_rows(q).max(initial=-1.0) <= 0
     dependent = list(mechanism.dependent)
     for values, size in ((dq, 2.0), (ddq, 5.0)):
         assert 0.3 * size < np.abs(values[:, dependent]).max(), "not shorter than need be"
-    expected = coordinates.rates(q, dq[:, independent], ddq[:, independent])
+    expected = coordinates.compute_rates(q, dq[:, independent], ddq[:, independent])
     np.testing.assert_allclose(dq, expected[0], atol=1e-9)
     np.testing.assert_allclose(ddq, expected[1], atol=1e-9)

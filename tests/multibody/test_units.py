@@ -5,9 +5,9 @@ import pytest
 from oracles.pinocchio_model import inverse_dynamics
 
 from paramreduce_cli.config.loading import load_config
-from paramreduce_cli.multibody.base_parameters import affecting_parameters, base_parameters
+from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_parameters
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 
 CONFIG = """
 robot: arm
@@ -42,10 +42,12 @@ def arm(folder, length, ratio, gravity):
 
 
 def effects(mechanism):
-    K = Dynamics(mechanism).regressor(*random_states(mechanism, 100, np.random.default_rng(0)))
-    affects = affecting_parameters(mechanism, K)
+    K = Dynamics(mechanism).compute_regressor(
+        *draw_states(mechanism, 100, np.random.default_rng(0))
+    )
+    affects = find_affecting_parameters(mechanism, K)
     W = K.reshape(-1, K.shape[2])
-    return affects, base_parameters(W, mechanism.preference_order, 1e-9, affects)
+    return affects, choose_base(W, mechanism.preference_order, 1e-9, affects)
 
 
 @pytest.mark.parametrize("gravity", [0.0, -9.81])
@@ -64,9 +66,9 @@ def test_what_has_no_effect_is_missing_in_no_torque(tmp_path, length, mass, rati
     rng = np.random.default_rng(0)
     sizes = [mass, *3 * [mass * length], *6 * [mass * length**2]]
     phi = rng.uniform(0.5, 1, mechanism.n_parameters) * np.array([*sizes * 4, 1e-9, 1e-9])
-    q, dq, ddq = random_states(mechanism, 50, np.random.default_rng(1))
+    q, dq, ddq = draw_states(mechanism, 50, np.random.default_rng(1))
     expected = inverse_dynamics(mechanism, phi[:40], q, dq, ddq)
-    found = Dynamics(mechanism).inverse(q, dq, ddq, np.where(affects, phi, 0.0))
+    found = Dynamics(mechanism).compute_torques(q, dq, ddq, np.where(affects, phi, 0.0))
     found[:, 1] -= (phi[40] * ddq[:, 1] + phi[41] * dq[:, 1]) * ratio**2
     off = np.abs(found - expected).max(axis=0)
     drive = np.abs(phi[40:]).max() * ratio**2

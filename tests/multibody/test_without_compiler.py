@@ -15,19 +15,19 @@ import numpy as np
 from pathlib import Path
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import DataError, ParamreduceWarning
-from paramreduce_cli.multibody.loops.assembly import assembled
+from paramreduce_cli.multibody.loops.assembly import assemble
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.random_states import random_states
+from paramreduce_cli.multibody.random_states import draw_states
 warnings.simplefilter("ignore", ParamreduceWarning)
-mechanism = assembled(load_config(Path(sys.argv[1])).build_mechanism())
-q, dq, ddq = random_states(mechanism, 5, np.random.default_rng(0))
-print(repr(Dynamics(mechanism).regressor(q, dq, ddq).ravel().tolist()))
+mechanism = assemble(load_config(Path(sys.argv[1])).build_mechanism())
+q, dq, ddq = draw_states(mechanism, 5, np.random.default_rng(0))
+print(repr(Dynamics(mechanism).compute_regressor(q, dq, ddq).ravel().tolist()))
 lined_up = np.zeros((3, mechanism.n_q))  # both far links along one line
 half = np.arccos((0.45 - 0.15) / 0.35)
 lined_up[1] = np.pi - half, half - np.pi, half, -half
 lined_up[[0, 2]] = mechanism.loops.assembly
-print(repr(Coordinates(mechanism).distance(lined_up).tolist()))
+print(repr(Coordinates(mechanism).compute_distance(lined_up).tolist()))
 """
 
 

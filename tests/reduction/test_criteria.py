@@ -9,7 +9,7 @@ from conftest import puma_mechanism, random_states, standard_arm
 from oracles.selection import error_by_definition
 from selecting import problem
 
-from paramreduce_cli.multibody.base_parameters import affecting_columns
+from paramreduce_cli.multibody.base_parameters import find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.reduction.criteria.acceleration import AccelerationObjective
@@ -30,11 +30,13 @@ class Case:
         self.phi = np.tile([4.0, 0.3, -0.2, 0.4, 0.8, 0.05, -0.04, 0.9, 0.03, 0.7], n // 10)
         self.phi = self.phi * rng.uniform(0.5, 1.5, n)
         self.q, self.dq, self.ddq = random_states(mechanism, count, seed)
-        K = self.dynamics.regressor(self.q, self.dq, self.ddq)
+        K = self.dynamics.compute_regressor(self.q, self.dq, self.ddq)
         self.tau = K @ self.phi
         W = K.reshape(-1, n)
-        self.problem = problem(W, self.tau.ravel(), candidates=np.flatnonzero(affecting_columns(W)))
-        self.A, self.B = self.dynamics.direct(self.q, self.dq, np.eye(n))
+        self.problem = problem(
+            W, self.tau.ravel(), candidates=np.flatnonzero(find_affecting_columns(W))
+        )
+        self.A, self.B = self.dynamics.compute_mass_matrix_and_bias(self.q, self.dq, np.eye(n))
         self.nominal = self.ddq.std(axis=0)
 
     def objective(self):

@@ -26,7 +26,7 @@ def puma():
 def data(puma):
     """W and torques of random states, rows divided by nominal torques."""
     _, model = puma
-    K = Dynamics(model.mechanism).regressor(*states_of(model.mechanism, 40))
+    K = Dynamics(model.mechanism).compute_regressor(*states_of(model.mechanism, 40))
     weights = model.nominal_torque[:, None]
     W = (K / weights).reshape(-1, K.shape[2])
     return W[:, model.affecting], W @ model.values
@@ -49,7 +49,7 @@ def by_definition(puma, states):
 def test_torques(puma):
     _, model = puma
     states = states_of(model.mechanism, 50)
-    found = Dynamics(model.mechanism).inverse(*states, model.values)
+    found = Dynamics(model.mechanism).compute_torques(*states, model.values)
     assert found == pytest.approx(by_definition(puma, states), rel=1e-11, abs=1e-10)
 
 

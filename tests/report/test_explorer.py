@@ -15,7 +15,7 @@ from browser import MISSING, complaints, opened
 from explored import explored
 
 import paramreduce_cli as pr
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.texts import format_percent
 
 in_browser = pytest.mark.skipif(MISSING, reason="there is no Chromium with its driver")
@@ -92,7 +92,7 @@ def test_every_trajectory_moves(carried, two_link_results):
         q = q[:: -(-len(q) // motion["frames"])]
         assert len(q) == motion["frames"] >= 10
         for moving, row in zip(frames[::7], q[::7], strict=True):
-            for pose in body_poses(model.mechanism, row):
+            for pose in compute_body_poses(model.mechanism, row):
                 off = np.linalg.norm(moving - pose[:3, 3], axis=1).min()
                 assert off < 2 * figure["step"], "some point is the frame's origin"
     assert begin == len(points)

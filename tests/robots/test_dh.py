@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from conftest import dh, mechanism_of
 
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.robots.frames import rotate_x, rotate_z
 
 
@@ -24,7 +24,7 @@ def test_one_link_is_the_product_of_its_textbook_transforms(convention, joint):
     theta, d = (0.5 + z, 0.2) if joint == "revolute" else (0.5, 0.2 + z)
     about_x, about_z = transform("x", 0.7, 0.3), transform("z", theta, d)
     expected = about_x @ about_z if convention == "modified" else about_z @ about_x
-    assert np.allclose(body_poses(mechanism, np.array([z]))[0], expected, atol=1e-15)
+    assert np.allclose(compute_body_poses(mechanism, np.array([z]))[0], expected, atol=1e-15)
 
 
 def test_right_angles_are_exact():
@@ -39,7 +39,7 @@ def test_a_branch_is_placed_on_its_parent():
         ("branch", "trunk", "revolute", 0.1, 0.2, 0.3, 0.0, 0.4, 0.5),
     ]
     mechanism = mechanism_of(dh(rows))
-    poses = body_poses(mechanism, np.array([0.6, 0.7]))
+    poses = compute_body_poses(mechanism, np.array([0.6, 0.7]))
     expected = (
         transform("z", 0.6, 0) @ transform("z", 0.4, 0.5) @ transform("x", 0.2, 0.1)
         @ transform("z", 0.7, 0.3)

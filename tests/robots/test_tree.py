@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.kinematics import body_poses
+from paramreduce_cli.multibody.kinematics import compute_body_poses
 from paramreduce_cli.records import JOINT_AXES, JOINT_COORDINATES
 from paramreduce_cli.robots.frames import rotate_x, rotate_y, rotate_z, translate
 from paramreduce_cli.robots.tree import list_joint_motions, rotate_z_to
@@ -48,7 +48,7 @@ def test_order_of_turns(kind, turns):
     body = {"name": "body", "joint": kind, "at": at, "coordinates": names}
     mechanism = mechanism_of({"tree": {"bodies": [body]}})
     angles = np.array([0.3, -0.7, 1.1])
-    pose = body_poses(mechanism, angles[: len(names)])[-1]
+    pose = compute_body_poses(mechanism, angles[: len(names)])[-1]
     placement = rotate_z(0.4) @ translate(1, 2, 3)
     assert pose == pytest.approx(placement @ turns(*angles), abs=1e-14)
     assert [b.intermediate for b in mechanism.bodies] == [True] * (len(names) - 1) + [False]
@@ -64,5 +64,5 @@ def test_a_chain_is_the_same_by_frames_and_by_denavit_hartenberg():
     ]  # fmt: skip
     mechanism = mechanism_of({"tree": {"bodies": rows}})
     states = random_states(mechanism, 5)
-    expected = Dynamics(puma_mechanism()).regressor(*states)
-    assert Dynamics(mechanism).regressor(*states) == pytest.approx(expected, abs=1e-10)
+    expected = Dynamics(puma_mechanism()).compute_regressor(*states)
+    assert Dynamics(mechanism).compute_regressor(*states) == pytest.approx(expected, abs=1e-10)

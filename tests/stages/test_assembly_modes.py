@@ -7,8 +7,8 @@ import pytest
 from conftest import config_of
 
 from paramreduce_cli.config.schema import ModelSection
-from paramreduce_cli.multibody.loops.assembly import assembled, find_assembly_modes
-from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.multibody.loops.assembly import assemble, find_assembly_modes
+from paramreduce_cli.multibody.loops.closures import express_equations
 from paramreduce_cli.records import Run
 from paramreduce_cli.robots import Robot
 from paramreduce_cli.stages.build_model import build_model
@@ -45,11 +45,11 @@ def test_modes_are_closed_and_keep_the_independent_coordinates(robot):
 
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        mechanism = assembled(config_of(robot).build_mechanism())
+        mechanism = assemble(config_of(robot).build_mechanism())
     modes = find_assembly_modes(mechanism)
     assert modes
     q = ca.SX.sym("q", mechanism.n_q)
-    gap = ca.Function("gap", [q], [closure_equations(mechanism, q)])
+    gap = ca.Function("gap", [q], [express_equations(mechanism, q)])
     own = mechanism.loops.assembly
     for mode in modes:
         found = mode.loops.assembly

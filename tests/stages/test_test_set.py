@@ -52,7 +52,7 @@ def test_accelerations_are_those_of_each_motion(two_link_results, summary):
     for motion in range(14):
         missed, size = 0.0, 0.0
         for k in np.flatnonzero(owner == motion):
-            M, delta = (v[0] for v in dynamics.direct(states["z"][k : k + 1], states["dz"][k : k + 1], phi))  # fmt: skip
+            M, delta = (v[0] for v in dynamics.compute_mass_matrix_and_bias(states["z"][k : k + 1], states["dz"][k : k + 1], phi))  # fmt: skip
             ddz = np.linalg.solve(M, states["tau"][k] - delta)
             missed += np.sum(((ddz - states["ddz"][k]) / nominal) ** 2)
             size += np.sum((states["ddz"][k] / nominal) ** 2)
@@ -163,7 +163,7 @@ def test_motions_keep_to_torque_limits_and_too_few_are_said(monkeypatch):
     assert len(found.test_point_to_point) == 10
     for motion in found.test_point_to_point:
         states = evaluate_point_to_point(motion, sample_point_to_point_times(motion, 300))
-        assert (np.abs(dynamics.inverse(*states, model.values)) <= 1.01 * limits).all()
+        assert (np.abs(dynamics.compute_torques(*states, model.values)) <= 1.01 * limits).all()
     monkeypatch.setattr("paramreduce_cli.excitation.point_to_point._TRIES", 0)
     with pytest.warns(ParamreduceWarning, match="^0 of 10 point-to-point motions of the test set"):
         optimize_trajectories(config.trajectories, model, None, Run(), Items())

@@ -24,15 +24,17 @@ class Moved:
 
     def evaluate(self, states):
         q, dq, ddq = np.split(states, 3)
-        return Outputs.of((self.dynamics.inverse(q.T, dq.T, ddq.T, self.values) + self.off).T)
+        return Outputs.of(
+            (self.dynamics.compute_torques(q.T, dq.T, ddq.T, self.values) + self.off).T
+        )
 
 
 def judge(robot, z, dz, ddz, nominal, constraints=(), **more):
     """Of samples with these states, in one block, and no validation set."""
     model = model_of(robot)
     coordinates = Coordinates(model.mechanism)
-    q, dq, ddq = coordinates.states(z, dz, ddz)
-    tau = Dynamics(model.mechanism).inverse(q, dq, ddq, model.values)
+    q, dq, ddq = coordinates.compute_states(z, dz, ddz)
+    tau = Dynamics(model.mechanism).compute_torques(q, dq, ddq, model.values)
     unused = np.zeros((z.size, model.values.size))
     block = Block(0, np.arange(len(z)), z, dz, ddz, tau, q, dq, ddq, unused)
     part = SimpleNamespace(iterate_blocks=lambda: iter([block]), n_samples=len(z))

@@ -29,7 +29,7 @@ def arm():
 def states(model, count, seed):
     rng = np.random.default_rng(seed)
     q, dq, ddq = rng.uniform(-2, 2, (3, count, model.mechanism.n_dof))
-    tau = Dynamics(model.mechanism).inverse(q, dq, ddq, model.values)
+    tau = Dynamics(model.mechanism).compute_torques(q, dq, ddq, model.values)
     return Block(0, np.zeros(count), q, dq, ddq, tau, q, dq, ddq, np.zeros((0, model.values.size)))
 
 

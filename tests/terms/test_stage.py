@@ -152,7 +152,7 @@ def errors_by_definition(runner, name):
             inputs = [*b.q.T, *b.dq.T, *b.ddq.T]
             ddq = b.ddq
             if mechanism.loops is not None:
-                tangent = coordinates.tangent(b.q)
+                tangent = coordinates.compute_tangent(b.q)
             if term.projected:
                 d, z = list(mechanism.dependent), list(mechanism.independent)
                 drift = b.ddq[:, d] - np.einsum("kij,kj->ki", tangent[:, d], b.ddq[:, z])
@@ -303,7 +303,7 @@ def test_random_states_are_inside_the_limits_and_have_the_errors_that_are_said(t
     dynamics = Dynamics(model.mechanism)
 
     def off(q, dq, ddq):
-        tau = dynamics.inverse(q, dq, ddq, model.values)
+        tau = dynamics.compute_torques(q, dq, ddq, model.values)
         torques, M = given(q, dq, ddq)
         return tau, tau - torques, M
 
@@ -332,8 +332,8 @@ def test_the_worst_state_of_loops_is_assembled_inside_the_limits(four_bar):
     for term in found.functions.values():
         (lower, upper), (z, dz, ddz) = term.drawn, term.worst_state[:, None]
         assert np.all((term.worst_state >= lower) & (term.worst_state <= upper))
-        q, dq, ddq = Coordinates(mechanism).states(z, dz, ddz)
-        tau = Dynamics(mechanism).inverse(q, dq, ddq, model.values)
+        q, dq, ddq = Coordinates(mechanism).compute_states(z, dz, ddz)
+        tau = Dynamics(mechanism).compute_torques(q, dq, ddq, model.values)
         assert np.abs(tau).max() < 5 * largest_torque(four_bar), "no singular one"
 
 
@@ -358,7 +358,7 @@ def recomputed_in_c(runner, name):
     off, total = np.zeros(2), np.zeros(2)
     nominal, scale = model_weights(runner), samples.nominal_acceleration
     for block in samples.validation.iterate_blocks():
-        tangent = Coordinates(mechanism).tangent(block.q)
+        tangent = Coordinates(mechanism).compute_tangent(block.q)
         R = tangent[:, dependent]
         b = block.ddq[:, dependent] - np.einsum("kij,kj->ki", R, block.ddz)
         for k, (tau, ddz) in enumerate(zip(block.tau, block.ddz, strict=True)):

@@ -1,4 +1,4 @@
-"""Close the loops of a mechanism once, and tell whether its description makes sense.
+"""Assembly of loops: they are closed once, and the description is checked.
 
 Ranks are decided on several configurations reached from the assembly by small random moves,
 so that one singular configuration is not taken for a property of the mechanism.
@@ -14,9 +14,9 @@ import scipy.linalg
 import scipy.optimize
 
 from paramreduce_cli.errors import Cause, NumericalError, ParamreduceWarning
-from paramreduce_cli.multibody.kinematics import body_poses
-from paramreduce_cli.multibody.loops.closures import CLOSURES, closure_equations, equation_owners
-from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.multibody.kinematics import compute_body_poses
+from paramreduce_cli.multibody.loops.closures import CLOSURES, express_equations, list_owners
+from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import BASE, FloatArray, IntArray, Loops, Mechanism
 
 _ASSEMBLED = 1e-9
@@ -37,8 +37,8 @@ _ANOTHER_MODE = 1e-3
 """Difference of a coordinate from which on an assembly mode is another one, rad or m."""
 
 
-def assembled(mechanism: Mechanism) -> Mechanism:
-    """The mechanism with its loops closed, and its independent coordinates as in the guess.
+def assemble(mechanism: Mechanism) -> Mechanism:
+    """Return the mechanism with its loops closed, and its independent coordinates as in the guess.
 
     Raises:
         NumericalError: The loops cannot be closed from the guess, equations are redundant, or the
@@ -54,13 +54,15 @@ def assembled(mechanism: Mechanism) -> Mechanism:
             "none left to determine. Leave out those that the loops determine.",
             Cause.INDEPENDENT,
         )
-    nearest = _closed_nearby(equations, mechanism, loops)
-    jacobians = [equations.jacobian(c) for c in [nearest, *_moved(equations, nearest)]]
-    kept = _kept(mechanism, loops, jacobians)
+    nearest = _close_nearby(equations, mechanism, loops)
+    jacobians = [
+        equations.compute_jacobian(c) for c in [nearest, *_list_nearby(equations, nearest)]
+    ]
+    kept = _choose_equations(mechanism, loops, jacobians)
     rows = [jacobian[kept] for jacobian in jacobians]
     _check_choice(mechanism, rows)
-    q = _closed_as_given(equations, mechanism, loops, nearest)
-    _check_regular(mechanism, equations.jacobian(q)[kept])
+    q = _close_as_given(equations, mechanism, loops, nearest)
+    _check_regular(mechanism, equations.compute_jacobian(q)[kept])
     _check_hinges(mechanism, loops, q)
     whole = len(kept) == len(jacobians[0])
     found = dataclasses.replace(loops, assembly=q, kept=None if whole else tuple(kept))
@@ -83,15 +85,17 @@ def find_assembly(mechanism: Mechanism, driven: Sequence[int]) -> tuple[FloatArr
     """
     assert mechanism.loops is not None
     equations = _Equations(mechanism)
-    q = _closed_nearby(equations, mechanism, mechanism.loops)
-    jacobian, rows = _generic([equations.jacobian(c) for c in [q, *_moved(equations, q)]])
+    q = _close_nearby(equations, mechanism, mechanism.loops)
+    jacobian, rows = _choose_generic(
+        [equations.compute_jacobian(c) for c in [q, *_list_nearby(equations, q)]]
+    )
     in_loops = _find_loop_coordinates(mechanism)
     others = np.array([k for k in in_loops if k not in driven], dtype=np.int64)
     # Those that are determined best come first, and what is left over determines them.
     _, pivots = scipy.linalg.qr(jacobian[rows][:, others], mode="r", pivoting=True)
     turned = [k for k in reversed(driven) if k in in_loops]
     order = np.array([*others[pivots], *turned], dtype=np.int64)
-    dependent = set(independent_columns(jacobian, order, _RANK))
+    dependent = set(select_independent(jacobian, order, _RANK))
     return q, [k for k in range(mechanism.n_q) if k not in dependent]
 
 
@@ -119,8 +123,8 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
         start[dependent] += rng.normal(size=len(dependent)) * rng.choice(_MODE_MOVES)
         try:
             moved = dataclasses.replace(loops, assembly=start)
-            q = _closed(equations, mechanism, moved, dependent)
-            _check_regular(mechanism, equations.jacobian(q)[kept])
+            q = _close(equations, mechanism, moved, dependent)
+            _check_regular(mechanism, equations.compute_jacobian(q)[kept])
             _check_hinges(mechanism, loops, q)
         except NumericalError:
             continue
@@ -134,27 +138,27 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
 
 
 def _wrap_angles(angles: FloatArray) -> FloatArray:
-    """Add whole turns to angles so that they are between minus and plus half a turn."""
+    """Return angles between minus and plus half a turn."""
     result: FloatArray = np.angle(np.exp(1j * angles))
     return result
 
 
 class _Equations:
-    """Phi and its Jacobian in numbers, at one configuration."""
+    """The closure equations Phi and their Jacobian in numbers, at one configuration."""
 
     def __init__(self, mechanism: Mechanism) -> None:
         q = ca.SX.sym("q", mechanism.n_q)
-        phi = closure_equations(mechanism, q)
+        phi = express_equations(mechanism, q)
         self._function = ca.Function("phi", [q], [phi, ca.jacobian(phi, q)])
 
-    def gap(self, q: FloatArray) -> FloatArray:
+    def evaluate(self, q: FloatArray) -> FloatArray:
         return np.array(self._function(q)[0]).ravel()
 
-    def jacobian(self, q: FloatArray) -> FloatArray:
+    def compute_jacobian(self, q: FloatArray) -> FloatArray:
         return np.array(self._function(q)[1])
 
 
-def _closed(
+def _close(
     equations: _Equations, mechanism: Mechanism, loops: Loops, moving: Iterable[int]
 ) -> FloatArray:
     """Move some coordinates from the guess until the loops are closed."""
@@ -167,9 +171,9 @@ def _closed(
         return q
 
     found = scipy.optimize.least_squares(
-        lambda values: equations.gap(whole(values)),
+        lambda values: equations.evaluate(whole(values)),
         start[free],
-        jac=lambda values: equations.jacobian(whole(values))[:, free],
+        jac=lambda values: equations.compute_jacobian(whole(values))[:, free],
         method="trf",
         x_scale="jac",
         xtol=1e-15,
@@ -178,11 +182,11 @@ def _closed(
         max_nfev=300,
     )
     q = whole(found.x)
-    gaps = np.abs(equations.gap(q))
+    gaps = np.abs(equations.evaluate(q))
     if gaps.max() > _ASSEMBLED:
         worst = int(np.argmax(gaps))
-        _, open_at = equation_owners(loops.closures)[worst]
-        before = float(np.abs(equations.gap(start)).max())
+        _, open_at = list_owners(loops.closures)[worst]
+        before = float(np.abs(equations.evaluate(start)).max())
         fixed = ", ".join(
             f"{mechanism.generalised_names[k]} = {start[k]:g}"
             for k in range(mechanism.n_q)
@@ -198,7 +202,7 @@ def _closed(
     return q
 
 
-def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
+def _close_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) -> FloatArray:
     """Move all coordinates from the guess until the loops are closed.
 
     A guess of zeros may be a pose in which all links lie in one line, which no step leads away from; then
@@ -209,7 +213,7 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
     """
     moving = _find_loop_coordinates(mechanism)
     try:
-        return _closed(equations, mechanism, loops, moving)
+        return _close(equations, mechanism, loops, moving)
     except NumericalError:
         if loops.assembly.any():
             raise
@@ -219,13 +223,13 @@ def _closed_nearby(equations: _Equations, mechanism: Mechanism, loops: Loops) ->
             start[moving] = size * rng.normal(size=len(moving))
             try:
                 moved = dataclasses.replace(loops, assembly=start)
-                return _closed(equations, mechanism, moved, moving)
+                return _close(equations, mechanism, moved, moving)
             except NumericalError:
                 continue
         raise
 
 
-def _closed_as_given(
+def _close_as_given(
     equations: _Equations, mechanism: Mechanism, loops: Loops, nearest: FloatArray
 ) -> FloatArray:
     """Close the loops with the independent coordinates as they are in the guess.
@@ -234,7 +238,7 @@ def _closed_as_given(
     all coordinates came to that were free to move, which is said.
     """
     try:
-        return _closed(equations, mechanism, loops, mechanism.dependent)
+        return _close(equations, mechanism, loops, mechanism.dependent)
     except NumericalError:
         if loops.assembly[list(mechanism.independent)].any():
             raise
@@ -249,24 +253,26 @@ def _closed_as_given(
     return nearest
 
 
-def _moved(equations: _Equations, q: FloatArray) -> list[FloatArray]:
-    """Configurations nearby, by random moves along the loops."""
+def _list_nearby(equations: _Equations, q: FloatArray) -> list[FloatArray]:
+    """Return configurations nearby, reached by random moves along the loops."""
     rng = np.random.default_rng(_SEED)
     found = []
     for _ in range(_MOVES):
         move = rng.normal(size=q.size)
         new = q + _MOVE * move / np.linalg.norm(move)
         for _ in range(20):
-            step, *_ = np.linalg.lstsq(equations.jacobian(new), equations.gap(new), rcond=1e-9)
+            step, *_ = np.linalg.lstsq(
+                equations.compute_jacobian(new), equations.evaluate(new), rcond=1e-9
+            )
             new = new - step
-        if np.abs(equations.gap(new)).max() <= _ASSEMBLED:
+        if np.abs(equations.evaluate(new)).max() <= _ASSEMBLED:
             found.append(new)
     return found
 
 
-def _generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
+def _choose_generic(jacobians: list[FloatArray]) -> tuple[FloatArray, list[int]]:
     """Choose the Jacobian of the largest rank, and its rows that do not depend on those before them."""
-    found = ((J, independent_columns(J.T, _rows_beyond_rounding(J), _RANK)) for J in jacobians)
+    found = ((J, select_independent(J.T, _find_nonzero_rows(J), _RANK)) for J in jacobians)
     return max(found, key=lambda pair: len(pair[1]))
 
 
@@ -289,19 +295,19 @@ def _find_carriers(mechanism: Mechanism, body: int) -> set[int]:
     return found
 
 
-def _rows_beyond_rounding(jacobian: FloatArray) -> IntArray:
+def _find_nonzero_rows(jacobian: FloatArray) -> IntArray:
     """Find the rows that are not zero to rounding, which every row of a unit length of its own would hide."""
     lengths = np.linalg.norm(jacobian, axis=1)
     return np.flatnonzero(lengths > _ROUNDING * lengths.max(initial=0.0))
 
 
-def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:
-    """Equations that all others follow from; which are dropped is said in a warning.
+def _choose_equations(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> list[int]:
+    """Return the equations that imply all others; a warning names the dropped ones.
 
     Welds of planar or spherical linkages, and rods between two ball joints, have more equations than
     they take away freedom. They can be dropped if the same ones do wherever the loops are closed.
     """
-    jacobian, rows = _generic(jacobians)
+    jacobian, rows = _choose_generic(jacobians)
     if len(rows) == mechanism.n_q:
         raise NumericalError(
             f"the loops are over-constrained: {len(rows)} independent "
@@ -309,13 +315,13 @@ def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> li
             "closure, or use joints or closures with more freedom.",
             Cause.CLOSURES,
         )
-    owners = equation_owners(loops.closures)
+    owners = list_owners(loops.closures)
     if len(rows) == len(owners):
         return rows
-    kept = sorted(_best_conditioned(jacobian, len(rows)))
+    kept = sorted(_choose_best_conditioned(jacobian, len(rows)))
     dropped = ", ".join(name for k, (_, name) in enumerate(owners) if k not in kept)
     for other in jacobians:
-        if _rank(other) > _rank(other[kept]):
+        if _compute_rank(other) > _compute_rank(other[kept]):
             raise NumericalError(
                 f"of the {len(owners)} equations {len(rows)} are independent, but not the same ones "
                 f"wherever the loops are closed; {dropped} cannot be left to the others. Use closures "
@@ -331,24 +337,25 @@ def _kept(mechanism: Mechanism, loops: Loops, jacobians: list[FloatArray]) -> li
     return kept
 
 
-def _best_conditioned(jacobian: FloatArray, count: int) -> list[int]:
-    """Rows that span all others, chosen by pivoted QR."""
+def _choose_best_conditioned(jacobian: FloatArray, count: int) -> list[int]:
+    """Return rows that span all others, chosen by pivoted QR."""
     _, order = scipy.linalg.qr(jacobian.T, mode="r", pivoting=True)
     chosen: list[int] = order[:count].tolist()
     return chosen
 
 
-def _rank(jacobian: FloatArray) -> int:
+def _compute_rank(jacobian: FloatArray) -> int:
     s = np.linalg.svd(jacobian, compute_uv=False)
     return int(np.sum(s > _RANK * s[0]))
 
 
 def _check_choice(mechanism: Mechanism, jacobians: list[FloatArray]) -> None:
-    jacobian, rows = _generic(jacobians)
+    """Raise NumericalError unless the independent coordinates are as many as the freedom, and independent."""
+    jacobian, rows = _choose_generic(jacobians)
     freedom = mechanism.n_q - len(rows)
     names = mechanism.generalised_names
     named = [names[k] for k in mechanism.independent]
-    suggestion = ", ".join(names[k] for k in _well_chosen(mechanism, jacobian))
+    suggestion = ", ".join(names[k] for k in _suggest_independent(mechanism, jacobian))
     if len(named) != freedom:
         raise NumericalError(
             f"names {len(named)} coordinates, but {freedom} are "
@@ -377,7 +384,7 @@ def _check_regular(mechanism: Mechanism, jacobian: FloatArray) -> None:
 
 def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
     """Refuse closures whose axes are against each other, which their equations allow."""
-    poses = body_poses(mechanism, q)
+    poses = compute_body_poses(mechanism, q)
     for closure in loops.closures:
         A, B = (
             frame[:3, :3] if body == BASE else poses[body, :3, :3] @ frame[:3, :3]
@@ -391,9 +398,9 @@ def _check_hinges(mechanism: Mechanism, loops: Loops, q: FloatArray) -> None:
                 )
 
 
-def _well_chosen(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:
-    """Coordinates that can be independent, those already named first where they can be."""
+def _suggest_independent(mechanism: Mechanism, jacobian: FloatArray) -> list[int]:
+    """Return coordinates that can be independent, those already named first as far as they can be."""
     others = [k for k in range(mechanism.n_q) if k not in mechanism.independent]
     order = np.array([*others, *mechanism.independent], dtype=np.int64)
-    dependent = independent_columns(jacobian, order, _RANK)
+    dependent = select_independent(jacobian, order, _RANK)
     return [k for k in range(mechanism.n_q) if k not in dependent]

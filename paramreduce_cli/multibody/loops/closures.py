@@ -1,4 +1,4 @@
-"""The equations that close the loops of a mechanism, symbolically.
+"""Closure equations of loops, as expressions.
 
 Phi(q) = 0 in the generalised coordinates of the open tree; lengths are in m and directions
 without unit, so that every equation is about as large as the gap it measures.
@@ -12,15 +12,15 @@ import casadi as ca
 from paramreduce_cli.expressions.vectors import Vector, dot, subtract
 from paramreduce_cli.multibody.kinematics import (
     JointMotion,
-    direction_in_base,
-    motions,
-    point_in_base,
+    make_joint_motions,
+    transform_direction,
+    transform_point,
 )
 from paramreduce_cli.records import Closure, ClosureKind, Mechanism
 
 
-def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
-    """Phi(q), all closures stacked, without what follows from the rest, (n_equations,).
+def express_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
+    """Return Phi(q), all closures stacked, without equations that follow from the rest, (n_equations,).
 
     Args:
         mechanism: With loops.
@@ -28,13 +28,15 @@ def closure_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     """
     if mechanism.loops is None:
         return ca.SX(0, 1)
-    joints, kept = motions(mechanism, q), mechanism.loops.kept
-    equations = [e for c in mechanism.loops.closures for e in _ClosedPair(joints, c, q).equations()]
+    joints, kept = make_joint_motions(mechanism, q), mechanism.loops.kept
+    equations = [
+        e for c in mechanism.loops.closures for e in _ClosedPair(joints, c, q).express_equations()
+    ]
     return ca.vertcat(*(e for k, e in enumerate(equations) if kept is None or k in kept))
 
 
-def equation_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
-    """For every equation in order the kind of its closure, and its name for people."""
+def list_owners(closures: Sequence[Closure]) -> list[tuple[str, str]]:
+    """Return the kind of the closure of every equation in order, and its name for people."""
     return [(c.kind, f"{c.name} ({part})") for c in closures for part in CLOSURES[c.kind].equations]
 
 
@@ -50,8 +52,8 @@ class _ClosedPair:
     def __init__(self, joints: list[JointMotion], closure: Closure, q: ca.SX) -> None:
         self._joints, self.closure, self.q = joints, closure, q
 
-    def equations(self) -> list[ca.SX]:
-        """Return what is zero where the closure holds."""
+    def express_equations(self) -> list[ca.SX]:
+        """Return the expressions that are zero where the closure holds."""
         if self.closure.kind not in CLOSURES:
             raise ValueError(f"there is no closure of the kind {self.closure.kind!r}")
         return CLOSURES[self.closure.kind].measure(self)
@@ -61,45 +63,45 @@ class _ClosedPair:
         """Origin of B from that of A, in the base frame, m."""
         (a, b), (A, B) = self.closure.bodies, self.closure.frames
         start, end = (
-            point_in_base(self._joints, a, A[:3, 3]),
-            point_in_base(self._joints, b, B[:3, 3]),
+            transform_point(self._joints, a, A[:3, 3]),
+            transform_point(self._joints, b, B[:3, 3]),
         )
         return subtract(end, start)
 
-    def axis(self, k: int) -> Vector:
-        """Axis k of B, in the base frame."""
-        return direction_in_base(
+    def get_axis(self, k: int) -> Vector:
+        """Return axis k of B in the base frame."""
+        return transform_direction(
             self._joints, self.closure.bodies[1], self.closure.frames[1][:3, k]
         )
 
-    def along(self, axes: Sequence[int], vector: Vector) -> list[ca.SX]:
-        """Components of a vector along some axes of A."""
+    def project(self, axes: Sequence[int], vector: Vector) -> list[ca.SX]:
+        """Return the components of a vector along some axes of A."""
         a, A = self.closure.bodies[0], self.closure.frames[0]
-        return [dot(direction_in_base(self._joints, a, A[:3, k]), vector) for k in axes]
+        return [dot(transform_direction(self._joints, a, A[:3, k]), vector) for k in axes]
 
     @property
     def tilt(self) -> list[ca.SX]:
         """Components of the z axis of B along the x and the y axis of A."""
-        return self.along((0, 1), self.axis(2))
+        return self.project((0, 1), self.get_axis(2))
 
     @property
     def turn(self) -> list[ca.SX]:
         """Component of the x axis of B along the y axis of A."""
-        return self.along((1,), self.axis(0))
+        return self.project((1,), self.get_axis(0))
 
 
-def _distance(pair: _ClosedPair) -> list[ca.SX]:
+def _express_distance(pair: _ClosedPair) -> list[ca.SX]:
     length = pair.closure.length
     return [(dot(pair.gap, pair.gap) - length**2) / (2 * length)]
 
 
-def _coupling(pair: _ClosedPair) -> list[ca.SX]:
+def _express_coupling(pair: _ClosedPair) -> list[ca.SX]:
     (a, b), closure = pair.closure.bodies, pair.closure
     return [pair.q[b] - closure.ratio * pair.q[a] - closure.offset]
 
 
 class ClosureType(NamedTuple):
-    """What closures of a kind ask for."""
+    """A type of closure, with the equations that it asks for."""
 
     equations: tuple[str, ...]
     """What each equation measures."""
@@ -113,15 +115,15 @@ CLOSURES: dict[ClosureKind, ClosureType] = {
     "fixed": ClosureType((*_PLACE, *_TILT, "turn"), lambda p: [*p.gap, *p.tilt, *p.turn], (2, 0)),
     "revolute": ClosureType((*_PLACE, *_TILT), lambda p: [*p.gap, *p.tilt], (2,)),
     "prismatic": ClosureType(
-        ("x", "y", *_TILT, "turn"), lambda p: [*p.along((0, 1), p.gap), *p.tilt, *p.turn], (2, 0)
+        ("x", "y", *_TILT, "turn"), lambda p: [*p.project((0, 1), p.gap), *p.tilt, *p.turn], (2, 0)
     ),
     "cylindrical": ClosureType(
-        ("x", "y", *_TILT), lambda p: [*p.along((0, 1), p.gap), *p.tilt], (2,)
+        ("x", "y", *_TILT), lambda p: [*p.project((0, 1), p.gap), *p.tilt], (2,)
     ),
-    "universal": ClosureType((*_PLACE, "angle"), lambda p: [*p.gap, *p.along((0,), p.axis(1))]),
+    "universal": ClosureType((*_PLACE, "angle"), lambda p: [*p.gap, *p.project((0,), p.get_axis(1))]),
     "point": ClosureType(_PLACE, lambda p: list(p.gap)),
-    "planar": ClosureType(("x", "y"), lambda p: p.along((0, 1), p.gap)),
-    "distance": ClosureType(("distance",), _distance),
-    "coupling": ClosureType(("coordinates",), _coupling),
+    "planar": ClosureType(("x", "y"), lambda p: p.project((0, 1), p.gap)),
+    "distance": ClosureType(("distance",), _express_distance),
+    "coupling": ClosureType(("coordinates",), _express_coupling),
 }
 """All kinds of closures."""

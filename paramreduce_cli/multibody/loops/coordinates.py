@@ -1,4 +1,4 @@
-"""From the independent coordinates of a closed loop to all of them.
+"""Map from the independent coordinates of closed loops to all coordinates.
 
 The position problem is solved by Newton's method for all samples at once, each followed
 along the straight line from where it started, in steps that shorten where Newton's
@@ -36,7 +36,7 @@ _UNNOTICED = 1e-2
 
 
 class Coordinates:
-    """Generalised coordinates, velocities and accelerations of a mechanism.
+    """A map from independent coordinates, velocities and accelerations to generalised ones.
 
     Args:
         mechanism: A tree, whose generalised coordinates are its independent ones, or one with
@@ -54,37 +54,39 @@ class Coordinates:
     def _projection(self) -> Projection:
         return Projection(self.mechanism)
 
-    def _compiled(self, *outputs: ca.MX) -> BatchFunction:
-        """A function of q."""
+    def _compile(self, *outputs: ca.MX) -> BatchFunction:
+        """Return the compiled function of q that gives some expressions."""
         return BatchFunction([self._projection.q], list(outputs), once=self._once)
 
     @cached_property
     def _newton(self) -> BatchFunction:
+        """Compiled gap of the closures, and Newton's step."""
         loop = self._projection
-        return self._compiled(loop.gap, -loop.solve(loop.gap))
+        return self._compile(loop.gap, -loop.solve(loop.gap))
 
     @cached_property
     def _tangent(self) -> BatchFunction:
-        return self._compiled(self._projection.tangent.T)
+        return self._compile(self._projection.tangent.T)
 
     @cached_property
     def _distance(self) -> BatchFunction:
-        return self._compiled(self._projection.distance)
+        return self._compile(self._projection.distance)
 
     @cached_property
     def _jacobian(self) -> BatchFunction:
-        return self._compiled(ca.densify(self._projection.dependent_jacobian).T)
+        return self._compile(ca.densify(self._projection.dependent_jacobian).T)
 
     @cached_property
     def _rates(self) -> BatchFunction:
+        """Compiled velocities and accelerations of all coordinates."""
         dz, ddz = (ca.MX.sym(name, self.mechanism.n_dof) for name in ("dz", "ddz"))
-        outputs = list(self._projection.rates(dz, ddz))
+        outputs = list(self._projection.express_rates(dz, ddz))
         return BatchFunction([self._projection.q, dz, ddz], outputs, once=self._once)
 
-    def states(
+    def compute_states(
         self, z: FloatArray, dz: FloatArray, ddz: FloatArray, start: FloatArray | None = None
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """All coordinates of a motion and their derivatives.
+        """Return all coordinates of a motion and their derivatives.
 
         Args:
             z: Independent coordinates, (n_samples, n_dof), rad or m.
@@ -99,11 +101,11 @@ class Coordinates:
         Raises:
             DataError: The loops cannot be closed at a sample.
         """
-        q = self.positions(z, start)
-        return (q, *self.rates(q, dz, ddz))
+        q = self.compute_positions(z, start)
+        return (q, *self.compute_rates(q, dz, ddz))
 
-    def positions(self, z: FloatArray, start: FloatArray | None) -> FloatArray:
-        """Generalised coordinates of consecutive samples of a motion, (n_samples, n_q).
+    def compute_positions(self, z: FloatArray, start: FloatArray | None) -> FloatArray:
+        """Return the generalised coordinates of consecutive samples of a motion, (n_samples, n_q).
 
         Args:
             z: Independent coordinates, (n_samples, n_dof), rad or m.
@@ -121,10 +123,10 @@ class Coordinates:
         self._check_reached(z, reached)
         return q
 
-    def rates(
+    def compute_rates(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Velocities dq and accelerations ddq, each (n_samples, n_q).
+        """Return velocities dq and accelerations ddq, (n_samples, n_q) each.
 
         Args:
             q: Generalised coordinates, (n_samples, n_q).
@@ -137,7 +139,7 @@ class Coordinates:
         return dq, ddq
 
     def _march(self, z: FloatArray, start: FloatArray | None) -> tuple[FloatArray, FloatArray]:
-        """Follow a motion in time: a straight way to far samples might lead to other modes.
+        """Follow a motion in time, as a straight path to far samples might lead to other assembly modes.
 
         Every few samples one after the other, those between from the one before.
         """
@@ -183,6 +185,7 @@ class Coordinates:
         return q, made
 
     def _check_reached(self, z: FloatArray, reached: FloatArray) -> None:
+        """Raise DataError if a sample was not reached."""
         if (reached == 1).all():
             return
         worst = int(np.argmin(reached))
@@ -194,8 +197,8 @@ class Coordinates:
             "Keep the motion away from there, by its limits or by constraints."
         )
 
-    def tangent(self, q: FloatArray) -> FloatArray:
-        """R = dq/dz, (n_samples, n_q, n_dof), at q (n_samples, n_q)."""
+    def compute_tangent(self, q: FloatArray) -> FloatArray:
+        """Return R = dq/dz, (n_samples, n_q, n_dof), at q, (n_samples, n_q)."""
         n_dof = len(self._independent)
         R = np.zeros((q.shape[0], self.mechanism.n_q, n_dof))
         R[:, self._independent] = np.eye(n_dof)
@@ -216,7 +219,7 @@ class Coordinates:
         """
         if self.mechanism.loops is None:
             return
-        near = np.flatnonzero(self.distance(q) < _SINGULAR)
+        near = np.flatnonzero(self.compute_distance(q) < _SINGULAR)
         if near.size:
             raise DataError(
                 f"the motion comes to a singular configuration of the loops at t = "
@@ -224,8 +227,8 @@ class Coordinates:
                 "determine the other coordinates. Keep away from it with a constraint on the distance "
                 "to singularity."
             )
-        sign = self._side(q)
-        tangent = self.tangent(q)
+        sign = self._compute_side(q)
+        tangent = self.compute_tangent(q)
         z = q[:, self._independent]
         step = np.diff(q, axis=0)
         middle = (tangent[1:] + tangent[:-1]) / 2
@@ -247,26 +250,27 @@ class Coordinates:
         Raises:
             DataError: The determinant of Phi_d has the other sign at a sample.
         """
-        beyond = self._side(q) != self._assembly_side
+        beyond = self._compute_side(q) != self._assembly_side
         self._check_reached(z, np.where(beyond, 0.5, 1.0))
 
-    def _side(self, q: FloatArray) -> FloatArray:
-        """Sign of the determinant of Phi_d, (n_samples,)."""
+    def _compute_side(self, q: FloatArray) -> FloatArray:
+        """Return the sign of the determinant of Phi_d, (n_samples,)."""
         n_d = len(self._dependent)
         sign: FloatArray = np.linalg.slogdet(self._jacobian(q)[0].reshape(-1, n_d, n_d))[0]
         return sign
 
     @cached_property
     def _assembly_side(self) -> float:
+        """Sign of the determinant of Phi_d at the assembly."""
         assert self.mechanism.loops is not None
-        return float(self._side(self.mechanism.loops.assembly[None])[0])
+        return float(self._compute_side(self.mechanism.loops.assembly[None])[0])
 
-    def distance(self, q: FloatArray) -> FloatArray:
-        """Distance to singularity of loops, 0 to 1, (n_samples,); see :class:`Projection`."""
+    def compute_distance(self, q: FloatArray) -> FloatArray:
+        """Return the distance to singularity of the loops, 0 to 1, (n_samples,); see :class:`Projection`."""
         return np.nan_to_num(self._distance(q)[0][:, 0], nan=0.0)
 
     def _advance(self, q: FloatArray, dz: FloatArray) -> tuple[FloatArray, BoolArray]:
-        """One predicted step with its corrections; where it cannot be trusted, False."""
+        """Take one predicted step with its corrections; return False where it cannot be trusted."""
         (tangent,) = self._tangent(q)
         shape = (q.shape[0], len(self._dependent), len(self._independent))
         predicted = np.einsum("kij,kj->ki", tangent.reshape(shape), dz)

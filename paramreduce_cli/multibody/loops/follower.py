@@ -10,7 +10,7 @@ from paramreduce_cli.records import FloatArray
 
 
 class Follower:
-    """Positions along a motion that changes a little from call to call.
+    """A follower of positions along a motion that changes a little from call to call.
 
     Each call starts from the positions kept last, of as many samples, and stays on the side of
     singular configurations that the assembly is on.
@@ -33,17 +33,17 @@ class Follower:
         if self._coordinates.mechanism.loops is None:
             return z
         if self._last is None or not np.array_equal(self._last[0], z):
-            self._last = (z, self._found(z))
+            self._last = (z, self._find_positions(z))
         return self._last[1]
 
-    def _found(self, z: FloatArray) -> FloatArray:
-        """From the positions that were kept; if that leads elsewhere, anew from the assembly."""
+    def _find_positions(self, z: FloatArray) -> FloatArray:
+        """Return positions, found from those of the last call, or from the assembly if these lead elsewhere."""
         if self._kept is not None:
             with contextlib.suppress(DataError):
-                q = self._coordinates.positions(z, self._kept)
+                q = self._coordinates.compute_positions(z, self._kept)
                 self._coordinates.check_side(z, q)
                 return q
-        q = self._coordinates.positions(z, None)
+        q = self._coordinates.compute_positions(z, None)
         self._coordinates.check_side(z, q)
         return q
 

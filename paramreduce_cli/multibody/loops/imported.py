@@ -27,7 +27,7 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     """
     names = mechanism.generalised_names
     named = [names.index(name) for name in robot.independent]
-    driven = named or _driven(robot, names)
+    driven = named or _find_driven(robot, names)
     try:
         q, independent = find_assembly(mechanism, driven)
     except NumericalError as error:
@@ -77,7 +77,7 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
     return replace(closed, warnings=warnings)
 
 
-def _driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
+def _find_driven(robot: SimplifiedRobot, names: tuple[str, ...]) -> list[int]:
     """Return positions of the coordinates whose joints have an effort limit in the file, in the order of the file."""
     return [
         names.index(name)

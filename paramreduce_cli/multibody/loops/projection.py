@@ -1,4 +1,4 @@
-"""From the generalised coordinates of an open tree to the independent ones of closed loops.
+"""Projection of the generalised coordinates of an open tree on the independent ones of closed loops.
 
 With Phi(q) = 0, d the dependent coordinates and z the independent ones [Ros2019]:
 
@@ -16,7 +16,7 @@ from typing import TypeVar
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.multibody.loops.closures import closure_equations
+from paramreduce_cli.multibody.loops.closures import express_equations
 from paramreduce_cli.records import Mechanism
 
 Expression = TypeVar("Expression", ca.SX, ca.MX)
@@ -40,10 +40,10 @@ class Projection:
         n_d, n_z = len(self._d), len(self._z)
         self.q = ca.MX.sym("q", mechanism.n_q)
         self.R_d, self.b_d = ca.SX.sym("R_d", n_d, n_z), ca.SX.sym("b_d", n_d)
-        self.R = self._whole(self.R_d, ca.SX.eye(n_z))
-        self.b = self._whole(self.b_d, ca.SX(n_z, 1))
+        self.R = self._interleave(self.R_d, ca.SX.eye(n_z))
+        self.b = self._interleave(self.b_d, ca.SX(n_z, 1))
         q, dq = ca.SX.sym("q", mechanism.n_q), ca.SX.sym("dq", mechanism.n_q)
-        equations = closure_equations(mechanism, q)
+        equations = express_equations(mechanism, q)
         jacobian = ca.jacobian(equations, q)
         gamma = -ca.jtimes(ca.jtimes(equations, q, dq), q, dq)
         self._equations = ca.Function("closure", [q], [ca.cse(equations)])
@@ -65,7 +65,7 @@ class Projection:
         return self._jacobian(self.q)
 
     def solve(self, right: ca.MX) -> ca.MX:
-        """Phi_d^-1 right."""
+        """Return Phi_d^-1 right."""
         return ca.solve(self.dependent_jacobian, right, _SOLVER)
 
     @cached_property
@@ -80,27 +80,27 @@ class Projection:
     @property
     def whole_tangent(self) -> ca.MX:
         """R, (n_q, n_dof)."""
-        return self._whole(self.tangent, ca.MX(ca.DM.eye(len(self._z))))
+        return self._interleave(self.tangent, ca.MX(ca.DM.eye(len(self._z))))
 
-    def whole_drift(self, dq: ca.MX) -> ca.MX:
-        """Accelerations of all coordinates at ddz = 0, b, (n_q,)."""
-        return self._whole(self.drift(dq), ca.MX(len(self._z), 1))
+    def express_whole_drift(self, dq: ca.MX) -> ca.MX:
+        """Return the accelerations of all coordinates at ddz = 0, b, (n_q,)."""
+        return self._interleave(self.express_drift(dq), ca.MX(len(self._z), 1))
 
-    def rates(self, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
-        """Velocities dq and accelerations ddq, each (n_q,)."""
-        dq = self._whole(self.tangent @ dz, dz)
-        return dq, self._whole(self.tangent @ ddz + self.drift(dq), ddz)
+    def express_rates(self, dz: ca.MX, ddz: ca.MX) -> tuple[ca.MX, ca.MX]:
+        """Return velocities dq and accelerations ddq, (n_q,) each."""
+        dq = self._interleave(self.tangent @ dz, dz)
+        return dq, self._interleave(self.tangent @ ddz + self.express_drift(dq), ddz)
 
-    def drift(self, dq: ca.MX) -> ca.MX:
-        """Accelerations of the dependent coordinates at ddz = 0, Phi_d^-1 gamma, (n_d,)."""
+    def express_drift(self, dq: ca.MX) -> ca.MX:
+        """Return the accelerations of the dependent coordinates at ddz = 0, Phi_d^-1 gamma, (n_d,)."""
         return self.solve(self._gamma(self.q, dq))
 
-    def pulled(self, q_bar: ca.MX) -> ca.MX:
-        """R' q_bar: derivatives by all coordinates as ones by the independent ones, in columns."""
+    def pull_back(self, q_bar: ca.MX) -> ca.MX:
+        """Return R' q_bar: derivatives by all coordinates as derivatives by the independent ones, in columns."""
         return q_bar[self._z, :] + self.tangent.T @ q_bar[self._d, :]
 
-    def projected(self, tree: ca.Function, dq: ca.MX, ddq: ca.MX) -> ca.MX:
-        """The transposed regressor in the independent coordinates, KT R, (n_parameters, n_dof).
+    def project_regressor(self, tree: ca.Function, dq: ca.MX, ddq: ca.MX) -> ca.MX:
+        """Return the transposed regressor in the independent coordinates, KT R, (n_parameters, n_dof).
 
         Where the tree's is of scalars, so is the product: most of KT is zero, which derivatives of a product of
         matrices do not use.
@@ -117,8 +117,8 @@ class Projection:
         whole: ca.MX = product(self.q, dq, ddq, self.tangent)
         return whole
 
-    def _whole(self, dependent: Expression, independent: Expression) -> Expression:
-        """Put dependent and independent rows where they belong among the generalised ones."""
+    def _interleave(self, dependent: Expression, independent: Expression) -> Expression:
+        """Return dependent and independent rows in the order of the generalised coordinates."""
         order = np.argsort([*self._d, *self._z]).tolist()
         return ca.vertcat(dependent, independent)[order, :]
 

@@ -11,7 +11,7 @@ from functools import cached_property
 import numpy as np
 
 from paramreduce_cli.errors import ParamreduceError
-from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.search import (
@@ -295,7 +295,7 @@ class ProofSearch:
     def _rank(self) -> int:
         """Rank of the candidates' columns."""
         problem = self._objective.problem
-        return len(independent_columns(problem.W, problem.candidates_by_preference))
+        return len(select_independent(problem.W, problem.candidates_by_preference))
 
     def _take_over(self, proof: _Proof, search: PartedSearch) -> None:
         """Note how far a search has come."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.errors import DataError
-from paramreduce_cli.multibody.orthogonal import unit_columns
+from paramreduce_cli.multibody.orthogonal import normalise_columns
 from paramreduce_cli.records import FloatArray, IntArray
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.fitting import Fit, compute_relative_error, fit
@@ -119,7 +119,7 @@ class _Accelerations:
 
 def _solve_least_squares(X: FloatArray, y: FloatArray) -> FloatArray:
     """Return the least-squares solution of X b = y by scaled normal equations."""
-    scaled, lengths = unit_columns(X)
+    scaled, lengths = normalise_columns(X)
     solution = np.linalg.lstsq(scaled.T @ scaled, scaled.T @ y, rcond=1e-13)[0]
     result: FloatArray = solution / lengths
     return result

@@ -40,7 +40,7 @@ class TorqueObjective(Objective):
         If only round-off is left of the torques, return the share of each unit that is independent of the subset.
         """
         rest = self._project_out(kept)
-        squared = rest.squared_lengths()
+        squared = rest.compute_squared_lengths()
         if rest.y @ rest.y <= FULL_PRECISION**2:
             shares = self.average_by_unit(squared)
             return np.where(shares > 0, shares, -np.inf)

@@ -59,6 +59,6 @@ def tracked(
 
 def _arm(model: Model, period: float) -> Arm:
     """The full model by plain recursion, compiled as a control period at once."""
-    accelerations = PlainDynamics(model.mechanism).accelerations(model.values)
+    accelerations = PlainDynamics(model.mechanism).express_accelerations(model.values)
     states = [ca.MX.sym(name, model.mechanism.n_dof) for name in ("z", "dz", "tau")]
     return BatchFunction(states, list(advanced(accelerations, period, *states)))

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paramreduce_cli.multibody.orthogonal import independent_columns
+from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.reduction.objective import Objective, Units, remove_unit
 from paramreduce_cli.reduction.task import FoundSubsets, SelectionTask, append_others, make_nested
@@ -16,7 +16,7 @@ def essential(task: SelectionTask) -> FoundSubsets:
     """
     objective = task.objective
     everything = tuple(range(len(objective.units)))
-    columns = independent_columns(objective.problem.W, objective.list_columns(everything))
+    columns = select_independent(objective.problem.W, objective.list_columns(everything))
     left: Units = tuple(sorted(objective.find_units(np.array(columns))))
     tail = append_others(objective, left)[len(left) :]
     while left:

@@ -17,7 +17,7 @@ def qr(task: SelectionTask) -> FoundSubsets:
     rest = Orthogonaliser(problem.X[:, problem.columns])
     weights = problem.lengths[problem.columns] ** 2
     order: tuple[int, ...] = ()
-    while (left := objective.average_by_unit(rest.squared_lengths() * weights)).any():
+    while (left := objective.average_by_unit(rest.compute_squared_lengths() * weights)).any():
         unit = find_first_best(left)
         for column in np.flatnonzero(objective.owner == unit):
             rest.take(int(column))
