@@ -38,7 +38,9 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.reduction.models import make_base_model, make_full_model, make_reduced_model
+from paramreduce_cli.reduction.models import make_base_model as base_model
+from paramreduce_cli.reduction.models import make_full_model as full_model
+from paramreduce_cli.reduction.models import make_reduced_model
 from paramreduce_cli.report.data_frames import frame
 from paramreduce_cli.running.in_memory import run_in_memory
 from paramreduce_cli.running.pipeline import find_maker, list_stages_to_run
@@ -48,15 +50,15 @@ __all__ = [
     "Config",
     "ParamreduceError",
     "Results",
+    "base_model",
     "build_model",
     "chosen",
     "code",
     "frame",
+    "full_model",
     "identify",
     "inverse_dynamics",
     "load_config",
-    "make_base_model",
-    "make_full_model",
     "make_report",
     "open_results",
     "optimize_trajectories",

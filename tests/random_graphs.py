@@ -31,5 +31,5 @@ def expressions(draw):
 def evaluated(graph, outputs, seed=0):
     rng = np.random.default_rng(seed)
     inputs = list(rng.uniform(-1, 1, size=(INPUTS, 7)))
-    values = Program.of_graph(graph, outputs).evaluated(inputs)
+    values = Program.from_graph(graph, outputs).evaluate(inputs)
     return np.array([np.broadcast_to(value, 7) for value in values])

@@ -81,7 +81,7 @@ def _simplified(
     inputs = [np.broadcast_to(value, count) for value in simplified.values]
     for name in ("q", "dq", "ddq", *(("R", "b") if simplified.projected else ())):
         inputs += list(stored[name].reshape(count, -1).T)
-    given = Program.of_stored(simplified.program).evaluated(inputs)
+    given = Program.from_stored(simplified.program).evaluate(inputs)
     outputs = np.column_stack([np.broadcast_to(value, count) for value in given])
     n = tangent.shape[2] if simplified.projected else tangent.shape[1]
     across = np.broadcast_to(
@@ -201,7 +201,7 @@ def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str
         for argument in function.arguments
         for column in stored[argument.name].reshape(-1, argument.size).T
     ]
-    values = function.program.evaluated(inputs)
+    values = function.program.evaluate(inputs)
     count = len(stored["q"])
     result = {}
     for array in function.results:

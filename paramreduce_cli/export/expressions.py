@@ -23,7 +23,7 @@ class Language:
 
     def leaves(self, function: Function) -> dict[int, str]:
         """Texts of constants and inputs, by node."""
-        places = function.places(function.arguments)
+        places = function.list_places(function.arguments)
         names = {}
         for number, node in enumerate(function.program.nodes):
             if node.operation == "constant":
@@ -48,7 +48,7 @@ class Language:
         """Names and texts of the operations one after the other, and texts of the results."""
         names = self.leaves(function)
         lines = []
-        for number, node in function.steps():
+        for number, node in function.iterate_steps():
             lines.append((f"t{number}", self.expression(names, node)))
             names[number] = f"t{number}"
         return lines, [signed(names, value) for value in function.program.outputs]

@@ -81,7 +81,7 @@ class RunningModel:
         if self._library is None:
             inputs = [np.broadcast_to(value, count) for value in self._phi]
             inputs += [column for array in arrays for column in array.T]
-            return np.column_stack(self._function.program.evaluated(inputs))
+            return np.column_stack(self._function.program.evaluate(inputs))
         results = [np.empty((count, result.size)) for result in self._function.results]
         self._library.repeated(
             ctypes.c_long(rounds),

@@ -1,4 +1,4 @@
-"""Compiled libraries in the user's cache: checked before they are loaded, and not kept for ever.
+"""Cache of compiled libraries: checked before they are loaded, and removed after a time without use.
 
 A library is kept with its SHA-256 behind it, which a loader of programs does not look at.
 """
@@ -26,14 +26,14 @@ _MOST = 512 * 2**20
 """Bytes of all libraries together; of more the ones used longest ago go."""
 
 
-def cache_folder() -> Path:
-    """Where compiled models are kept: ``$PARAMREDUCE_CACHE`` or the user's cache.
+def find_cache_folder() -> Path:
+    """Return the folder of compiled models: ``$PARAMREDUCE_CACHE`` or the user's cache.
 
     A temporary folder of this process where that cannot be made, or where others could put
     something there that would be run.
     """
     try:
-        folder = _wanted_folder()
+        folder = _get_wanted_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = folder.stat()
     except (OSError, RuntimeError) as error:  # the latter where there is no home
@@ -44,7 +44,7 @@ def cache_folder() -> Path:
                 ParamreduceWarning,
                 stacklevel=2,
             )
-        return temporary_folder()
+        return get_temporary_folder()
     others = stat.S_IWGRP | stat.S_IWOTH
     if hasattr(os, "getuid") and (found.st_uid != os.getuid() or found.st_mode & others):
         warnings.warn(
@@ -53,7 +53,7 @@ def cache_folder() -> Path:
             ParamreduceWarning,
             stacklevel=2,
         )
-        return temporary_folder()
+        return get_temporary_folder()
     if not os.access(folder, os.W_OK | os.X_OK):
         warnings.warn(
             f"{folder} cannot be written, so compiled models are compiled in every run; name another folder in "
@@ -61,15 +61,14 @@ def cache_folder() -> Path:
             ParamreduceWarning,
             stacklevel=2,
         )
-        return temporary_folder()
+        return get_temporary_folder()
     return folder
 
 
 @cache
-def machine_type() -> str:
-    """What a library that is compiled for the machine at hand runs on: its architecture and what its processor can do.
-
-    So machines that share a folder take none that would stop them.
+def identify_machine() -> str:
+    """Return the architecture and the features of the processor, so that machines that share a folder load only
+    libraries that they can run.
     """
     able = platform.processor()
     try:
@@ -80,25 +79,26 @@ def machine_type() -> str:
     return "\n".join([platform.system(), platform.machine(), *platform.libc_ver(), able])
 
 
-def _wanted_folder() -> Path:
+def _get_wanted_folder() -> Path:
+    """Return the folder that the environment asks for."""
     named = os.environ.get("PARAMREDUCE_CACHE")
     if named:
         return Path(named)
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "paramreduce"
 
 
-def temporary_folder() -> Path:
+def get_temporary_folder() -> Path:
     """Return a folder that lasts as long as this process."""
-    return Path(_temporary_folder().name)
+    return Path(_make_temporary_folder().name)
 
 
 @cache
-def _temporary_folder() -> tempfile.TemporaryDirectory[str]:
+def _make_temporary_folder() -> tempfile.TemporaryDirectory[str]:
     return tempfile.TemporaryDirectory(prefix="paramreduce-")
 
 
-def kept(library: Path) -> bool:
-    """Whether a library is there and whole; it counts as used, one that is damaged is removed."""
+def is_kept(library: Path) -> bool:
+    """Return whether a library is there and whole; a whole one counts as used, a damaged one is removed."""
     try:
         if library.exists() and not library.is_file():  # a pipe would be waited for
             library.unlink()
@@ -128,6 +128,7 @@ def keep(built: Path, library: Path) -> None:
 
 
 def _prune(folder: Path, new: Path) -> None:
+    """Remove libraries without recent use, and folders of killed compilations."""
     for left in folder.glob("tmp*"):  # by compilations that were killed
         if left.is_dir() and left.stat().st_mtime < time.time() - _KILLED:
             shutil.rmtree(left, ignore_errors=True)

@@ -1,4 +1,4 @@
-"""Factors common to terms of a sum are taken out of it, compiled by Numba."""
+"""Common factors of the terms of a sum, taken out by loops that Numba compiles."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from paramreduce_cli.expressions.rows import (
     SUM,
     USES,
     Rows,
-    dice,
-    new,
-    next_waiting,
-    place_of,
+    add_row,
+    draw_random,
+    find_term,
     put,
     remove,
+    take_next,
     within,
 )
 
@@ -29,13 +29,13 @@ from paramreduce_cli.expressions.rows import (
 def factor(rows: Rows) -> None:
     """Take factors common to terms of a sum out of it, the most frequent first."""
     while True:
-        n = next_waiting(rows, FACTOR)
+        n = take_next(rows, FACTOR)
         if n < 0:
             break
         if rows.numbers[n, KIND] == PRODUCT and rows.numbers[n, USES] == 1:
             n = rows.links[rows.numbers[n, HEAD], ROW]
         while rows.numbers[n, KIND] == SUM and not rows.counters[FAILED]:
-            common = _most_frequent_factor(rows, n)
+            common = _find_most_frequent_factor(rows, n)
             if common < 0:
                 break
             _take_out(rows, n, common)
@@ -53,8 +53,8 @@ def _is_own(rows: Rows, value: int) -> bool:
 
 
 @within
-def _most_frequent_factor(rows: Rows, n: int) -> int:
-    """Of the products in a sum; negative if no two of them have one in common."""
+def _find_most_frequent_factor(rows: Rows, n: int) -> int:
+    """Return the most frequent factor of the products in a sum; negative if no two products share one."""
     result, most, own = -1, 1, 0
     for k in range(rows.numbers[n, LENGTH]):
         own += _is_own(rows, rows.terms[n, k])
@@ -67,17 +67,18 @@ def _most_frequent_factor(rows: Rows, n: int) -> int:
             product = rows.terms[n, k] >> 1
             for i in range(rows.numbers[product, LENGTH]):
                 value = rows.terms[product, i]
-                if place_of(rows, product, value, 0) < i:
+                if find_term(rows, product, value, 0) < i:
                     continue
                 rows.numbers[value >> 1, COUNT] += change
                 count = rows.numbers[value >> 1, COUNT]
-                if change > 0 and (count > most or (count == most > 1 and dice(rows) % 2)):
+                if change > 0 and (count > most or (count == most > 1 and draw_random(rows) % 2)):
                     result, most = value, count
     return result
 
 
 @within
 def _take_out(rows: Rows, n: int, common: int) -> None:
+    """Take a common factor out of the terms of a sum."""
     rest, inner, left, divided = rows.room[0], rows.room[1], rows.room[2], rows.room[3]
     n_inner, n_left = 0, 0
     for k in range(rows.numbers[n, LENGTH]):
@@ -91,18 +92,18 @@ def _take_out(rows: Rows, n: int, common: int) -> None:
                     rest[length] = rows.terms[product, j]
                     length += 1
         if has:
-            quotient = rest[0] if length == 1 else new(rows, PRODUCT, rest[:length])
+            quotient = rest[0] if length == 1 else add_row(rows, PRODUCT, rest[:length])
             inner[n_inner] = quotient ^ (value & 1)
             divided[n_inner] = product
             n_inner += 1
         else:
             left[n_left] = value
             n_left += 1
-    rest[0], rest[1] = common, new(rows, SUM, inner[:n_inner])
+    rest[0], rest[1] = common, add_row(rows, SUM, inner[:n_inner])
     if n_left == 0:
         put(rows, n, PRODUCT, rest[:2])
     else:
-        left[n_left] = new(rows, PRODUCT, rest[:2])
+        left[n_left] = add_row(rows, PRODUCT, rest[:2])
         put(rows, n, SUM, left[: n_left + 1])
     for k in range(n_inner):
         remove(rows, divided[k])

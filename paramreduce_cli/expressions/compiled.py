@@ -1,4 +1,4 @@
-"""Turn CasADi functions into compiled loops over many samples.
+"""CasADi functions as compiled loops over many samples.
 
 The C text that CasADi generates is wrapped in a loop over samples, compiled once by the
 system's C compiler and kept in the user's cache under a digest of the text, so that a
@@ -22,11 +22,11 @@ import numpy as np
 
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.expressions.cache import (
-    cache_folder,
+    find_cache_folder,
+    get_temporary_folder,
+    identify_machine,
+    is_kept,
     keep,
-    kept,
-    machine_type,
-    temporary_folder,
 )
 from paramreduce_cli.records import FloatArray
 
@@ -66,9 +66,12 @@ class BatchFunction:
         self._function = ca.Function("kernel", inputs, dense)
         self._in_sizes = [x.numel() for x in inputs]
         self._out_sizes = [x.numel() for x in outputs]
-        self._in_lengths, self._out_lengths = _numbers(self._in_sizes), _numbers(self._out_sizes)
+        self._in_lengths, self._out_lengths = (
+            _to_c_numbers(self._in_sizes),
+            _to_c_numbers(self._out_sizes),
+        )
         self._work_size = max(1, self._function.sz_w())
-        self._library = None if once else load(_c_text(self._function))
+        self._library = None if once else load(_generate_c(self._function))
 
     def __call__(self, *arrays: FloatArray) -> list[FloatArray]:
         """Evaluate.
@@ -91,15 +94,16 @@ class BatchFunction:
         work = np.empty(self._work_size)
         self._library.paramreduce_batch(
             ctypes.c_longlong(n),
-            _pointers(ins),
+            _to_c_pointers(ins),
             self._in_lengths,
-            _pointers(outs),
+            _to_c_pointers(outs),
             self._out_lengths,
-            ctypes.c_void_p(_address(work)),
+            ctypes.c_void_p(_get_address(work)),
         )
         return outs
 
     def _interpret(self, n: int, ins: list[FloatArray]) -> list[FloatArray]:
+        """Evaluate the samples in CasADi's virtual machine; NaN where a linear system is singular."""
         if n == 0:
             return [np.empty((0, size)) for size in self._out_sizes]
         try:
@@ -112,23 +116,23 @@ class BatchFunction:
         return [np.ascontiguousarray(result.full().T) for result in results]
 
 
-def _numbers(values: list[int]) -> ctypes.Array:
+def _to_c_numbers(values: list[int]) -> ctypes.Array:
     return (ctypes.c_longlong * len(values))(*values)
 
 
-def _pointers(arrays: list[FloatArray]) -> ctypes.Array:
-    return (ctypes.c_void_p * len(arrays))(*map(_address, arrays))
+def _to_c_pointers(arrays: list[FloatArray]) -> ctypes.Array:
+    return (ctypes.c_void_p * len(arrays))(*map(_get_address, arrays))
 
 
-def _address(array: FloatArray) -> int:
-    """Not by `array.ctypes`, whose making takes longer than many a function of one sample."""
+def _get_address(array: FloatArray) -> int:
+    """Return the address of an array; `array.ctypes` takes longer than many a function of one sample."""
     address: int = array.__array_interface__["data"][0]
     return address
 
 
 @cache
-def compiler() -> tuple[str, ...] | None:
-    """The C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none."""
+def find_compiler() -> tuple[str, ...] | None:
+    """Return the C compiler's command: ``$CC`` if set, else gcc or cc; None if there is none."""
     try:
         wanted = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:
@@ -157,24 +161,24 @@ def load(text: str) -> ctypes.CDLL | None:
     Returns:
         The library; None without a compiler, or if it fails.
     """
-    cc = compiler()
+    cc = find_compiler()
     if cc is None:
         return None
     digest = hashlib.sha256(
-        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version(), machine_type()]).encode()
+        "\n".join([text, *cc, *_FLAGS, ca.CasadiMeta.version(), identify_machine()]).encode()
     ).hexdigest()
     name, command = f"{digest[:32]}.so", [*cc, *_FLAGS]
     try:
         try:
-            return _library(command, text, cache_folder() / name)
+            return _load_library(command, text, find_cache_folder() / name)
         except OSError as error:
             warnings.warn(
-                f"{cache_folder()} cannot hold compiled models ({error.strerror or error}), so they are compiled in every "
+                f"{find_cache_folder()} cannot hold compiled models ({error.strerror or error}), so they are compiled in every "
                 "run; name another folder in PARAMREDUCE_CACHE",
                 ParamreduceWarning,
                 stacklevel=2,
             )
-            return _library(command, text, temporary_folder() / name)
+            return _load_library(command, text, get_temporary_folder() / name)
     except (OSError, subprocess.CalledProcessError) as error:
         detail = getattr(error, "stderr", None) or str(error)
         warnings.warn(
@@ -186,19 +190,20 @@ def load(text: str) -> ctypes.CDLL | None:
         return None
 
 
-def _library(command: list[str], text: str, path: Path) -> ctypes.CDLL:
-    """Load a library, compiled first where it is not kept.
+def _load_library(command: list[str], text: str, path: Path) -> ctypes.CDLL:
+    """Load a library, and compile it first if it is not kept.
 
     Raises:
         OSError: Nothing can be written there, or run from there.
         subprocess.CalledProcessError: The compiler fails.
     """
-    if not kept(path):
+    if not is_kept(path):
         _compile(command, text, path)
     return ctypes.CDLL(str(path))
 
 
-def _c_text(function: ca.Function) -> str:
+def _generate_c(function: ca.Function) -> str:
+    """Return the C text of a function with a loop over samples."""
     generator = ca.CodeGenerator("kernel.c", {"with_header": False})
     generator.add(function)
     loop = _LOOP.format(

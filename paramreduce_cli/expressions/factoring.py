@@ -1,4 +1,4 @@
-"""Fewer operations by the laws of sums and products.
+"""Factoring: fewer operations by the simplification rules of sums and products.
 
 Chains of sums and of products are taken apart into sums and products of many terms; what these have in common is
 computed once, as far as the laws and rewriting find it, and all is put together again. Results differ by rounding only.
@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.rewriting import rewrite
-from paramreduce_cli.expressions.rows import COST, DICE, PRODUCT, SUM, Rows, rows_of, terms_of
+from paramreduce_cli.expressions.rows import COST, DICE, PRODUCT, SUM, Rows, list_terms, make_rows
 
 _CLOSE = {0.0: 0.01, 1.0: 0.003}
 """After so many rewritings per operation, the share of them by which a way of writing may be behind and go on."""
@@ -22,8 +22,8 @@ _LONG = 1000
 """Operations, from which on fewer are tried, as each takes longer and there are more places to save something."""
 
 
-class Written(NamedTuple):
-    """Values in a graph in which signs are free."""
+class Values(NamedTuple):
+    """The values in a graph in which signs are free."""
 
     graph: Graph
     outputs: list[int]
@@ -31,17 +31,17 @@ class Written(NamedTuple):
     @property
     def n_operations(self) -> int:
         """Operations that they take."""
-        return self.graph.count(self.outputs)
+        return self.graph.count_operations(self.outputs)
 
-    def settled(self) -> "Written":
-        """The same values after the laws have been applied."""
-        rows = self.taken_apart()
+    def simplify(self) -> "Values":
+        """Return the same values after the simplification rules are applied to a fixed point."""
+        rows = self.to_rows()
         rewrite(rows, 0)
-        return self.put_together(rows)
+        return self.from_rows(rows)
 
-    def taken_apart(self) -> Rows:
-        """Sums and products of many terms, by the numbers of the nodes."""
-        nodes, reached = self.graph.nodes, self.graph.reached(self.outputs)
+    def to_rows(self) -> Rows:
+        """Return sums and products of many terms, by the numbers of the nodes."""
+        nodes, reached = self.graph.nodes, self.graph.find_reached(self.outputs)
         uses = Counter(value >> 1 for value in self.outputs)
         for number in reached:
             uses.update(value >> 1 for value in nodes[number].operands)
@@ -62,21 +62,21 @@ class Written(NamedTuple):
                     terms += [term ^ (value & 1) for term in table.pop(below)]
                 else:
                     terms.append(value)
-        return rows_of(tables["+"], tables["*"], pinned, len(nodes), calls)
+        return make_rows(tables["+"], tables["*"], pinned, len(nodes), calls)
 
-    def put_together(self, rows: Rows) -> "Written":
-        """The same values in a graph of their own.
+    def from_rows(self, rows: Rows) -> "Values":
+        """Return the same values in a graph of their own.
 
         Args:
-            rows: What became of :meth:`taken_apart`.
+            rows: Rows from :meth:`to_rows`, possibly rewritten.
         """
         target = Graph()
-        sums, products = terms_of(rows, SUM), terms_of(rows, PRODUCT)
-        return Written(target, _Assembly(self.graph, sums, products, target).built(self.outputs))
+        sums, products = list_terms(rows, SUM), list_terms(rows, PRODUCT)
+        return Values(target, _Assembly(self.graph, sums, products, target).build(self.outputs))
 
 
-def least(ways: Iterable[Written], dice: int = 0) -> Written:
-    """Write values with fewer operations.
+def minimise_operations(ways: Iterable[Values], dice: int = 0) -> Values:
+    """Return the values with the fewest operations found.
 
     Args:
         ways: The same values, written in one or several ways; those that are far behind before they are
@@ -86,34 +86,35 @@ def least(ways: Iterable[Written], dice: int = 0) -> Written:
     Returns:
         What takes the fewest operations.
     """
-    apart = [(way, way.taken_apart()) for way in ways]
+    apart = [(way, way.to_rows()) for way in ways]
     for _, rows in apart:
         rows.counters[DICE] = dice
     for tries, share in _CLOSE.items():
         for _, rows in apart:
-            rewrite(rows, int(tries * _places(rows)))
+            rewrite(rows, int(tries * _count_places(rows)))
         close = (1 + share) * min(rows.counters[COST] for _, rows in apart)
         apart = [(way, rows) for way, rows in apart if rows.counters[COST] <= close]
     for _, rows in apart:
-        _rewrite_to_the_end(rows)
-    return min((way.put_together(rows) for way, rows in apart), key=lambda way: way.n_operations)
+        _rewrite_fully(rows)
+    return min((way.from_rows(rows) for way, rows in apart), key=lambda way: way.n_operations)
 
 
-def _rewrite_to_the_end(rows: Rows) -> None:
+def _rewrite_fully(rows: Rows) -> None:
+    """Rewrite rows until a round saves hardly anything."""
     count = saved = int(rows.counters[COST])
     while saved > count // _HARDLY:
-        rewrite(rows, _TRIES * _places(rows))
+        rewrite(rows, _TRIES * _count_places(rows))
         saved = count - int(rows.counters[COST])
         count -= saved
 
 
-def _places(rows: Rows) -> int:
+def _count_places(rows: Rows) -> int:
     count = int(rows.counters[COST])
     return min(count, _LONG**2 // max(count, 1))
 
 
 class _Assembly:
-    """Builds terms in a graph."""
+    """A builder of rows' terms in a graph."""
 
     def __init__(
         self,
@@ -125,46 +126,47 @@ class _Assembly:
         self._source, self._sums, self._products, self._target = source, sums, products, target
         self._built: dict[int, int] = {}
 
-    def built(self, values: Sequence[int]) -> list[int]:
-        """The values in the target graph, operands before what uses them."""
+    def build(self, values: Sequence[int]) -> list[int]:
+        """Return the values in the target graph; operands are built before their users."""
         pending = [value >> 1 for value in reversed(values)]
         while pending:
             number = pending[-1]
-            missing = [v >> 1 for v in self._operands(number) if v >> 1 not in self._built]
+            missing = [v >> 1 for v in self._list_operands(number) if v >> 1 not in self._built]
             if missing and number not in self._built:
                 pending += reversed(missing)
                 continue
             pending.pop()
             if number not in self._built:
-                self._built[number] = self._number(number)
-        return self._known(values)
+                self._built[number] = self._build_number(number)
+        return self._get_built(values)
 
-    def _known(self, values: Sequence[int]) -> list[int]:
+    def _get_built(self, values: Sequence[int]) -> list[int]:
         negate, built = self._target.negate, self._built
         return [negate(built[v >> 1]) if v & 1 else built[v >> 1] for v in values]
 
-    def _operands(self, number: int) -> Sequence[int]:
+    def _list_operands(self, number: int) -> Sequence[int]:
         terms = self._sums.get(number) or self._products.get(number)
         return terms or self._source.nodes[number].operands
 
-    def _number(self, number: int) -> int:
+    def _build_number(self, number: int) -> int:
+        """Build the node or row of a number, and return its value."""
         graph = self._target
         if number in self._sums:
-            return _joined(self._known(self._sums[number]), graph.add)
+            return _join_pairwise(self._get_built(self._sums[number]), graph.add)
         if number in self._products:
-            factors = self._known(self._products[number])
+            factors = self._get_built(self._products[number])
             factors.sort(key=lambda value: graph.number(value) is None)  # so that numbers meet
-            return _joined(factors, graph.multiply)
+            return _join_pairwise(factors, graph.multiply)
         node = self._source.nodes[number]
         if node.operation == "constant":
             return graph.constant(node.number)
         if node.operation == "input":
             return graph.input(int(node.number))
-        return graph.call(node.operation, *self._known(node.operands))
+        return graph.call(node.operation, *self._get_built(node.operands))
 
 
-def _joined(values: list[int], join: Callable[[int, int], int]) -> int:
-    """Join terms two by two, so that few wait for others."""
+def _join_pairwise(values: list[int], join: Callable[[int, int], int]) -> int:
+    """Join terms pairwise, so that few wait for others."""
     while len(values) > 1:
         pairs = [join(a, b) for a, b in zip(values[::2], values[1::2], strict=False)]
         values = pairs + values[len(pairs) * 2 :]

@@ -1,4 +1,4 @@
-"""Named functions with array arguments, ready to be written in some language."""
+"""Named functions with array arguments, ready to be written in a language."""
 
 from __future__ import annotations
 
@@ -41,26 +41,26 @@ class Function:
     results: tuple[Argument, ...]
     program: Program
 
-    def places(self, arrays: Sequence[Argument]) -> list[tuple[Argument, int]]:
-        """For every input or output, its array and the position in it."""
+    def list_places(self, arrays: Sequence[Argument]) -> list[tuple[Argument, int]]:
+        """Return for every input or output its array and the position in it."""
         return [(array, k) for array in arrays for k in range(array.size)]
 
-    def used(self) -> set[str]:
-        """Names of the arguments that the results depend on."""
-        places = self.places(self.arguments)
+    def find_used_arguments(self) -> set[str]:
+        """Return the names of the arguments that the results depend on."""
+        places = self.list_places(self.arguments)
         numbers = (int(n.number) for n in self.program.nodes if n.operation == "input")
         return {places[number][0].name for number in numbers}
 
-    def taking(self, names: Collection[str]) -> Function:
-        """The same with some of its arguments; the others are not used."""
-        places = enumerate(self.places(self.arguments))
+    def restrict_arguments(self, names: Collection[str]) -> Function:
+        """Return the function with some of its arguments only; it uses no others."""
+        places = enumerate(self.list_places(self.arguments))
         kept = [position for position, (argument, _) in places if argument.name in names]
         arguments = tuple(a for a in self.arguments if a.name in names)
-        return replace(self, arguments=arguments, program=self.program.renumbered(kept.index))
+        return replace(self, arguments=arguments, program=self.program.renumber(kept.index))
 
-    def on_state(self) -> list[bool]:
-        """Which nodes of the program depend on more than the parameters, ``phi``."""
-        places = self.places(self.arguments)
+    def find_state_dependent(self) -> list[bool]:
+        """Return which nodes of the program depend on more than the parameters ``phi``."""
+        places = self.list_places(self.arguments)
         found: list[bool] = []
         for node in self.program.nodes:
             if node.operation == "input":
@@ -69,15 +69,15 @@ class Function:
                 found.append(any(found[value >> 1] for value in node.operands))
         return found
 
-    def cost(self) -> str:
-        """How many operations it takes, for people: some are the same for all states."""
-        of_state = self.on_state()
-        once = sum(not of_state[number] for number, _ in self.steps())
+    def describe_cost(self) -> str:
+        """Return a sentence on the number of operations, and how many are the same for all states."""
+        of_state = self.find_state_dependent()
+        once = sum(not of_state[number] for number, _ in self.iterate_steps())
         total = f"{self.program.n_operations} operations"
         return f"{total}, {once} of them on parameters alone." if once else f"{total}."
 
-    def steps(self) -> Iterator[tuple[int, Node]]:
-        """Numbers and nodes of the operations, in an order in which they can be done."""
+    def iterate_steps(self) -> Iterator[tuple[int, Node]]:
+        """Yield numbers and nodes of the operations, in an order in which they can be computed."""
         for number, node in enumerate(self.program.nodes):
             if node.operation not in ("constant", "input"):
                 yield number, node

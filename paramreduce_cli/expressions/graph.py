@@ -15,7 +15,7 @@ _EVEN = frozenset({"cos"})
 
 
 class Node(NamedTuple):
-    """What a node computes: a constant, an input, or an operation on values."""
+    """A node: a constant, an input, or an operation on values."""
 
     operation: str
     """``constant``, ``input``, ``+``, ``*`` or the name of a function."""
@@ -44,17 +44,17 @@ class Graph:
         """Constants, by the numbers of their nodes."""
         self.constant(0.0)
 
-    def _appended(self, node: Node) -> int:
+    def _append(self, node: Node) -> int:
         """Append a node; return its value."""
         self.nodes.append(node)
         return 2 * len(self.nodes) - 2
 
-    def _value(self, operation: str, operands: tuple[int, ...]) -> int:
+    def _make_value(self, operation: str, operands: tuple[int, ...]) -> int:
         """Return the value of an operation on values."""
         index = self._indices[operation]
         value = index.get(operands)
         if value is None:
-            value = index[operands] = self._appended(Node(operation, operands))
+            value = index[operands] = self._append(Node(operation, operands))
         return value
 
     def constant(self, number: float) -> int:
@@ -62,7 +62,7 @@ class Graph:
         size = abs(number)
         value = self._constants.get(size)
         if value is None:
-            value = self._constants[size] = self._appended(Node("constant", (), size))
+            value = self._constants[size] = self._append(Node("constant", (), size))
             self._numbers[value >> 1] = size
         return value ^ (number < 0)
 
@@ -70,7 +70,7 @@ class Graph:
         """Return one of the inputs, by position."""
         value = self._inputs.get(position)
         if value is None:
-            value = self._inputs[position] = self._appended(Node("input", (), position))
+            value = self._inputs[position] = self._append(Node("input", (), position))
         return value
 
     def number(self, value: int) -> float | None:
@@ -79,7 +79,7 @@ class Graph:
         return -number if number is not None and value & 1 else number
 
     def negate(self, a: int) -> int:
-        """-a"""
+        """Return -a."""
         if a == ZERO:
             return a
         if self._signs_free:
@@ -92,14 +92,14 @@ class Graph:
         if node.operation == "+" and sum(value & 1 for value in node.operands) == 1:
             x, y = node.operands  # of a difference it is the other difference
             return self.add(x ^ 1, y ^ 1)
-        return self._value("neg", (a,))
+        return self._make_value("neg", (a,))
 
     def subtract(self, a: int, b: int) -> int:
-        """A - b"""
+        """Return a - b."""
         return self.negate(b) if a == ZERO else self.add(a, b ^ 1 if b != ZERO else b)
 
     def add(self, a: int, b: int) -> int:
-        """A + b"""
+        """Return a + b."""
         if a == ZERO:
             return b
         if b == ZERO:
@@ -112,16 +112,16 @@ class Graph:
         if b >> 1 < a >> 1:
             a, b = b, a
         if not self._signs_free:
-            return self._value("+", (a, b))
+            return self._make_value("+", (a, b))
         sign = a & 1
         key = (a ^ sign, b ^ sign)
         value = self._sums.get(key)
         if value is None:
-            value = self._sums[key] = self._appended(Node("+", key))
+            value = self._sums[key] = self._append(Node("+", key))
         return value ^ sign
 
     def multiply(self, a: int, b: int) -> int:
-        """A b"""
+        """Return a b."""
         if a == ZERO or b == ZERO:
             return ZERO
         x, y = self.number(a), self.number(b)
@@ -143,21 +143,21 @@ class Graph:
         key = (a, b)
         value = self._products.get(key)
         if value is None:
-            value = self._products[key] = self._appended(Node("*", key))
+            value = self._products[key] = self._append(Node("*", key))
         return value ^ sign
 
     def call(self, function: str, *values: int) -> int:
-        """A function of values: sin, cos, sqrt, /, atan2, ..."""
+        """Return a function of values: sin, cos, sqrt, /, atan2, ..."""
         if values == (ZERO,) and function in ("sin", "cos", "sign", "tanh"):
             return self.constant(float(function == "cos"))
         if len(values) == 1 and self._signs_free and function in _ODD:
-            return self._value(function, (values[0] & ~1,)) ^ (values[0] & 1)
+            return self._make_value(function, (values[0] & ~1,)) ^ (values[0] & 1)
         if function in _EVEN:
-            return self._value(function, (values[0] & ~1,))
-        return self._value(function, values)
+            return self._make_value(function, (values[0] & ~1,))
+        return self._make_value(function, values)
 
-    def reached(self, outputs: list[int]) -> list[int]:
-        """Numbers of the nodes that outputs are made of, operands before what uses them."""
+    def find_reached(self, outputs: list[int]) -> list[int]:
+        """Return the numbers of the nodes that outputs depend on; operands come before their users."""
         seen = {value >> 1 for value in outputs}
         pending = list(seen)
         while pending:
@@ -168,9 +168,9 @@ class Graph:
                     pending.append(node)
         return sorted(seen)
 
-    def count(self, outputs: list[int]) -> int:
-        """Operations that outputs take: all their nodes but constants and inputs."""
+    def count_operations(self, outputs: list[int]) -> int:
+        """Return the operations of outputs: all their nodes except constants and inputs."""
         return sum(
             self.nodes[node].operation not in ("constant", "input")
-            for node in self.reached(outputs)
+            for node in self.find_reached(outputs)
         )

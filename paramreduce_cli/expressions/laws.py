@@ -1,4 +1,4 @@
-"""The laws of sums and products, applied to rows until they save no more, compiled by Numba.
+"""Simplification rules of sums and products, applied to rows by loops that Numba compiles.
 
 Chains are taken together, terms that cancel vanish, pairs that several rows hold are computed once [Breuer1969], and a
 factor common to terms of a sum is taken out. Only rows that wait are looked at.
@@ -22,13 +22,13 @@ from paramreduce_cli.expressions.rows import (
     TIDY,
     USES,
     Rows,
-    next_waiting,
     put,
     remove,
+    take_next,
     wait,
     within,
 )
-from paramreduce_cli.expressions.sharing import share
+from paramreduce_cli.expressions.sharing import share_pairs
 
 
 @within
@@ -41,16 +41,16 @@ def settle(rows: Rows, products_first: bool) -> None:
     """
     tidy(rows)
     if products_first:
-        share(rows, PRODUCT)
+        share_pairs(rows, PRODUCT)
         tidy(rows)
     factor(rows)
     tidy(rows)
     cost = rows.counters[COST] + 1
     while rows.counters[COST] < cost and not rows.counters[FAILED]:
         cost = rows.counters[COST]
-        share(rows, PRODUCT)
+        share_pairs(rows, PRODUCT)
         tidy(rows)
-        share(rows, SUM)
+        share_pairs(rows, SUM)
         tidy(rows)
         factor(rows)
         tidy(rows)
@@ -61,7 +61,7 @@ def tidy(rows: Rows) -> None:
     """Drop rows that nothing uses, and take those that one other row uses into it where both are sums, or products."""
     width = rows.terms.shape[1]
     while True:
-        n = next_waiting(rows, TIDY)
+        n = take_next(rows, TIDY)
         if n < 0:
             break
         kind = rows.numbers[n, KIND]
@@ -87,7 +87,7 @@ def tidy(rows: Rows) -> None:
 
 @within
 def _resolve(rows: Rows, n: int) -> None:
-    """Have others hold a row's only term in its place; products hold none that is negative."""
+    """Replace a row by its only term wherever it is used; products hold no negative terms."""
     width = rows.terms.shape[1]
     negative = rows.terms[n, 0] & 1
     slot = rows.numbers[n, HEAD]

@@ -1,4 +1,4 @@
-"""A quick count of what is left of a program when inputs are zero, compiled by Numba.
+"""A quick count of the operations left when inputs are zero, compiled by Numba.
 
 What becomes zero, or equal to one of its terms, is not counted, nor what no output needs any
 more; that different nodes may then compute the same, and that sums and products could be
@@ -7,7 +7,7 @@ rearranged, is not looked at. It takes microseconds and is meant for comparing m
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compile_loop
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import BoolArray, IntArray
 
@@ -41,13 +41,14 @@ class LiveCount:
         Args:
             zero: Which of the first inputs are zero.
         """
-        return int(_live(self._kinds, self._operands, self._inputs, self._outputs, zero))
+        return int(_count_live(self._kinds, self._operands, self._inputs, self._outputs, zero))
 
 
-@compiled()
-def _live(
+@compile_loop()
+def _count_live(
     kinds: IntArray, operands: IntArray, inputs: IntArray, outputs: IntArray, zero: BoolArray
 ) -> int:
+    """Return the operations that outputs still need when some inputs are zero."""
     n = kinds.size
     stands_for = np.arange(n)
     for k in range(n):

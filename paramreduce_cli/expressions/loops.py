@@ -21,21 +21,22 @@ _DIGEST = 32
 
 
 class _CheckedCache(IndexDataCacheFile):
-    """Numba's files of one function, each with a checksum behind it."""
+    """A cache of one function's Numba files, each with a checksum behind it."""
 
     def _load_index(self) -> Any:
         try:
-            _whole(self._index_path)
+            _read_checked(self._index_path)
             return super()._load_index()
         except OSError:
             return {}
 
     def _save_index(self, overloads: Any) -> None:
+        """Write the index with its checksum."""
         version = pickle.dumps(self._version, protocol=-1)
         self._write(self._index_path, version + self._dump((self._source_stamp, overloads)))
 
     def _load_data(self, name: str) -> Any:
-        return pickle.loads(_whole(self._data_path(name)))
+        return pickle.loads(_read_checked(self._data_path(name)))
 
     def _save_data(self, name: str, data: Any) -> None:
         self._write(self._data_path(name), self._dump(data))
@@ -45,8 +46,8 @@ class _CheckedCache(IndexDataCacheFile):
             file.write(content + hashlib.sha256(content).digest())
 
 
-def _whole(path: str) -> bytes:
-    """What a file holds before its checksum.
+def _read_checked(path: str) -> bytes:
+    """Return the content of a file before its checksum.
 
     Raises:
         OSError: It cannot be read, or its checksum does not fit.
@@ -57,23 +58,23 @@ def _whole(path: str) -> bytes:
     return content[:-_DIGEST]
 
 
-def _stamps(source: Path) -> tuple[tuple[str, float, int], ...]:
-    """Of all files beside one: what a compiled function calls is compiled with it, and may be in any of them."""
+def _stamp_files(source: Path) -> tuple[tuple[str, float, int], ...]:
+    """Return the times and sizes of all files in a folder, as a compiled function contains the functions that it calls."""
     stats = [(file, file.stat()) for file in sorted(source.parent.glob("*.py"))]
     return tuple((file.name, stat.st_mtime, stat.st_size) for file, stat in stats)
 
 
-def inlined(function: Loop) -> Loop:
-    """Have a function written out in the compiled ones that call it, where these are few.
+def inline(function: Loop) -> Loop:
+    """Inline a function in the compiled functions that call it, if these are few.
 
-    What is compiled by itself is so once more, with all that it calls, in each of those that call it.
+    A function that is compiled by itself is compiled again, with all that it calls, in each of its callers.
     """
     made: Loop = numba.njit(inline="always")(function)
     return made
 
 
-def compiled(*, within: bool = False, makes_arrays: bool = True) -> Callable[[Loop], Loop]:
-    """Have a function compiled when it is first called, and kept; others run on while it does.
+def compile_loop(*, within: bool = False, makes_arrays: bool = True) -> Callable[[Loop], Loop]:
+    """Compile a function at its first call, and keep the result; other threads run on meanwhile.
 
     Args:
         within: Whether only compiled functions call it; nothing is compiled for calls from Python, which end the process.
@@ -94,7 +95,10 @@ def compiled(*, within: bool = False, makes_arrays: bool = True) -> Callable[[Lo
         ):  # not where NUMBA_DISABLE_JIT leaves functions as they are
             file = dispatcher._cache._cache_file
             file.__class__ = _CheckedCache
-            file._source_stamp = (file._source_stamp, _stamps(Path(function.__code__.co_filename)))
+            file._source_stamp = (
+                file._source_stamp,
+                _stamp_files(Path(function.__code__.co_filename)),
+            )
         return dispatcher
 
     return made

@@ -1,4 +1,4 @@
-"""Straight-line programs: count their operations, specialise them, evaluate them.
+"""Straight-line programs: counted, specialised and evaluated.
 
 An operation is a sum, a product, or a call of a function (sin, cos, ...) that no other
 operation repeats. Two rules are offered:
@@ -71,8 +71,8 @@ class Program:
     outputs: tuple[int, ...]
 
     @classmethod
-    def of_function(cls, function: ca.Function) -> Program:
-        """Read a CasADi function of SX expressions; its inputs count on through all of them."""
+    def from_function(cls, function: ca.Function) -> Program:
+        """Return the program of a CasADi function of SX expressions, with its inputs numbered consecutively."""
         starts = np.cumsum([0, *(function.nnz_in(i) for i in range(function.n_in()))])
         nodes: list[Node] = []
         slots: dict[int, int] = {}
@@ -87,15 +87,15 @@ class Program:
             elif op == ca.OP_INPUT:
                 node = Node("input", (), int(starts[arguments[0]]) + arguments[1])
             else:
-                node = _operation(op, tuple(slots[a] for a in arguments))
+                node = _translate_operation(op, tuple(slots[a] for a in arguments))
             slots[function.instruction_output(k)[0]] = 2 * len(nodes)
             nodes.append(node)
         return cls(tuple(nodes), tuple(outputs))
 
     @classmethod
-    def of_graph(cls, graph: Graph, outputs: Sequence[int]) -> Program:
-        """What some values of a graph are made of."""
-        reached = graph.reached(list(outputs))
+    def from_graph(cls, graph: Graph, outputs: Sequence[int]) -> Program:
+        """Return the program of some values in a graph."""
+        reached = graph.find_reached(list(outputs))
         place = {node: 2 * k for k, node in enumerate(reached)}
 
         def moved(values: Sequence[int]) -> tuple[int, ...]:
@@ -108,8 +108,8 @@ class Program:
         return cls(nodes, moved(outputs))
 
     @classmethod
-    def of_stored(cls, stored: StoredProgram) -> Program:
-        """A program from arrays."""
+    def from_stored(cls, stored: StoredProgram) -> Program:
+        """Return the program in stored arrays."""
         nodes = tuple(
             Node(operation, tuple(pair[pair >= 0].tolist()), float(number))
             for operation, pair, number in zip(
@@ -118,8 +118,8 @@ class Program:
         )
         return cls(nodes, tuple(stored.outputs.tolist()))
 
-    def stored(self) -> StoredProgram:
-        """As arrays."""
+    def to_stored(self) -> StoredProgram:
+        """Return the program as arrays."""
         padded = [[*node.operands, NO_OPERAND, NO_OPERAND][:2] for node in self.nodes]
         return StoredProgram(
             operations=tuple(node.operation for node in self.nodes),
@@ -138,8 +138,8 @@ class Program:
         """Operations it takes as it stands."""
         return sum(node.operation not in ("constant", "input") for node in self.nodes)
 
-    def rebuilt(self, graph: Graph, substitute: Callable[[int], int] | None = None) -> list[int]:
-        """Build the function again in another graph.
+    def rebuild(self, graph: Graph, substitute: Callable[[int], int] | None = None) -> list[int]:
+        """Build the program again in another graph.
 
         Args:
             graph: Where its nodes go.
@@ -158,7 +158,9 @@ class Program:
             if operation == "*":
                 value = graph.multiply(*arguments)
             elif operation == "+":
-                value = _sum(graph, [values[a >> 1] for a in operands], [a & 1 for a in operands])
+                value = _add_signed(
+                    graph, [values[a >> 1] for a in operands], [a & 1 for a in operands]
+                )
             elif operation == "input":
                 value = substitute(int(number))
             elif operation == "constant":
@@ -172,8 +174,8 @@ class Program:
             values.append(value)
         return [graph.negate(values[a >> 1]) if a & 1 else values[a >> 1] for a in self.outputs]
 
-    def renumbered(self, place: Callable[[int], int]) -> Program:
-        """The function with its inputs at other positions.
+    def renumber(self, place: Callable[[int], int]) -> Program:
+        """Return the program with its inputs at other positions.
 
         Args:
             place: Position of an input, by the one it has now; negative for one that is zero.
@@ -184,7 +186,7 @@ class Program:
             moved = place(position)
             return graph.input(moved) if moved >= 0 else ZERO
 
-        return Program.of_graph(graph, self.rebuilt(graph, substitute))
+        return Program.from_graph(graph, self.rebuild(graph, substitute))
 
     def count(
         self,
@@ -209,10 +211,10 @@ class Program:
         def substitute(position: int) -> int:
             return ZERO if position in zero else graph.input(same.get(position, position))
 
-        return graph.count(self.rebuilt(graph, substitute))
+        return graph.count_operations(self.rebuild(graph, substitute))
 
-    def evaluated(self, inputs: Sequence[FloatArray]) -> list[FloatArray]:
-        """Values of the outputs for many samples.
+    def evaluate(self, inputs: Sequence[FloatArray]) -> list[FloatArray]:
+        """Return the values of the outputs for many samples.
 
         Args:
             inputs: One per position, all of one shape or scalar; in their precision all is calculated.
@@ -231,8 +233,8 @@ class Program:
         return [-values[a >> 1] if a & 1 else values[a >> 1] for a in self.outputs]
 
 
-def _sum(graph: Graph, values: list[int], negated: list[int]) -> int:
-    """A sum of two signed values; a difference is one operation, with or without free signs."""
+def _add_signed(graph: Graph, values: list[int], negated: list[int]) -> int:
+    """Return the sum of two signed values; a difference is one operation, with or without free signs."""
     a, b = values
     if negated[0] == negated[1]:
         total = graph.add(a, b)
@@ -240,7 +242,8 @@ def _sum(graph: Graph, values: list[int], negated: list[int]) -> int:
     return graph.subtract(b, a) if negated[0] else graph.subtract(a, b)
 
 
-def _operation(op: int, operands: tuple[int, ...]) -> Node:
+def _translate_operation(op: int, operands: tuple[int, ...]) -> Node:
+    """Return the node of one of CasADi's operations."""
     if op == ca.OP_SQ:
         return Node("*", (operands[0], operands[0]))
     if op == ca.OP_TWICE:

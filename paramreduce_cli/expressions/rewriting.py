@@ -1,4 +1,4 @@
-"""Rewrite sums and products at random places, as far as it saves operations, compiled by Numba.
+"""Rewriting of sums and products at random places, by loops that Numba compiles.
 
 What factoring has settled is a dead end of its own order: a sum that was split elsewhere, or a factor that was not
 taken out, may let more be shared. So at a few places at a time a shared sum or product is written out, or a factor is
@@ -18,9 +18,9 @@ from paramreduce_cli.expressions.rows import (
     SUM,
     TIDY,
     Rows,
-    dice,
+    add_row,
+    draw_random,
     keep,
-    new,
     on_rows,
     put,
     undo,
@@ -36,7 +36,7 @@ _LOOKS = 10_000
 
 @on_rows
 def rewrite(rows: Rows, tries: int) -> None:
-    """Save operations.
+    """Rewrite rows until tries save nothing more.
 
     Args:
         rows: Changed.
@@ -45,9 +45,9 @@ def rewrite(rows: Rows, tries: int) -> None:
     for k in range(tries + 1):
         cost = rows.counters[COST]
         if k > 0:
-            for _ in range(1 + dice(rows) % _AT_MOST):
+            for _ in range(1 + draw_random(rows) % _AT_MOST):
                 _rewrite_somewhere(rows)
-        settle(rows, dice(rows) % 2 == 0)
+        settle(rows, draw_random(rows) % 2 == 0)
         if rows.counters[FAILED] or rows.counters[COST] > cost:
             undo(rows)
         else:
@@ -56,25 +56,26 @@ def rewrite(rows: Rows, tries: int) -> None:
 
 @within
 def _rewrite_somewhere(rows: Rows) -> None:
+    """Try one rewriting at a random place."""
     for _ in range(_LOOKS):
         if rows.counters[FAILED]:
             return
-        n = dice(rows) % rows.numbers.shape[0]
+        n = draw_random(rows) % rows.numbers.shape[0]
         if rows.numbers[n, KIND] == NONE:
             continue
-        place = dice(rows) % rows.numbers[n, LENGTH]
+        place = draw_random(rows) % rows.numbers[n, LENGTH]
         held = rows.numbers[rows.terms[n, place] >> 1, KIND]
         if held == rows.numbers[n, KIND]:
             insert(rows, n, place)
             return
         if held == SUM:
-            _distribute(rows, n, place, dice(rows) % 2 == 0)
+            _distribute(rows, n, place, draw_random(rows) % 2 == 0)
             return
 
 
 @within
 def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
-    """Make a product with a sum a sum of products.
+    """Turn a product with a sum into a sum of products.
 
     Args:
         rows: Changed.
@@ -97,7 +98,7 @@ def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
             if j != place:
                 row[k] = rows.terms[n, j]
                 k += 1
-        total[i] = new(rows, PRODUCT, row[:k]) ^ ((value ^ factor) & 1)
+        total[i] = add_row(rows, PRODUCT, row[:k]) ^ ((value ^ factor) & 1)
         wait(rows, TIDY, below)
     if not rows.counters[FAILED]:
         put(rows, n, SUM, total[:length])

@@ -1,4 +1,4 @@
-"""Sums and products of many terms in arrays, which can be changed and changed back, compiled by Numba.
+"""Sums and products of many terms in arrays that can be changed and restored, for loops that Numba compiles.
 
 A number stands for a value. That of a sum or a product has a row of terms, which are signed references as in a
 graph; those of products are positive, as signs are part of what refers to the product. Of all others it is only
@@ -12,7 +12,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compile_loop
 from paramreduce_cli.records import IntArray
 
 # Codes that are handed on are integers of NumPy: for plain ones Numba compiles each function anew.
@@ -32,14 +32,14 @@ COST, SAVED, LAST, DICE, FAILED, WAITING = range(6)
 last on, how many wait on each list."""
 END = -1
 
-on_rows = compiled(makes_arrays=False)
+on_rows = compile_loop(makes_arrays=False)
 """For functions of rows that are called from Python, too."""
-within = compiled(within=True, makes_arrays=False)
+within = compile_loop(within=True, makes_arrays=False)
 """For all others."""
 
 
 class Rows(NamedTuple):
-    """All rows of some values; few arrays, as each takes the compiler's time."""
+    """A record of all rows of some values, in few arrays, as each costs compilation time."""
 
     numbers: IntArray
     """What is known of every number, (size, WAITS + lists)"""
@@ -61,14 +61,14 @@ class Rows(NamedTuple):
     """For counts of pairs of terms, (width, width)"""
 
 
-def rows_of(
+def make_rows(
     sums: Mapping[int, Sequence[int]],
     products: Mapping[int, Sequence[int]],
     pinned: Iterable[int],
     numbers: int,
     others: int,
 ) -> Rows:
-    """Rows in arrays, all waiting to be looked at.
+    """Return rows in arrays, all on the worklist.
 
     Args:
         sums: Terms of sums.
@@ -107,23 +107,23 @@ def rows_of(
     return rows
 
 
-def terms_of(rows: Rows, kind: int) -> dict[int, list[int]]:
-    """All rows of a kind, by number."""
+def list_terms(rows: Rows, kind: int) -> dict[int, list[int]]:
+    """Return all rows of a kind by number."""
     numbers = np.flatnonzero(rows.numbers[:, KIND] == kind).tolist()
     return {n: rows.terms[n, : rows.numbers[n, LENGTH]].tolist() for n in numbers}
 
 
 @within
-def dice(rows: Rows) -> int:
-    """A random number, the same on every machine."""
+def draw_random(rows: Rows) -> int:
+    """Return a random number, the same on every machine."""
     state = (rows.counters[DICE] * 1103515245 + 12345) & 0x7FFFFFFFFFFF
     rows.counters[DICE] = state
     return state >> 16
 
 
 @within
-def place_of(rows: Rows, n: int, value: int, start: int) -> int:
-    """Where a row has a term, from a place on; END if it has not."""
+def find_term(rows: Rows, n: int, value: int, start: int) -> int:
+    """Return the place of a term in a row, from a start on, or END."""
     for k in range(start, rows.numbers[n, LENGTH]):
         if rows.terms[n, k] == value:
             return k
@@ -140,8 +140,8 @@ def wait(rows: Rows, which: int, number: int) -> None:
 
 
 @within
-def next_waiting(rows: Rows, which: int) -> int:
-    """Take the last number off a list; negative if it is empty, or if something has failed."""
+def take_next(rows: Rows, which: int) -> int:
+    """Take the last number off a worklist; negative if it is empty, or if something has failed."""
     if rows.counters[WAITING + which] == 0 or rows.counters[FAILED]:
         return END
     rows.counters[WAITING + which] -= 1
@@ -152,6 +152,7 @@ def next_waiting(rows: Rows, which: int) -> int:
 
 @within
 def _replace(rows: Rows, number: int, kind: int, row: IntArray) -> None:
+    """Replace a row, and update the links of its terms."""
     width, length = rows.terms.shape[1], row.size
     for k in range(rows.numbers[number, LENGTH]):
         held, slot = rows.terms[number, k] >> 1, number * width + k
@@ -183,8 +184,8 @@ def _replace(rows: Rows, number: int, kind: int, row: IntArray) -> None:
 
 
 @within
-def _cancelled(row: IntArray) -> int:
-    """Take terms out with their opposites; how many are left."""
+def _cancel(row: IntArray) -> int:
+    """Remove terms with their opposites, and return how many terms are left."""
     left = 0
     for k in range(row.size):
         opposite = -1
@@ -211,7 +212,7 @@ def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
         row: Its terms; of a sum, opposites vanish, and if none is left it is zero. Changed.
     """
     if kind == SUM:
-        length = _cancelled(row)
+        length = _cancel(row)
         if length == 0:
             row[0], length = 0, 1
         row = row[:length]
@@ -243,8 +244,8 @@ def remove(rows: Rows, number: int) -> None:
 
 
 @within
-def new(rows: Rows, kind: int, row: IntArray) -> int:
-    """A reference to a new number with a row; it fails where none is left."""
+def add_row(rows: Rows, kind: int, row: IntArray) -> int:
+    """Return a reference to a new number with a row; it fails if no number is left."""
     number = rows.counters[LAST]
     for _ in range(rows.numbers.shape[0]):
         number = max(1, (number + 1) % rows.numbers.shape[0])  # zero is zero

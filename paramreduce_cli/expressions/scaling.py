@@ -1,4 +1,4 @@
-"""Units for what a program computes on the way, in which products with constants vanish.
+"""Units for the intermediate results of a program, in which products with constants vanish.
 
 Where some inputs may come in units of any size, as parameters that are fitted anyway, so may all that is made of
 them; and in a unit of length that is one of a mechanism's own, no product with that length is left. With s the
@@ -24,8 +24,8 @@ _DIGITS = 6
 """To which equations are told apart."""
 
 
-def rescaled(program: Program, n: int) -> tuple[Program, FloatArray]:
-    """The same function of inputs in other units, in which few products with constants are left.
+def rescale(program: Program, n: int) -> tuple[Program, FloatArray]:
+    """Return the same function of inputs in other units, with few products with constants left.
 
     Those that vanish together in most places are made to first, then others as far as these leave it open.
 
@@ -38,16 +38,16 @@ def rescaled(program: Program, n: int) -> tuple[Program, FloatArray]:
         times what they are.
     """
     units = _Units(program, n)
-    units.meet_wishes()
+    units.eliminate_products()
     sizes = np.ones(n)
     for k, node in enumerate(program.nodes):
         if node.operation == "input" and node.number < n:
-            sizes[int(node.number)] = 1 / units.factor(k)
-    return _Moving(program, units).moved(), sizes
+            sizes[int(node.number)] = 1 / units.compute_factor(k)
+    return _Rescaler(program, units).build(), sizes
 
 
-class _Moving:
-    """Builds a program again in units.
+class _Rescaler:
+    """A builder of a program in new units.
 
     Args:
         program: As it is.
@@ -64,40 +64,40 @@ class _Moving:
             *(node.number for node in program.nodes if node.operation == "constant"),
         ]
 
-    def moved(self) -> Program:
-        """The program in its units."""
+    def build(self) -> Program:
+        """Return the program in its units."""
         for k, node in enumerate(self._program.nodes):
-            self._values.append(self._made(k, node))
-        return Program.of_graph(self._graph, [self._value(v) for v in self._program.outputs])
+            self._values.append(self._build_node(k, node))
+        return Program.from_graph(self._graph, [self._get_value(v) for v in self._program.outputs])
 
-    def _value(self, value: int) -> int:
+    def _get_value(self, value: int) -> int:
         """What has become of one."""
         found = self._values[value >> 1]
         return self._graph.negate(found) if value & 1 else found
 
-    def _made(self, k: int, node: Node) -> int:
-        """Node k in its unit."""
+    def _build_node(self, k: int, node: Node) -> int:
+        """Return node k in its unit."""
         operation, operands, number = node
         if operation == "constant":
             return self._graph.constant(number)
         if operation == "input":
             return self._graph.input(int(number))
-        moved = [self._value(value) for value in operands]
+        moved = [self._get_value(value) for value in operands]
         for place, value in enumerate(operands):
-            constant = self._units.constant(value)
+            constant = self._units.get_constant(value)
             if constant is not None and operation in ("+", "*"):
-                factor = self._units.factor(k)
+                factor = self._units.compute_factor(k)
                 if operation == "*":
-                    factor /= self._units.factor(operands[1 - place] >> 1)
-                moved[place] = self._constant(constant * factor)
+                    factor /= self._units.compute_factor(operands[1 - place] >> 1)
+                moved[place] = self._make_constant(constant * factor)
         if operation == "+":
             return self._graph.add(*moved)
         if operation == "*":
             return self._graph.multiply(*moved)
         return self._graph.call(operation, *moved)
 
-    def _constant(self, number: float) -> int:
-        """A number, or the one that it differs from by rounding."""
+    def _make_constant(self, number: float) -> int:
+        """Return a number, or the known number from which it differs by rounding."""
         size = abs(number)
         same = (one for one in self._numbers if abs(one - size) <= _ROUNDING * size)
         known = next(same, None)
@@ -116,7 +116,7 @@ class _Units:
 
     def __init__(self, program: Program, n: int) -> None:
         self._nodes = program.nodes
-        by_constants = ((k, self._by_constant(k)) for k in range(len(self._nodes)))
+        by_constants = ((k, self._split_constant(k)) for k in range(len(self._nodes)))
         self._products = {k: found for k, found in by_constants if found is not None}
         inputs = [
             k for k, node in enumerate(self._nodes) if node.operation == "input" and node.number < n
@@ -125,69 +125,69 @@ class _Units:
         self._s = np.zeros((len(self._nodes), len(self._products) + len(inputs) + 1))
         self._s[[*self._products, *inputs], range(self._s.shape[1] - 1)] = 1.0
         for k in range(len(self._nodes)):
-            self._follow(k)
+            self._propagate(k)
         for value in program.outputs:
-            self._meet(self._s[value >> 1].copy())
+            self._satisfy(self._s[value >> 1].copy())
 
-    def constant(self, value: int) -> float | None:
-        """What a value is if it is a constant."""
+    def get_constant(self, value: int) -> float | None:
+        """Return the number of a value if it is a constant, else None."""
         node = self._nodes[value >> 1]
         if node.operation != "constant":
             return None
         return -node.number if value & 1 else node.number
 
-    def factor(self, k: int) -> float:
-        """How many times what it was a node is."""
+    def compute_factor(self, k: int) -> float:
+        """Return how many times its original value a node has."""
         return float(np.exp(self._s[k, -1]))
 
-    def meet_wishes(self) -> None:
-        """Make products with constants vanish, those first of which most do together."""
+    def eliminate_products(self) -> None:
+        """Make products with constants vanish, first those of which most vanish together."""
         found: dict[tuple[float, ...], int] = {}
         counts: Counter[tuple[float, ...]] = Counter()
         for k in self._products:
-            equation = self._wish(k)
+            equation = self._make_equation(k)
             (open_ones,) = np.nonzero(np.abs(equation[:-1]) > _ROUNDING)
             if open_ones.size:
                 key = tuple(np.round(equation / equation[open_ones[0]], _DIGITS).tolist())
                 found.setdefault(key, k)
                 counts[key] += 1
         for key, _ in counts.most_common():
-            self._meet(self._wish(found[key]))
+            self._satisfy(self._make_equation(found[key]))
 
-    def _wish(self, k: int) -> FloatArray:
-        """What is zero where a product with a constant is no more than its operand."""
+    def _make_equation(self, k: int) -> FloatArray:
+        """Return the equation that makes a product with a constant equal to its operand."""
         constant, other = self._products[k]
         equation = self._s[k] - self._s[other]
         equation[-1] += np.log(constant)
         return equation
 
-    def _meet(self, equation: FloatArray) -> None:
-        """Close one s that is open by what is to be zero, if there is one left."""
+    def _satisfy(self, equation: FloatArray) -> None:
+        """Fix one free scale so that an equation holds, if a free scale is left."""
         sizes = np.abs(equation[:-1])
         if np.any(sizes > _ROUNDING):
             place = int(np.argmax(sizes))
             self._s -= np.outer(self._s[:, place], equation / equation[place])
 
-    def _by_constant(self, k: int) -> tuple[float, int] | None:
-        """Of a product with a constant, its size and the other operand."""
+    def _split_constant(self, k: int) -> tuple[float, int] | None:
+        """Return constant and other operand of a product with a constant, or None."""
         operation, operands, _ = self._nodes[k]
         if operation != "*":
             return None
         for value, other in (operands, operands[::-1]):
-            if (constant := self.constant(value)) is not None:
+            if (constant := self.get_constant(value)) is not None:
                 return abs(constant), other >> 1
         return None
 
-    def _follow(self, k: int) -> None:
-        """What its operands say of the s of a node."""
+    def _propagate(self, k: int) -> None:
+        """Set the scale of a node from its operands."""
         operation, operands, _ = self._nodes[k]
         # A number can come in any unit.
-        below = [value >> 1 for value in operands if self.constant(value) is None]
+        below = [value >> 1 for value in operands if self.get_constant(value) is None]
         if operation == "*" and len(below) == 2:
             self._s[k] = self._s[below[0]] + self._s[below[1]]
         elif operation == "+":
-            self._meet(self._s[below[0]] - self._s[below[-1]])
+            self._satisfy(self._s[below[0]] - self._s[below[-1]])
             self._s[k] = self._s[below[0]]
         elif operation not in ("*", "+", "input", "constant"):
             for node in below:
-                self._meet(self._s[node].copy())
+                self._satisfy(self._s[node].copy())

@@ -1,4 +1,4 @@
-"""Pairs that several sums, or several products, hold are computed once [Breuer1969], compiled by Numba."""
+"""Common pairs of sums or products, computed once [Breuer1969], by loops that Numba compiles."""
 
 from __future__ import annotations
 
@@ -19,34 +19,34 @@ from paramreduce_cli.expressions.rows import (
     USES,
     VALUE,
     Rows,
-    dice,
-    new,
-    next_waiting,
-    place_of,
+    add_row,
+    draw_random,
+    find_term,
     put,
+    take_next,
     within,
 )
 from paramreduce_cli.records import IntArray
 
 
 @within
-def share(rows: Rows, kind: int) -> None:
-    """Compute pairs once that rows of a kind have in common."""
+def share_pairs(rows: Rows, kind: int) -> None:
+    """Compute the pairs once that rows of a kind have in common."""
     which = SHARE_SUM if kind == SUM else SHARE_PRODUCT
     while True:
-        n = next_waiting(rows, which)
+        n = take_next(rows, which)
         if n < 0:
             break
         while rows.numbers[n, KIND] == kind and not rows.counters[FAILED]:
-            first, second = _most_shared(rows, n)
+            first, second = _find_most_shared(rows, n)
             if first < 0:
                 break
             _compute_once(rows, kind, rows.terms[n, first], rows.terms[n, second])
 
 
 @within
-def _most_shared(rows: Rows, n: int) -> tuple[int, int]:
-    """Places of the two terms of a row that most others of its kind have too; negative if none has."""
+def _find_most_shared(rows: Rows, n: int) -> tuple[int, int]:
+    """Return the places of the two terms of a row that most other rows of its kind have too; negative if none has."""
     counts = rows.pairs
     kind, length = rows.numbers[n, KIND], rows.numbers[n, LENGTH]
     shared = 0
@@ -60,7 +60,7 @@ def _most_shared(rows: Rows, n: int) -> tuple[int, int]:
     best, first, second = 0, -1, -1
     for k in range(length):
         value = rows.terms[n, k]
-        if rows.numbers[value >> 1, USES] == 1 or place_of(rows, n, value, 0) < k:
+        if rows.numbers[value >> 1, USES] == 1 or find_term(rows, n, value, 0) < k:
             continue
         slot = rows.numbers[value >> 1, HEAD]
         while slot != END:
@@ -73,11 +73,11 @@ def _most_shared(rows: Rows, n: int) -> tuple[int, int]:
                 while other != END:
                     a, b = rows.links[other, PLACE], k
                     if a == k:  # a square, if it is one here too
-                        b = place_of(rows, n, value, k + 1)
+                        b = find_term(rows, n, value, k + 1)
                     there = rows.links[other, VALUE]
                     if b > a and (rows.terms[n, a] ^ there) & 1 == sign:
                         counts[a, b] += 1
-                        if counts[a, b] > best or (counts[a, b] == best and dice(rows) % 2):
+                        if counts[a, b] > best or (counts[a, b] == best and draw_random(rows) % 2):
                             best, first, second = counts[a, b], a, b
                     other = rows.links[other, FORMER]
             slot = rows.links[slot, AFTER]
@@ -90,8 +90,9 @@ def _most_shared(rows: Rows, n: int) -> tuple[int, int]:
 
 
 @within
-def _beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int]:
-    """How many terms a row has beside a pair, and the sign with which it has that; negative if it does not have it.
+def _count_beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int]:
+    """Return the number of terms that a row has beside a pair, and the sign with which it has the pair; negative
+    without the pair.
 
     Args:
         rows: All of them.
@@ -118,13 +119,15 @@ def _beside(rows: Rows, n: int, a: int, b: int, row: IntArray) -> tuple[int, int
 
 @within
 def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
-    """Have all rows of a kind refer to one row for a pair of terms; as many of them as there is room for."""
+    """Make all rows of a kind refer to one row for a pair of terms, as far as there is space."""
     rarer = a if rows.numbers[a >> 1, USES] <= rows.numbers[b >> 1, USES] else b
     row, holders = rows.room[0], rows.room[1]
     found, shared, slot = 0, END, rows.numbers[rarer >> 1, HEAD]
     while slot != END and found < holders.size:
         n = rows.links[slot, ROW]
-        length, sign = _beside(rows, n, a, b, row) if rows.numbers[n, KIND] == kind else (0, END)
+        length, sign = (
+            _count_beside(rows, n, a, b, row) if rows.numbers[n, KIND] == kind else (0, END)
+        )
         if sign != END and length == 0 and shared == END:
             shared = 2 * n + sign
         elif sign != END:
@@ -133,10 +136,10 @@ def _compute_once(rows: Rows, kind: int, a: int, b: int) -> None:
         slot = rows.links[slot, AFTER]
     if shared == END:
         row[0], row[1] = a, b
-        shared = new(rows, kind, row[:2])
+        shared = add_row(rows, kind, row[:2])
     for i in range(found):
         n = holders[i]
-        length, sign = _beside(rows, n, a, b, row)
+        length, sign = _count_beside(rows, n, a, b, row)
         if not rows.counters[FAILED] and n != shared >> 1 and sign != END:
             row[length] = shared ^ sign
             put(rows, n, kind, row[: length + 1])

@@ -13,36 +13,36 @@ Matrix = tuple[Vector, Vector, Vector]
 
 
 def add(a: Vector, b: Vector) -> Vector:
-    """The sum a + b."""
+    """Return a + b."""
     return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
 
 
 def subtract(a: Vector, b: Vector) -> Vector:
-    """The difference a - b."""
+    """Return a - b."""
     return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
 
 
 def scale(factor: Any, a: Vector) -> Vector:
-    """The multiple factor a."""
+    """Return the vector a times a factor."""
     return (factor * a[0], factor * a[1], factor * a[2])
 
 
 def dot(a: Sequence, b: Vector) -> Any:
-    """The inner product a . b."""
+    """Return the inner product a . b."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 def cross(a: Sequence, b: Sequence) -> Vector:
-    """The cross product a x b."""
+    """Return the cross product a x b."""
     return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
 
 
 def apply(matrix: Sequence[Sequence], a: Vector) -> Vector:
-    """The product of a matrix, by rows, with a; entries that are the numbers 0 and 1 take no time."""
-    return (_weighted(matrix[0], a), _weighted(matrix[1], a), _weighted(matrix[2], a))
+    """Return the product of a matrix, given by rows, with a; entries that are the numbers 0 and 1 cost nothing."""
+    return (_sum_weighted(matrix[0], a), _sum_weighted(matrix[1], a), _sum_weighted(matrix[2], a))
 
 
-def _weighted(weights: Sequence, a: Vector) -> Any:
+def _sum_weighted(weights: Sequence, a: Vector) -> Any:
     # An operation of CasADi takes long even where nothing comes of it, and turns are mostly zeros.
     terms = [
         entry if isinstance(weight, float) and weight == 1 else weight * entry

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from paramreduce_cli.errors import FormulationError
-from paramreduce_cli.expressions.factoring import Written
+from paramreduce_cli.expressions.factoring import Values
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
@@ -55,8 +55,8 @@ def check_formulations(
         for choices in getattr(formulations, kind):
             graph = Graph()
             outputs = builds[kind](tree, [from_data(data) for data in choices], graph, dropped)
-            program = Program.of_graph(*Written(graph, outputs).settled())
-            values = program.evaluated(inputs)
+            program = Program.from_graph(*Values(graph, outputs).simplify())
+            values = program.evaluate(inputs)
             got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
             refuse_if_off(f"a lean formulation of the {kind} dynamics", got - wanted, wanted)
 

@@ -188,7 +188,7 @@ def formulations_for(
 
         def count(choices: _Choices, dropped: frozenset[int] = dropped) -> int:
             graph = Graph()
-            return graph.count(build(tree, choices, graph, dropped))
+            return graph.count_operations(build(tree, choices, graph, dropped))
 
         suited = heapq.nsmallest(_SUITED, starts, key=count)
         asked += [_Searches(direct, start, (dropped,)) for start in suited]

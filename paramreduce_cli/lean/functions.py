@@ -5,7 +5,7 @@ from collections.abc import Callable
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import Written, least
+from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
@@ -87,11 +87,13 @@ class LeanFunctions:
                     return graph.input(position - start + n)
                 return graph.constant(1.0) if place[position] == value else ZERO
 
-            columns.append(program.rebuilt(graph, substitute))
+            columns.append(program.rebuild(graph, substitute))
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
         K = Argument("K", (z, n), "torques for unit values of the parameters")
         text = "Torques as a linear map of the parameters: tau = K phi."
-        return self._function("regressor", text, (K,), *least([Written(graph, outputs)]))
+        return self._function(
+            "regressor", text, (K,), *minimise_operations([Values(graph, outputs)])
+        )
 
     def _model(
         self, model: Callable[..., Program], project: Callable[..., list[int]]
@@ -108,7 +110,7 @@ class LeanFunctions:
             kept = position - start + n if position >= start else int(place[position])
             return graph.input(kept)
 
-        return graph, program.rebuilt(graph, substitute)
+        return graph, program.rebuild(graph, substitute)
 
     def _without_terms(self, simplified: TermModel, project: Callable[..., list[int]]) -> Program:
         """A simplified program with inputs as those of lean models, of the independent coordinates."""
@@ -123,13 +125,13 @@ class LeanFunctions:
                 return graph.constant(float(simplified.values[position]))
             return graph.input(first[position])
 
-        outputs = Program.of_stored(simplified.program).rebuilt(graph, substitute)
+        outputs = Program.from_stored(simplified.program).rebuild(graph, substitute)
         to_project = self._mechanism.loops is not None and not simplified.projected
         if to_project:
             outputs = project(self._mechanism, graph, outputs)
         if to_project or self._constant:
-            return Program.of_graph(*least([Written(graph, outputs)]))
-        return Program.of_graph(graph, outputs)
+            return Program.from_graph(*minimise_operations([Values(graph, outputs)]))
+        return Program.from_graph(graph, outputs)
 
     def _function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]
@@ -142,8 +144,8 @@ class LeanFunctions:
         }[name]
         if self._constant:
             needed = needed - {"phi"}
-        program = Program.of_graph(graph, outputs)
-        return Function(name, text, self._arguments, results, program).taking(needed)
+        program = Program.from_graph(graph, outputs)
+        return Function(name, text, self._arguments, results, program).restrict_arguments(needed)
 
     def closures(self) -> list[Function]:
         """What the position, velocity and acceleration problems of loops are made of."""
@@ -163,9 +165,11 @@ class LeanFunctions:
         def new(name: str, text: str, inputs: list, outputs: list, *results: Argument) -> Function:
             function = ca.Function(name, inputs, [ca.densify(ca.vertcat(*outputs))])
             graph = Graph()
-            graph, values = least([Written(graph, Program.of_function(function).rebuilt(graph))])
+            graph, values = minimise_operations(
+                [Values(graph, Program.from_function(function).rebuild(graph))]
+            )
             states = self._states[: len(inputs)]
-            return Function(name, text, states, results, Program.of_graph(graph, values))
+            return Function(name, text, states, results, Program.from_graph(graph, values))
 
         return [
             new("closure", "The equations that close the loops.", [q], [equations, by_d], gap, J_d),

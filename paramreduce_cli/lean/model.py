@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import Written, least
+from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
@@ -123,7 +123,7 @@ class LeanModels:
             outputs = build(self._tree, at_joints, graph, self._useless)
             if self._projected:
                 outputs = project(self.mechanism, graph, outputs)
-            programs.append(Program.of_graph(*Written(graph, outputs).settled()))
+            programs.append(Program.from_graph(*Values(graph, outputs).simplify()))
         return _Variants(programs)
 
     def inverse(
@@ -190,25 +190,27 @@ class LeanModels:
     ) -> Program:
         """The formulation with the fewest operations."""
         if not rewritten:
-            return Program.of_graph(*self._settled(variants, model, constant)[0])
-        return Program.of_graph(*least(self._promising(variants, model, constant).values()))
+            return Program.from_graph(*self._settled(variants, model, constant)[0])
+        return Program.from_graph(
+            *minimise_operations(self._promising(variants, model, constant).values())
+        )
 
     def _settled(
         self, variants: _Variants, model: ReducedModel, constant: bool
-    ) -> tuple[Written, int]:
+    ) -> tuple[Values, int]:
         """The same before it is rewritten, and its number."""
         ways = self._promising(variants, model, constant)
-        settled = [(way.settled(), number) for number, way in ways.items()]
+        settled = [(way.simplify(), number) for number, way in ways.items()]
         return min(settled, key=lambda way: way[0].n_operations)
 
     def _promising(
         self, variants: _Variants, model: ReducedModel, constant: bool
-    ) -> dict[int, Written]:
+    ) -> dict[int, Values]:
         """What may turn out to be the leanest, by number of the formulation."""
         numbers = variants.promising(self._dropped(model.kept))
         return {k: self._written(variants.programs[k], model, constant) for k in numbers}
 
-    def _written(self, program: Program, model: ReducedModel, constant: bool) -> Written:
+    def _written(self, program: Program, model: ReducedModel, constant: bool) -> Values:
         """A formulation for a model, without what is zero then."""
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())
@@ -223,4 +225,4 @@ class LeanModels:
                 return graph.constant(float(values[position]))
             return graph.input(ties.get(position, position))
 
-        return Written(graph, program.rebuilt(graph, substitute))
+        return Values(graph, program.rebuild(graph, substitute))

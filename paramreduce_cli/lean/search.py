@@ -125,7 +125,7 @@ def _best_choice(
 
     def count(choice: JointFormulation) -> int:
         some = [choice if k == i else choices[k] for k in piece.joints]
-        return graph.count(build(piece.tree, some, graph, piece.dropped))
+        return graph.count_operations(build(piece.tree, some, graph, piece.dropped))
 
     found = choices[i]
     best = count(found)

@@ -60,7 +60,7 @@ class PlainDynamics:
         q, dq, ddq = self._q, self._dq, self._ddq
         inverse = ca.Function("d", [self._phi, q, dq, ddq, *loop], [tau])
         direct = ca.Function("M_delta", [self._phi, q, dq, *loop], [ca.vertcat(*lower), delta])
-        return Program.of_function(inverse), Program.of_function(direct)
+        return Program.from_function(inverse), Program.from_function(direct)
 
     def count_operations(
         self, model: ReducedModel, *, signs_free: bool = True, independent: bool = False

@@ -264,7 +264,7 @@ def _make_record(
         values=model.values,
         units=model.unit_sizes,
         position=model.position,
-        program=program.stored(),
+        program=program.to_stored(),
         projected=judge.projected,
         operations=program.n_operations,
         operations_start=whole.n_operations,

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paramreduce_cli.expressions.factoring import Written, least
+from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.expressions.scaling import rescaled
+from paramreduce_cli.expressions.scaling import rescale
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
 from paramreduce_cli.terms.fitting import Budget, Fitting
 from paramreduce_cli.terms.pruning import Pruning
@@ -58,7 +58,7 @@ class Simplified:
         """Return the outputs of the program for states, (n_states, n_samples)."""
         m = states.shape[1]
         values = np.broadcast_to(self.beta[:, None], (self.beta.size, m))
-        given = self.program.evaluated([*values, *states])
+        given = self.program.evaluate([*values, *states])
         return Outputs.of(np.array([np.broadcast_to(value, m) for value in given]))
 
     def drop_unused(self) -> tuple[ReducedModel, Program]:
@@ -74,7 +74,7 @@ class Simplified:
         place = np.full(model.n + 1, NOT_KEPT)
         place[used] = np.arange(len(used))
         dropped = model.n - len(used)
-        program = self.program.renumbered(
+        program = self.program.renumber(
             lambda position: position - dropped if position >= model.n else int(place[position])
         )
         names = tuple(model.names[k] for k in used)
@@ -115,9 +115,11 @@ class SearchHistory:
 
     def rebuild(self, passed: Candidate, dice: int = 0) -> Simplified:
         """Return the program of a candidate, with its sums and products rearranged as a seed says."""
-        program, sizes = rescaled(passed.tape.rebuilt(passed.pruning), passed.beta.size)
+        program, sizes = rescale(passed.tape.rebuilt(passed.pruning), passed.beta.size)
         graph = Graph()
-        program = Program.of_graph(*least([Written(graph, program.rebuilt(graph))], dice))
+        program = Program.from_graph(
+            *minimise_operations([Values(graph, program.rebuild(graph))], dice)
+        )
         return Simplified(self.start, program, passed.beta / sizes, passed.units * sizes)
 
 
@@ -142,7 +144,7 @@ class Descent:
         cls, start: Start, program: Program, searching: Callable[[Tape], TermSearch]
     ) -> Descent:
         """Return a descent with all terms of a program, whose first inputs are the parameters of the start."""
-        program, units = rescaled(program, start.model.n)
+        program, units = rescale(program, start.model.n)
         return cls._make(
             Simplified(start, program, start.model.values / units, units), searching, {}
         )

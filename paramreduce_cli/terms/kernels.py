@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled, inlined
+from paramreduce_cli.expressions.loops import compile_loop, inline
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms.pruning import (
     FIRST,
@@ -29,7 +29,7 @@ SEVERAL = -2
 """In place of a number where there is more than one."""
 
 
-@compiled()
+@compile_loop()
 def find_live_nodes(program: Instructions, pruning: Pruning) -> BoolArray:
     """Return the nodes that the outputs depend on, (n_nodes,)."""
     codes, operands = program.codes, program.operands
@@ -51,14 +51,14 @@ def find_live_nodes(program: Instructions, pruning: Pruning) -> BoolArray:
     return used
 
 
-@inlined
+@inline
 def _multiply(factor: float, values: FloatArray, result: FloatArray) -> None:
     """Write a vector times a factor; assigning it as a whole takes Numba seconds to compile, as shapes are compared."""
     for i in range(result.size):
         result[i] = factor * values[i]
 
 
-@compiled(within=True)
+@compile_loop(within=True)
 def _evaluate_node(
     k: int,
     program: Instructions,
@@ -101,7 +101,7 @@ def _evaluate_node(
                 result[i] = np.sign(x)
 
 
-@compiled()
+@compile_loop()
 def evaluate(
     program: Instructions, pruning: Pruning, inputs: FloatArray, which: BoolArray
 ) -> FloatArray:
@@ -120,7 +120,7 @@ def evaluate(
     return v
 
 
-@compiled()
+@compile_loop()
 def evaluate_unreplaced(
     program: Instructions, pruning: Pruning, inputs: FloatArray, v: FloatArray
 ) -> FloatArray:
@@ -131,7 +131,7 @@ def evaluate_unreplaced(
     return own
 
 
-@inlined
+@inline
 def _clear_first(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
     """Set derivatives to zero before something is added for the first time."""
     if not reached[q]:
@@ -140,7 +140,7 @@ def _clear_first(derivatives: FloatArray, reached: BoolArray, q: int) -> None:
             derivatives[i] = 0.0
 
 
-@compiled()
+@compile_loop()
 def accumulate_adjoints(
     program: Instructions, pruning: Pruning, v: FloatArray, seeds: FloatArray, which: BoolArray
 ) -> tuple[FloatArray, BoolArray]:
@@ -213,7 +213,7 @@ def accumulate_adjoints(
     return found, reached
 
 
-@compiled()
+@compile_loop()
 def compute_effects(
     program: Instructions,
     pruning: Pruning,
@@ -251,7 +251,7 @@ def compute_effects(
     return result
 
 
-@compiled()
+@compile_loop()
 def find_combinations(
     program: Instructions, pruning: Pruning, n: int
 ) -> tuple[IntArray, FloatArray]:
@@ -312,7 +312,7 @@ def find_combinations(
     return found, coefficients
 
 
-@compiled()
+@compile_loop()
 def count_operations(program: Instructions, pruning: Pruning) -> int:
     """Return the number of operations that are left."""
     codes, operands = program.codes, program.operands
@@ -370,7 +370,7 @@ def count_operations(program: Instructions, pruning: Pruning) -> int:
     return found
 
 
-@compiled()
+@compile_loop()
 def count_flipped(program: Instructions, pruning: Pruning, candidates: IntArray) -> IntArray:
     """Return the number of operations left with one more term the other way round, (n_candidates,)."""
     kept, source, factor = pruning
@@ -390,7 +390,7 @@ def count_flipped(program: Instructions, pruning: Pruning, candidates: IntArray)
     return result
 
 
-@compiled()
+@compile_loop()
 def count_replaced(
     program: Instructions,
     pruning: Pruning,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compile_loop
 from paramreduce_cli.records import FloatArray
 
 _SINGULAR = 1e-14
@@ -42,7 +42,7 @@ def compute_roots(factors: FloatArray, weights: FloatArray) -> FloatArray:
         return np.ascontiguousarray(R.transpose(1, 2, 0))
 
 
-@compiled()
+@compile_loop()
 def multiply_triangles(triangles: FloatArray, vectors: FloatArray) -> FloatArray:
     """Return upper triangles times vectors, sample by sample.
 
@@ -63,7 +63,7 @@ def multiply_triangles(triangles: FloatArray, vectors: FloatArray) -> FloatArray
     return result
 
 
-@compiled()
+@compile_loop()
 def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
     """Return the lower triangle that makes columns orthonormal, from their Gram matrix, (n, n).
 
@@ -94,7 +94,7 @@ def compute_whitening(gram: FloatArray, ridge: float) -> FloatArray:
     return inverse
 
 
-@compiled(within=True)
+@compile_loop(within=True)
 def _factorise(matrix: FloatArray, lower: FloatArray) -> bool:
     """Write the lower triangle by Cholesky, and return whether there is one."""
     n = matrix.shape[0]
@@ -113,7 +113,7 @@ def _factorise(matrix: FloatArray, lower: FloatArray) -> bool:
     return True
 
 
-@compiled()
+@compile_loop()
 def _is_positive_definite(matrices: FloatArray) -> bool:
     """Return whether all matrices have a Cholesky factor."""
     lower = np.empty(matrices.shape[1:])
@@ -123,7 +123,7 @@ def _is_positive_definite(matrices: FloatArray) -> bool:
     return s == matrices.shape[0]
 
 
-@compiled()
+@compile_loop()
 def _invert(matrices: FloatArray) -> tuple[FloatArray, bool]:
     """Return the inverses, and whether all matrices are positive definite."""
     m, n, _ = matrices.shape

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled
+from paramreduce_cli.expressions.loops import compile_loop
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, BoolArray, FloatArray, IntArray, Mechanism
 from paramreduce_cli.terms.matrices import invert
@@ -138,7 +138,7 @@ def compute_joint_errors(parts: Iterable[tuple[TermSamples, Outputs]]) -> tuple[
     return float(torque), float(acceleration)
 
 
-@compiled()
+@compile_loop()
 def _build_symmetric(lower: FloatArray, rows: IntArray, columns: IntArray, n: int) -> FloatArray:
     """Return symmetric matrices, (n_samples, n, n), from some entries of their lower triangles, (n_entries, n_samples)."""
     count = lower.shape[1]
@@ -149,7 +149,7 @@ def _build_symmetric(lower: FloatArray, rows: IntArray, columns: IntArray, n: in
     return result
 
 
-@compiled()
+@compile_loop()
 def _project_symmetric(
     lower: FloatArray, rows: IntArray, columns: IntArray, across: FloatArray
 ) -> FloatArray:

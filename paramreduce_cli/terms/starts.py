@@ -42,9 +42,7 @@ class Start:
             lean = lean.alone(self.formulation, direct=direct)
         program = (lean.direct if direct else lean.inverse)(self.model, rewritten=False)
         n, n_standard, place = self.model.n, lean.n_parameters, self.model.position
-        return program.renumbered(
-            lambda k: k - n_standard + n if k >= n_standard else int(place[k])
-        )
+        return program.renumber(lambda k: k - n_standard + n if k >= n_standard else int(place[k]))
 
 
 def list_starts(

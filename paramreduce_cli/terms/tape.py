@@ -278,4 +278,4 @@ class Tape:
                 stands_for.append(2 * (len(nodes) - 1))
         outputs = tuple(stands_for[value >> 1] ^ (value & 1) for value in self.program.outputs)
         graph = Graph()
-        return Program.of_graph(graph, Program(tuple(nodes), outputs).rebuilt(graph))
+        return Program.from_graph(graph, Program(tuple(nodes), outputs).rebuild(graph))

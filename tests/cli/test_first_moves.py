@@ -299,12 +299,12 @@ def test_doctor_names_what_is_missing(invoke, monkeypatch):
     found = {one["what"]: one for one in json.loads(invoke("doctor", "--json").out)["findings"]}
     assert found["linear algebra"]["state"] == "ok"
     monkeypatch.setenv("CC", "gcc '")
-    from paramreduce_cli.expressions.compiled import compiler
+    from paramreduce_cli.expressions.compiled import find_compiler
 
-    compiler.cache_clear()
+    find_compiler.cache_clear()
     assert "the variable CC holds no command" in " ".join(invoke("doctor", code=1).out.split())
     monkeypatch.delenv("CC")
-    compiler.cache_clear()
+    find_compiler.cache_clear()
 
 
 def test_completion_is_what_the_shell_asks_for(invoke, tmp_path, monkeypatch):

@@ -230,7 +230,7 @@ def test_a_pipe_in_the_folder_is_no_config_to_propose(tmp_path):
 def test_a_pipe_in_the_cache_is_no_library(tmp_path):
     library = tmp_path / "kept.so"
     os.mkfifo(library)
-    assert not cache.kept(library)
+    assert not cache.is_kept(library)
     assert not library.exists()
 
 
@@ -242,7 +242,7 @@ def test_folders_of_killed_compilations_go_after_a_day(tmp_path):
     built = tmp_path / "built.so"
     built.write_bytes(b"code")
     cache.keep(built, tmp_path / "kept.so")
-    assert cache.kept(tmp_path / "kept.so")
+    assert cache.is_kept(tmp_path / "kept.so")
     assert not old.exists()
     assert new.exists()
 

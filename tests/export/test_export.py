@@ -251,10 +251,10 @@ def function_without_terms(chosen, graph, outputs, n, **more):
         "worst_joint": 0, "worst_state": np.zeros((3, n)), "smallest_eigenvalue": np.nan, "mass_states": 0,
         "lower": -np.ones((3, n)), "upper": np.ones((3, n)), "drawn": np.zeros((2, 3, n)), "projected": False,
     }  # fmt: skip
-    program = Program.of_graph(graph, outputs)
+    program = Program.from_graph(graph, outputs)
     return TermModel(
         heuristic="swap", n_start=chosen.n, names=chosen.names, values=chosen.values, units=np.ones(chosen.n),
-        position=chosen.position, program=program.stored(), operations=program.n_operations,
+        position=chosen.position, program=program.to_stored(), operations=program.n_operations,
         operations_start=program.n_operations, front=None, **(known | more),
     )  # fmt: skip
 

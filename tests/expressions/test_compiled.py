@@ -14,9 +14,9 @@ from paramreduce_cli.expressions.compiled import BatchFunction
 @pytest.fixture(autouse=True)
 def own_cache(tmp_path, monkeypatch):
     monkeypatch.setenv("PARAMREDUCE_CACHE", str(tmp_path / "cache"))
-    compiled.compiler.cache_clear()
+    compiled.find_compiler.cache_clear()
     yield
-    compiled.compiler.cache_clear()
+    compiled.find_compiler.cache_clear()
 
 
 def example():
@@ -33,23 +33,23 @@ def check(function):
 
 
 def test_compiled_loop():
-    if compiled.compiler() is None:
+    if compiled.find_compiler() is None:
         pytest.skip("there is no C compiler")
     check(example())
-    assert len(list(compiled.cache_folder().glob("*.so"))) == 1
+    assert len(list(compiled.find_cache_folder().glob("*.so"))) == 1
     check(example())
-    assert len(list(compiled.cache_folder().glob("*.so"))) == 1
+    assert len(list(compiled.find_cache_folder().glob("*.so"))) == 1
 
 
 def test_a_cache_that_is_named_but_cannot_be_is_said(monkeypatch, tmp_path):
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("PARAMREDUCE_CACHE", str(tmp_path / "file" / "cache"))
     with pytest.warns(ParamreduceWarning, match="PARAMREDUCE_CACHE cannot be used"):
-        assert compiled.cache_folder().is_dir()
+        assert compiled.find_cache_folder().is_dir()
 
 
 def test_a_cache_that_can_be_read_alone_is_said_and_models_are_compiled_all_the_same(monkeypatch):
-    if compiled.compiler() is None:
+    if compiled.find_compiler() is None:
         pytest.skip("there is no C compiler")
     monkeypatch.setenv("PARAMREDUCE_CACHE", "/sys/kernel")  # whatever the user's rights
     with pytest.warns(ParamreduceWarning, match="/sys/kernel cannot (be written|hold)") as said:
@@ -58,11 +58,11 @@ def test_a_cache_that_can_be_read_alone_is_said_and_models_are_compiled_all_the_
 
 
 def test_a_cache_that_cannot_hold_models_is_no_fault_of_the_compiler(monkeypatch):
-    if compiled.compiler() is None:
+    if compiled.find_compiler() is None:
         pytest.skip("there is no C compiler")
 
     def full(built, library):
-        if library.parent == compiled.cache_folder():
+        if library.parent == compiled.find_cache_folder():
             raise OSError(errno.ENOSPC, "No space left on device")
 
     monkeypatch.setattr(compiled, "keep", full)
@@ -73,12 +73,12 @@ def test_a_cache_that_cannot_hold_models_is_no_fault_of_the_compiler(monkeypatch
 
 def test_machines_of_two_kinds_share_a_folder(monkeypatch):
     """Each takes what was compiled for its own processor."""
-    if compiled.compiler() is None:
+    if compiled.find_compiler() is None:
         pytest.skip("there is no C compiler")
     check(example())
-    monkeypatch.setattr(compiled, "machine_type", lambda: "another processor")
+    monkeypatch.setattr(compiled, "identify_machine", lambda: "another processor")
     check(example())
-    assert len(list(compiled.cache_folder().glob("*.so"))) == 2
+    assert len(list(compiled.find_cache_folder().glob("*.so"))) == 2
 
 
 def test_without_a_compiler_the_result_is_the_same_and_it_is_said_once(monkeypatch):
@@ -107,10 +107,12 @@ def test_states_that_do_not_fit_are_refused():
 
 
 def libraries():
-    return sorted(compiled.cache_folder().glob("*.so"))
+    return sorted(compiled.find_cache_folder().glob("*.so"))
 
 
-needs_compiler = pytest.mark.skipif(compiled.compiler() is None, reason="there is no C compiler")
+needs_compiler = pytest.mark.skipif(
+    compiled.find_compiler() is None, reason="there is no C compiler"
+)
 
 
 @needs_compiler
@@ -133,7 +135,7 @@ def test_a_damaged_library_is_never_loaded(place):
 
 @needs_compiler
 def test_a_folder_that_others_can_write_to_is_not_trusted():
-    folder = compiled.cache_folder()
+    folder = compiled.find_cache_folder()
     folder.chmod(0o777)
     with pytest.warns(ParamreduceWarning, match="can be written by others"):
         check(example())
@@ -142,7 +144,7 @@ def test_a_folder_that_others_can_write_to_is_not_trusted():
 
 @needs_compiler
 def test_libraries_that_were_not_used_for_long_go():
-    old = compiled.cache_folder() / "old.so"
+    old = compiled.find_cache_folder() / "old.so"
     old.write_bytes(b"something")
     os.utime(old, (0, 0))
     check(example())

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from random_graphs import evaluated, expressions
 
-from paramreduce_cli.expressions.factoring import Written, least
+from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
 
@@ -14,7 +14,7 @@ from paramreduce_cli.expressions.operations import Program
 @given(expressions())
 def test_factoring_keeps_values(made):
     graph, outputs = made
-    target, changed = least([Written(graph, outputs)])
+    target, changed = minimise_operations([Values(graph, outputs)])
     expected = evaluated(graph, outputs)
     np.testing.assert_allclose(
         evaluated(target, changed), expected, rtol=1e-9, atol=1e-9 * (1 + np.abs(expected).max())
@@ -25,18 +25,18 @@ def test_factoring_keeps_values(made):
 @given(expressions())
 def test_the_least_form_never_takes_more(made):
     graph, outputs = made
-    target, changed = least([Written(graph, outputs)])
-    assert target.count(changed) <= graph.count(outputs)
+    target, changed = minimise_operations([Values(graph, outputs)])
+    assert target.count_operations(changed) <= graph.count_operations(outputs)
 
 
 @settings(max_examples=100, deadline=None)
 @given(expressions())
 def test_a_program_builds_the_same_graph_again(made):
     graph, outputs = made
-    program = Program.of_graph(graph, outputs)
+    program = Program.from_graph(graph, outputs)
     again = Graph()
-    rebuilt = program.rebuilt(again)
-    assert again.count(rebuilt) <= graph.count(outputs) == program.n_operations
+    rebuilt = program.rebuild(again)
+    assert again.count_operations(rebuilt) <= graph.count_operations(outputs) == program.n_operations
     np.testing.assert_allclose(
         evaluated(again, rebuilt), evaluated(graph, outputs), rtol=1e-9, atol=1e-9
     )
@@ -81,8 +81,8 @@ def test_the_laws_of_sums_and_products(terms, expected):
                 product = graph.multiply(product, graph.input(factor))
             value = graph.add(value, product)
         outputs.append(value)
-    target, changed = least([Written(graph, outputs)])
-    assert target.count(changed) == expected
+    target, changed = minimise_operations([Values(graph, outputs)])
+    assert target.count_operations(changed) == expected
 
 
 def test_of_two_ways_the_least_takes_no_more_than_either():
@@ -91,6 +91,8 @@ def test_of_two_ways_the_least_takes_no_more_than_either():
     products = [graph.multiply(x, y) for x, y in ((a, c), (a, d), (b, c), (b, d))]
     long = [graph.add(graph.add(products[0], products[1]), graph.add(products[2], products[3]))]
     short = [graph.multiply(graph.add(a, b), graph.add(c, d))]
-    ways = [Written(graph, long), Written(graph, short)]
-    assert least(ways).n_operations <= min(least([way]).n_operations for way in ways)
-    assert least(ways).n_operations == 3
+    ways = [Values(graph, long), Values(graph, short)]
+    assert minimise_operations(ways).n_operations <= min(
+        minimise_operations([way]).n_operations for way in ways
+    )
+    assert minimise_operations(ways).n_operations == 3

@@ -41,8 +41,8 @@ def test_what_is_damaged_or_was_kept_without_checksums_is_replaced(tmp_path):
 
 def test_a_damaged_loop_runs_as_before(tmp_path):
     (tmp_path / "loop_to_keep.py").write_text(
-        "from paramreduce_cli.expressions.loops import compiled\n"
-        "@compiled()\ndef added(a, b):\n    return a + b\n"
+        "from paramreduce_cli.expressions.loops import compile_loop\n"
+        "@compile_loop()\ndef added(a, b):\n    return a + b\n"
     )
     program = "import loop_to_keep; print(loop_to_keep.added(2, 3), sum(loop_to_keep.added.stats.cache_hits.values()))"
 
@@ -82,12 +82,12 @@ def test_all_loops_of_the_package_are_kept_that_way():
 
 def test_a_change_in_a_file_beside_is_noticed(tmp_path):
     (tmp_path / "inner_loop.py").write_text(
-        "from paramreduce_cli.expressions.loops import compiled\n"
-        "@compiled()\ndef inner(a):\n    return a + 1\n"
+        "from paramreduce_cli.expressions.loops import compile_loop\n"
+        "@compile_loop()\ndef inner(a):\n    return a + 1\n"
     )
     (tmp_path / "outer_loop.py").write_text(
-        "from paramreduce_cli.expressions.loops import compiled\nfrom inner_loop import inner\n"
-        "@compiled()\ndef outer(a):\n    return 2 * inner(a)\n"
+        "from paramreduce_cli.expressions.loops import compile_loop\nfrom inner_loop import inner\n"
+        "@compile_loop()\ndef outer(a):\n    return 2 * inner(a)\n"
     )
 
     def said():

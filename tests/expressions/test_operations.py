@@ -8,7 +8,9 @@ x = ca.SX.sym("x", 4)
 
 
 def count(*outputs, zero=(), **options):
-    return Program.of_function(ca.Function("f", [x], [ca.vertcat(*outputs)])).count(zero, **options)
+    return Program.from_function(ca.Function("f", [x], [ca.vertcat(*outputs)])).count(
+        zero, **options
+    )
 
 
 @pytest.mark.parametrize(
@@ -60,8 +62,8 @@ def test_a_difference_is_one_operation_in_programs_made_from_graphs():
     graph = Graph()
     a, b, c = (graph.input(k) for k in range(3))
     difference = graph.subtract(a, b)
-    program = Program.of_graph(graph, [difference, graph.subtract(graph.negate(a), c)])
+    program = Program.from_graph(graph, [difference, graph.subtract(graph.negate(a), c)])
     assert program.count() == 2
     assert program.count(signs_free=False) == 3  # of -a - c the sign is one
-    assert Program.of_graph(graph, [difference]).count(signs_free=False) == 1
-    assert Program.of_graph(graph, [graph.subtract(b, a)]).count(signs_free=False) == 1
+    assert Program.from_graph(graph, [difference]).count(signs_free=False) == 1
+    assert Program.from_graph(graph, [graph.subtract(b, a)]).count(signs_free=False) == 1

@@ -5,7 +5,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from random_graphs import evaluated, expressions
 
-from paramreduce_cli.expressions.factoring import Written, least
+from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.expressions.rewriting import rewrite
@@ -18,20 +18,20 @@ from paramreduce_cli.expressions.rows import (
     PRODUCT,
     SUM,
     USES,
-    terms_of,
+    list_terms,
 )
 
 
 def state(rows):
-    return terms_of(rows, SUM), terms_of(rows, PRODUCT), int(rows.counters[COST])
+    return list_terms(rows, SUM), list_terms(rows, PRODUCT), int(rows.counters[COST])
 
 
 @settings(max_examples=100, deadline=None)
 @given(expressions(), st.integers(0, 10**6))
 def test_values_stay_and_operations_get_no_more(made, seed):
     graph, outputs = made
-    way = Written(graph, outputs)
-    rows = way.taken_apart()
+    way = Values(graph, outputs)
+    rows = way.to_rows()
     rows.counters[DICE] = seed
     expected = evaluated(graph, outputs)
     before = rows.counters[COST]
@@ -39,7 +39,7 @@ def test_values_stay_and_operations_get_no_more(made, seed):
         rewrite(rows, tries)
         assert rows.counters[COST] <= before
         before = rows.counters[COST]
-        changed = way.put_together(rows)
+        changed = way.from_rows(rows)
         assert changed.n_operations <= before
         np.testing.assert_allclose(
             evaluated(*changed), expected, rtol=1e-8, atol=1e-8 * (1 + np.abs(expected).max())
@@ -50,9 +50,9 @@ def test_values_stay_and_operations_get_no_more(made, seed):
 @given(expressions())
 def test_counts_and_chains_are_those_of_the_rows(made):
     graph, outputs = made
-    rows = Written(graph, outputs).taken_apart()
+    rows = Values(graph, outputs).to_rows()
     calls = rows.counters[COST] - sum(
-        len(row) - 1 for kind in (SUM, PRODUCT) for row in terms_of(rows, kind).values()
+        len(row) - 1 for kind in (SUM, PRODUCT) for row in list_terms(rows, kind).values()
     )
     rewrite(rows, 60)
     sums, products, cost = state(rows)
@@ -68,9 +68,9 @@ def test_where_there_is_no_room_everything_stays():
     graph = Graph()
     a, b, c, d = (graph.input(k) for k in range(4))
     total = graph.add(graph.multiply(a, b), graph.multiply(c, d))
-    rows = Written(
+    rows = Values(
         graph, [graph.multiply(total, graph.add(a, d)), graph.multiply(total, b)]
-    ).taken_apart()
+    ).to_rows()
     rewrite(rows, 0)
     before = state(rows)
     rows.numbers[rows.numbers[:, KIND] == NONE, USES] += 1  # so that no number is free
@@ -100,7 +100,7 @@ def test_a_factor_is_distributed_where_it_lets_products_be_shared():
         graph.multiply(two, bracket),
     ]
     # turned, D = 2 rate, E = D w, F = D other, E sine, E u + F v
-    assert least([Written(graph, outputs)]).n_operations == 8
+    assert minimise_operations([Values(graph, outputs)]).n_operations == 8
 
 
 def test_what_cancels_between_sums_that_are_used_elsewhere_vanishes():
@@ -110,7 +110,7 @@ def test_what_cancels_between_sums_that_are_used_elsewhere_vanishes():
     second = graph.subtract(b, c)
     outputs = [graph.multiply(first, d), graph.multiply(graph.add(first, second), second)]
     # a - b, b - c, a - c and two products
-    assert least([Written(graph, outputs)]).n_operations == 5
+    assert minimise_operations([Values(graph, outputs)]).n_operations == 5
 
 
 def test_it_repeats_itself():
@@ -122,7 +122,7 @@ def test_it_repeats_itself():
         total = graph.add(graph.multiply(total, x[k % 5]), x[(3 * k + 1) % 5])
         outputs.append(graph.multiply(total, x[(2 * k) % 5]))
     for dice in (0, 1234567):
-        found = [least([Written(graph, outputs)], dice) for _ in range(2)]
+        found = [minimise_operations([Values(graph, outputs)], dice) for _ in range(2)]
         assert found[0].graph.nodes == found[1].graph.nodes
         assert found[0].outputs == found[1].outputs
 
@@ -138,15 +138,18 @@ def test_other_dice_write_the_same_values_in_other_ways():
             total = graph.add(total, x[k])
         outputs.append(total)
     given = rng.normal(size=7)
-    expected = Program.of_graph(graph, outputs).evaluated([*given])
-    found = [Program.of_graph(*least([Written(graph, outputs)], dice)) for dice in (0, 1, 10**12)]
+    expected = Program.from_graph(graph, outputs).evaluate([*given])
+    found = [
+        Program.from_graph(*minimise_operations([Values(graph, outputs)], dice))
+        for dice in (0, 1, 10**12)
+    ]
     assert len(set(found)) > 1
     for one in found:
-        np.testing.assert_allclose(one.evaluated([*given]), expected, rtol=1e-12)
+        np.testing.assert_allclose(one.evaluate([*given]), expected, rtol=1e-12)
 
 
 def test_where_nothing_can_be_rewritten_it_ends():
     graph = Graph()
-    rows = Written(graph, [graph.call("sin", graph.input(0))]).taken_apart()
+    rows = Values(graph, [graph.call("sin", graph.input(0))]).to_rows()
     rewrite(rows, 3)
     assert state(rows) == ({}, {}, 1)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.expressions.scaling import rescaled
+from paramreduce_cli.expressions.scaling import rescale
 from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
 from paramreduce_cli.lean.choices import JointFormulation
 from paramreduce_cli.lean.tree import lean_tree
@@ -34,7 +34,7 @@ def programs(draw):
         else:
             operation = graph.add if kind in ("sum", "shift") else graph.multiply
             values.append(operation(a, b if kind in ("sum", "product") else number))
-    return Program.of_graph(graph, [values[-1], draw(st.sampled_from(values))])
+    return Program.from_graph(graph, [values[-1], draw(st.sampled_from(values))])
 
 
 def same(program, scaled, units):
@@ -42,14 +42,14 @@ def same(program, scaled, units):
     x = np.random.default_rng(0).uniform(0.5, 1.5, size=(N, 20))
     in_units = x.copy()
     in_units[:FREE] /= units[:, None]
-    for one, other in zip(program.evaluated(x), scaled.evaluated(in_units), strict=True):
+    for one, other in zip(program.evaluate(x), scaled.evaluate(in_units), strict=True):
         np.testing.assert_allclose(other, one, rtol=1e-7, atol=1e-7 * np.abs(one).max())
 
 
 @settings(deadline=None)
 @given(programs())
 def test_the_function_is_the_same_and_takes_no_more_operations(program):
-    scaled, units = rescaled(program, FREE)
+    scaled, units = rescale(program, FREE)
     same(program, scaled, units)
     assert scaled.n_operations <= program.n_operations
 
@@ -58,12 +58,12 @@ def built(make):
     """The program of what is made of three free inputs and three others."""
     graph = Graph()
     outputs = make(graph, *(graph.input(k) for k in range(N)))
-    return Program.of_graph(graph, outputs)
+    return Program.from_graph(graph, outputs)
 
 
 def test_a_factor_that_a_parameter_can_take_vanishes():
     program = built(lambda g, p, q, r, x, y, z: [g.multiply(p, g.multiply(g.constant(0.5), x))])
-    scaled, units = rescaled(program, FREE)
+    scaled, units = rescale(program, FREE)
     assert scaled.n_operations == 1
     np.testing.assert_allclose(units, [2.0, 1.0, 1.0])
 
@@ -81,7 +81,7 @@ def test_a_factor_that_a_parameter_can_take_vanishes():
 )
 def test_what_nothing_can_make_up_for_stays(make):
     program = built(make)
-    scaled, units = rescaled(program, FREE)
+    scaled, units = rescale(program, FREE)
     assert scaled.n_operations == program.n_operations
     np.testing.assert_array_equal(units, 1.0)
     same(program, scaled, units)
@@ -97,7 +97,7 @@ def test_what_vanishes_in_more_places_goes_first():
         return [g.multiply(p, total), g.multiply(p, g.multiply(y, speeds[0]))]
 
     program = built(make)
-    scaled, units = rescaled(program, FREE)
+    scaled, units = rescale(program, FREE)
     assert scaled.n_operations == program.n_operations - 2
     np.testing.assert_allclose(units[0], 1 / 0.3)
     numbers = [node.number for node in scaled.nodes if node.operation == "constant"]
@@ -115,10 +115,10 @@ def test_an_arm_takes_what_it_would_take_if_its_length_were_one(outputs):
 
     def program(tree):
         graph = Graph()
-        return Program.of_graph(graph, outputs(tree, [JointFormulation()] * 2, graph))
+        return Program.from_graph(graph, outputs(tree, [JointFormulation()] * 2, graph))
 
     n = mechanism.n_parameters
-    scaled, units = rescaled(program(tree), n)
+    scaled, units = rescale(program(tree), n)
     assert scaled.n_operations < program(tree).n_operations
     assert scaled.n_operations <= program(in_lengths).n_operations
     # A mass comes as m l^2, a first moment as m x l, moments of inertia as they are.
@@ -132,7 +132,7 @@ def test_numbers_that_differ_by_rounding_are_one(outputs):
     mechanism = model_of("puma560").mechanism
     graph = Graph()
     values = outputs(lean_tree(mechanism), [JointFormulation()] * 6, graph)
-    scaled, _ = rescaled(Program.of_graph(graph, values), mechanism.n_parameters)
+    scaled, _ = rescale(Program.from_graph(graph, values), mechanism.n_parameters)
     numbers = np.sort([node.number for node in scaled.nodes if node.operation == "constant"])
     assert numbers.size > 3
     assert np.diff(numbers).min() > 1e-6

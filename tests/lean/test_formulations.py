@@ -47,7 +47,7 @@ def compared(mechanism, choices, rng, samples=30):
 
     def evaluated(build):
         graph = Graph()
-        return Program.of_graph(graph, build(tree, choices, graph)).evaluated(inputs)
+        return Program.from_graph(graph, build(tree, choices, graph)).evaluate(inputs)
 
     rows, columns = np.tril_indices(mechanism.n_q)
     direct = np.hstack([M[:, rows, columns], delta])
@@ -256,7 +256,7 @@ def test_formulations_for_some_parameters_are_the_same_dynamics_and_take_no_more
 
     def count(choices):
         graph = Graph()
-        return graph.count(build(tree, list(map(from_data, choices)), graph, dropped))
+        return graph.count_operations(build(tree, list(map(from_data, choices)), graph, dropped))
 
     assert min(map(count, new)) < min(map(count, known))
 

@@ -47,7 +47,7 @@ def predicted(fitting, fit, samples, direct):
     """Torques, and mass matrices, from the program that is left, written out."""
     program = fitting.tape.rebuilt(fit.pruning)
     m = samples.tau.shape[1]
-    given = program.evaluated(
+    given = program.evaluate(
         [*np.broadcast_to(fit.beta[:, None], (fit.beta.size, m)), *samples.states]
     )
     given = [np.broadcast_to(value, m) for value in given]

@@ -141,7 +141,7 @@ def errors_by_definition(runner, name):
     """Torque errors on both sets, from the stored program and plain formulas alone."""
     model, samples, found = (loaded(runner, r) for r in (Model, Samples, TermReduction))
     term = found.functions[name]
-    mechanism, program = model.mechanism, Program.of_stored(term.program)
+    mechanism, program = model.mechanism, Program.from_stored(term.program)
     coordinates = Coordinates(mechanism)
     result = []
     for part in (samples.estimation, samples.validation):
@@ -160,7 +160,7 @@ def errors_by_definition(runner, name):
                 n = mechanism.n_dof
                 tangent, ddq = np.broadcast_to(np.eye(n), (len(b.q), n, n)), b.ddz
             values = [np.full(len(b.q), value) for value in term.values]
-            given = [np.broadcast_to(x, len(b.q)) for x in program.evaluated([*values, *inputs])]
+            given = [np.broadcast_to(x, len(b.q)) for x in program.evaluate([*values, *inputs])]
             torques = np.array(given).T
             if name == "direct":
                 M = np.zeros((len(b.q), n, n))
@@ -214,7 +214,7 @@ def test_errors_are_what_they_are_defined_as_and_within_the_budget(two_link, nam
     assert term.torque_error.validation == pytest.approx(validation, rel=1e-9)
     assert max(estimation, validation) <= 0.05
     assert 0 < term.operations < term.operations_start
-    assert term.operations == Program.of_stored(term.program).n_operations
+    assert term.operations == Program.from_stored(term.program).n_operations
     if name == "direct":
         assert term.smallest_eigenvalue > 0
         assert term.mass_states == 100_000
@@ -274,12 +274,12 @@ def given_by(runner, name):
     """What the stored program gives for states, in plain NumPy: torques, and M of the direct dynamics; of trees."""
     model, term = loaded(runner, Model), loaded(runner, TermReduction).functions[name]
     assert model.mechanism.loops is None
-    program = Program.of_stored(term.program)
+    program = Program.from_stored(term.program)
 
     def given(q, dq, ddq):
         count, n = q.shape
         inputs = [*(np.full(count, value) for value in term.values), *q.T, *dq.T, *ddq.T]
-        outputs = np.array([np.broadcast_to(x, count) for x in program.evaluated(inputs)])
+        outputs = np.array([np.broadcast_to(x, count) for x in program.evaluate(inputs)])
         if name == "inverse":
             return outputs.T, None
         M = np.zeros((count, n, n))

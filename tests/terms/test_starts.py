@@ -39,7 +39,7 @@ def test_starts_near_one_are_the_same_function_written_otherwise(direct):
     inputs = [*np.broadcast_to(base.values[:, None], (base.n, 20)), *states]
 
     def outputs(some):
-        return np.array(some.build_program(lean, direct=direct).evaluated(inputs))
+        return np.array(some.build_program(lean, direct=direct).evaluate(inputs))
 
     expected, formulations, at = outputs(one), [], one
     for seed in range(8):

@@ -19,7 +19,7 @@ def program():
     inner = g.add(g.multiply(a, s), g.multiply(b, g.subtract(c, y)))
     drag = g.multiply(b, g.add(g.call("tanh", y), g.multiply(g.constant(0.1), g.call("sign", x))))
     outputs = [g.add(g.multiply(inner, y), drag), g.negate(g.add(inner, g.multiply(a, y)))]
-    return Program.of_graph(g, outputs)
+    return Program.from_graph(g, outputs)
 
 
 @pytest.fixture
@@ -60,7 +60,7 @@ def test_what_is_left_is_the_program_with_terms_set_to_zero(program, inputs, see
     tape = Tape(program)
     pruning = random_remains(tape, seed)
     rebuilt = tape.rebuilt(pruning)
-    expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluated(list(inputs))]
+    expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluate(list(inputs))]
     np.testing.assert_allclose(outputs_of(tape, pruning, inputs), expected, atol=1e-14)
     assert rebuilt.n_operations <= tape.count(pruning) <= program.n_operations
 
@@ -70,7 +70,7 @@ def test_a_constant_that_stands_for_one_saves_all_products_with_it():
     p, x, y = map(g.input, range(3))
     length = g.constant(1.07)
     lengths = g.add(g.multiply(length, x), g.multiply(x, g.multiply(length, y)))
-    tape = Tape(Program.of_graph(g, [g.multiply(p, lengths)]))
+    tape = Tape(Program.from_graph(g, [g.multiply(p, lengths)]))
     (constant,) = tape.constants()
     pruning = tape.everything().replace(constant, NUMBER, 1.0)
     assert tape.count(pruning) == tape.count(tape.everything()) - 2
@@ -198,7 +198,9 @@ def test_counts_of_single_changes(program, seed):
 def test_outputs_are_those_that_are_not_zero(inputs):
     g = Graph()
     a, x = g.input(0), g.input(2)
-    tape = Tape(Program.of_graph(g, [g.constant(0.0), g.negate(g.multiply(a, x)), g.constant(0.0)]))
+    tape = Tape(
+        Program.from_graph(g, [g.constant(0.0), g.negate(g.multiply(a, x)), g.constant(0.0)])
+    )
     pruning = tape.everything()
     found = tape.outputs(tape.values(pruning, inputs, tape.needed(pruning)))
     assert found.places.tolist() == [1]

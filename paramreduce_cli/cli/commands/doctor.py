@@ -88,12 +88,12 @@ def _extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
 
 
 def _compiler() -> tuple[str, str, str]:
-    from paramreduce_cli.expressions.compiled import compiler
+    from paramreduce_cli.expressions.compiled import find_compiler
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            command = compiler()
+            command = find_compiler()
     except ParamreduceError as error:
         return "C compiler", "wrong", str(error)
     if command is None:
@@ -126,14 +126,14 @@ def _caches() -> Iterator[tuple[str, str, str]]:
 
 def _model_cache() -> tuple[str, str, str]:
     """Compile a small library, keep it in the cache and load it from there."""
-    from paramreduce_cli.expressions.cache import cache_folder
+    from paramreduce_cli.expressions.cache import find_cache_folder
     from paramreduce_cli.expressions.compiled import load
 
     what = "cache of compiled models"
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
-            folder = cache_folder()
+            folder = find_cache_folder()
             load("int paramreduce_doctor(void) { return 1; }\n")
         except (ParamreduceError, OSError) as error:
             return what, "wrong", str(error)

@@ -115,8 +115,10 @@ class _Writer:
             "text": function.text,
             "arguments": function.arguments,
             "results": function.results,
-            "cost": function.cost(),
-            "unused": [a.name for a in function.arguments if a.name not in function.used()],
+            "cost": function.describe_cost(),
+            "unused": [
+                a.name for a in function.arguments if a.name not in function.find_used_arguments()
+            ],
             "statements": self.statements(function),
             "batched": self.batched(function),
         }
@@ -185,7 +187,7 @@ class _Writer:
         rows = {angle: row for row, angle in enumerate(found.angles)}
         before: list[str] = []
         rest: list[str] = []
-        for number, node in function.steps():
+        for number, node in function.iterate_steps():
             if number in found.waves:
                 row = rows[node.operands[0] >> 1]
                 names[number] = f"{'sine' if node.operation == 'sin' else 'cosine'}[{row}]"
@@ -199,7 +201,7 @@ class _Writer:
             before.append(f"{self._real} angles[{count}] = {{{angles}}};")
             before.append(f"{self._real} sine[{count}], cosine[{count}];")
             before.append(f"sines({count}, angles, sine, cosine);")
-        places = zip(function.places(function.results), function.program.outputs, strict=True)
+        places = zip(function.list_places(function.results), function.program.outputs, strict=True)
         outputs = [f"{array.name}[{k}] = {signed(names, value)};" for (array, k), value in places]
         return [*before, *rest, *outputs]
 
@@ -227,7 +229,7 @@ class _Writer:
         once: list[str] = []
         before: list[str] = []
         rest: list[str] = []
-        for number, node in function.steps():
+        for number, node in function.iterate_steps():
             if number in found.waves:
                 names[number] = f"{node.operation}_{rows[node.operands[0] >> 1]}[k]"
                 continue
@@ -237,7 +239,7 @@ class _Writer:
             names[number] = f"t{number}"
             (rest if found.states[number] else once).append(text)
         again = language.leaves(function)
-        for number, node in function.steps():
+        for number, node in function.iterate_steps():
             if number in found.before:
                 text = f"const {self._real} a{number} = {language.expression(again, node)};"
                 again[number] = f"a{number}"
@@ -245,7 +247,7 @@ class _Writer:
         filled = [(row, again[angle]) for angle, row in rows.items()]
         outputs = list(dict.fromkeys(program.outputs))
         rest += [f"out[{row}][k] = {signed(names, value)};" for row, value in enumerate(outputs)]
-        places = zip(function.places(function.results), program.outputs, strict=True)
+        places = zip(function.list_places(function.results), program.outputs, strict=True)
         return {
             "once": once,
             "before": before,
@@ -292,7 +294,7 @@ class _Dependence:
 
 
 def _dependence(function: Function) -> _Dependence:
-    nodes, states = function.program.nodes, function.on_state()
+    nodes, states = function.program.nodes, function.find_state_dependent()
     waves: set[int] = set()
     before: set[int] = set()
     rest = {value >> 1 for value in function.program.outputs}
@@ -305,7 +307,7 @@ def _dependence(function: Function) -> _Dependence:
             before |= below
         if number in rest and number not in waves:
             rest |= below
-    operations = {number for number, _ in function.steps()}
+    operations = {number for number, _ in function.iterate_steps()}
     waves &= operations
     angles = dict.fromkeys(nodes[number].operands[0] >> 1 for number in sorted(waves))
     return _Dependence(states, waves, list(angles), before & operations, rest)

@@ -31,7 +31,7 @@ def _function(model: ExportedModel, function: Function) -> str:
     results = ", ".join(r.name for r in function.results)
     arguments = ", ".join(a.name for a in function.arguments)
     lines = [f"function [{results}] = {model.name}_{function.name}({arguments})"]
-    documented = [f"{function.text} {function.cost()}"]
+    documented = [f"{function.text} {function.describe_cost()}"]
     documented += [
         f"{array.name}: {array.text}, {' x '.join(map(str, array.shape))}"
         for array in (*function.arguments, *function.results)
@@ -42,7 +42,7 @@ def _function(model: ExportedModel, function: Function) -> str:
     for result in function.results:
         rows, columns = (*result.shape, 1)[:2]
         lines.append(f"{result.name} = zeros({rows}, {columns});")
-    for (array, k), text in zip(function.places(function.results), outputs, strict=True):
+    for (array, k), text in zip(function.list_places(function.results), outputs, strict=True):
         lines.append(f"{_element(array, k)} = {text};")
     return "\n".join([*lines, "end"])
 

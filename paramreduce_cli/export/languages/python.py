@@ -49,7 +49,7 @@ def python(model: ExportedModel) -> dict[str, bytes]:
 def _function(function: Function, *, private: bool) -> list[str]:
     arguments = ", ".join(a.name for a in function.arguments)
     lines = [f"def {'_' * private}{function.name}({arguments}):"]
-    lines += [f'    """{function.text} {function.cost()}', ""]
+    lines += [f'    """{function.text} {function.describe_cost()}', ""]
     lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
     lines += ['    """']
     lines += [f"    {a.name} = _array({a.name!r}, {a.name}, {a.shape})" for a in function.arguments]

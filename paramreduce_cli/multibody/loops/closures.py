@@ -120,7 +120,9 @@ CLOSURES: dict[ClosureKind, ClosureType] = {
     "cylindrical": ClosureType(
         ("x", "y", *_TILT), lambda p: [*p.project((0, 1), p.gap), *p.tilt], (2,)
     ),
-    "universal": ClosureType((*_PLACE, "angle"), lambda p: [*p.gap, *p.project((0,), p.get_axis(1))]),
+    "universal": ClosureType(
+        (*_PLACE, "angle"), lambda p: [*p.gap, *p.project((0,), p.get_axis(1))]
+    ),
     "point": ClosureType(_PLACE, lambda p: list(p.gap)),
     "planar": ClosureType(("x", "y"), lambda p: p.project((0, 1), p.gap)),
     "distance": ClosureType(("distance",), _express_distance),

@@ -26,7 +26,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from paramreduce_cli.expressions.loops import compiled, inlined
+from paramreduce_cli.expressions.loops import compile_loop, inline
 from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import FloatArray, IntArray
 
@@ -58,8 +58,8 @@ _NO_COLUMN = cast("int", np.int64(-1))
 _GRAM = cast("int", np.int64(0))
 _INCLUDE, _EXCLUDE = cast("tuple[bool, bool]", (np.bool_(True), np.bool_(False)))
 
-_within = compiled(within=True, makes_arrays=False)
-_making_arrays = compiled(within=True)
+_within = compile_loop(within=True, makes_arrays=False)
+_making_arrays = compile_loop(within=True)
 
 
 class Data(NamedTuple):
@@ -112,7 +112,7 @@ class State(NamedTuple):
     """Room to work in, (n_columns,)."""
 
 
-@inlined
+@inline
 def _copy_vector(given: FloatArray | IntArray, to: FloatArray | IntArray) -> None:
     """Copy a vector; assigned as a whole it takes Numba seconds to compile that shapes are compared."""
     for i in range(to.size):
@@ -176,7 +176,7 @@ def _compute_null_share(sheet: FloatArray, nullity: int, j: int) -> float:
     return share
 
 
-@inlined
+@inline
 def _exclude(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
@@ -289,7 +289,7 @@ def _span(s: State, data: Data, count: int) -> None:
     s.progress[SPANNED] = max(s.progress[SPANNED], count)
 
 
-@inlined
+@inline
 def _include(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
@@ -342,7 +342,7 @@ def _decide(
             _exclude(sheet, numbers, errors, s, data, j)
 
 
-@inlined
+@inline
 def _branch(s: State, data: Data, unit: int) -> None:
     """Keep the node for later, and continue with a copy that includes a unit."""
     level = s.progress[LEVEL]
@@ -380,7 +380,7 @@ def _is_parallel(s: State, data: Data, count: int, one: int, other: int) -> bool
     return bool(np.dot(rest, rest) <= DEPENDENT**2 * np.dot(second, second))
 
 
-@inlined
+@inline
 def _exclude_parallel(
     sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
 ) -> None:
@@ -399,7 +399,7 @@ def _exclude_parallel(
             own = _find_position(numbers, data.first[unit])
 
 
-@inlined
+@inline
 def _go_back(s: State, data: Data) -> None:
     """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
@@ -448,7 +448,7 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
         _copy_vector(subset, s.subset)
 
 
-@inlined
+@inline
 def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
@@ -484,7 +484,7 @@ def _is_mandatory(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
     return _compute_null_share(sheet, nullity, j) <= APART
 
 
-@inlined
+@inline
 def _count_mandatory(
     sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
 ) -> tuple[int, int, int]:
@@ -505,7 +505,7 @@ def _count_mandatory(
     return needed, must, _NO_COLUMN
 
 
-@inlined
+@inline
 def _fill_last_place(
     sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
 ) -> None:
@@ -519,7 +519,7 @@ def _fill_last_place(
             limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
-@inlined
+@inline
 def _fill_last_two_places(
     sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
 ) -> None:
@@ -583,7 +583,7 @@ def _choose_branching_column(sheet: FloatArray, numbers: IntArray) -> int:
     return int(chosen)
 
 
-@inlined
+@inline
 def _repeat(s: State, data: Data, log: IntArray) -> None:
     """Go the way that another search has logged."""
     for k in range(log.size):
@@ -597,7 +597,7 @@ def _repeat(s: State, data: Data, log: IntArray) -> None:
             )  # fmt: skip
 
 
-@compiled(makes_arrays=False)
+@compile_loop(makes_arrays=False)
 def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
     """Go the way that another search has logged, then on for at most so many nodes, and back from the last one.
 
