@@ -25,7 +25,7 @@ def test_states_of_another_shape_are_refused_with_the_one_that_is_meant():
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         model = model_of("four_bar")
-    torques = pr.inverse_dynamics(model, pr.make_full_model(model))
+    torques = pr.inverse_dynamics(model, pr.full_model(model))
     right = np.zeros((4, 3))
     assert torques(right, right, right).shape == (4, 1)
     for wrong in (np.zeros((4, 1)), np.zeros(3), np.zeros((5, 3))):
