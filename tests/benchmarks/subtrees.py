@@ -53,7 +53,7 @@ def finished(jobs):
     while any(not job.finished for job in jobs):
         best = min(jobs, key=lambda job: job.squared_error)
         for job in jobs:
-            job.learn(best.squared_error, best.subset)
+            job.take_incumbent(best.squared_error, best.subset)
             if not job.finished:
                 job.advance(_TURN, threads=1)
     return jobs
