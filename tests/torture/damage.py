@@ -71,8 +71,8 @@ print(found.tolist())
 """
 _LOOPED = """
 import numpy as np
-from paramreduce_cli.terms.matrices import times
-print(times(np.arange(12.0).reshape(2, 2, 3), np.ones((1, 2, 3))).tolist())
+from paramreduce_cli.terms.matrices import multiply_triangles
+print(multiply_triangles(np.arange(12.0).reshape(2, 2, 3), np.ones((1, 2, 3))).tolist())
 """
 
 
