@@ -24,7 +24,7 @@ def read(store, record):
 
 
 def plain(value):
-    if hasattr(value, "blocks"):  # read in slices
+    if hasattr(value, "iterate_blocks"):  # read in slices
         return [plain(list(value.iterate_blocks())), plain(value.compute_factors())]
     if dataclasses.is_dataclass(value):
         return [plain(getattr(value, field.name)) for field in dataclasses.fields(value)]
