@@ -32,8 +32,6 @@ def find_resting_position(
     """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, or the assembly,
     or what a search from there finds.
 
-    The middle of the limits, or the assembly, or what a search from there finds.
-
     Args:
         excitation: Excitation with the bounds.
         limits: Limits of the independent coordinates.

@@ -57,8 +57,6 @@ def smooth_friction(mechanism: Mechanism, speeds: FloatArray) -> Mechanism:
     """Return the mechanism with a smooth sign in Coulomb friction, so that gradients exist; without such friction the
     mechanism itself.
 
-    One without such friction is returned as it is.
-
     Args:
         mechanism: The mechanism.
         speeds: Largest ones of the independent coordinates, (n_dof,), rad/s or m/s.

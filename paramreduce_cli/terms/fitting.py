@@ -171,7 +171,7 @@ class Fitting:
         """Fit the parameters.
 
         Args:
-            pruning: Of the program.
+            pruning: Pruning of the program.
             beta: Values to start from, for the mass matrices that accelerations are found with.
             looks: How often these are found anew.
         """

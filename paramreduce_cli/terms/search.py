@@ -96,7 +96,7 @@ class TermSearch:
         """Put back as many terms as errors need to be within the budget, if that is enough.
 
         Args:
-            pruning: Of the program.
+            pruning: Pruning of the program.
             beta: Values to start from.
         """
         fit = self._fitting.fit(pruning, beta, looks=2)

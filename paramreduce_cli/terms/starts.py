@@ -34,7 +34,7 @@ class Start:
     """In which it is written, none for whichever is the leanest."""
 
     def build_program(self, lean: LeanModels, *, direct: bool) -> Program:
-        """Return the program with all terms, not rewritten yet; its first inputs are the parameters of the model.
+        """Return the program with all terms; its first inputs are the parameters of the model.
 
         It is not rewritten yet, as its terms are not those that are left in the end.
         """
@@ -77,7 +77,7 @@ def order_by_promise(starts: list[Start], smallest: int) -> Iterator[Start]:
     What a larger subset has besides may cost little once terms are left out, and make up for these.
 
     Args:
-        starts: As :func:`starts_within` gives them.
+        starts: As :func:`list_starts` gives them.
         smallest: Parameters of those that are small enough.
     """
     sizes: dict[int, list[Start]] = defaultdict(list)

@@ -28,7 +28,7 @@ from paramreduce_cli.terms.pruning import (
 
 
 class Outputs(NamedTuple):
-    """Of a program, but for those that are known to be zero, as most entries of loops' mass matrices are."""
+    """The outputs of a program without those that are always zero, as most entries of loops' mass matrices are."""
 
     values: FloatArray
     """(k, n_samples)"""
@@ -122,7 +122,7 @@ class Tape:
         """Of nodes, (n_nodes, n_samples); zero where they are left out, or not asked for.
 
         Args:
-            pruning: Of the program.
+            pruning: Pruning of the program.
             inputs: By position, (n_inputs, n_samples).
             which: Nodes that are asked for, with all that they are made of, (n_nodes,).
         """
@@ -141,7 +141,7 @@ class Tape:
         """What nodes would be if they were kept as they are, (n_nodes, n_samples).
 
         Args:
-            pruning: Of the program.
+            pruning: Pruning of the program.
             inputs: By position, (n_inputs, n_samples).
             values: Of all nodes.
         """
@@ -154,7 +154,7 @@ class Tape:
         """Derivatives of quantities that are linear in the outputs, by nodes.
 
         Args:
-            pruning: Of the program.
+            pruning: Pruning of the program.
             values: Of the nodes.
             seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
             which: Nodes that are asked for, with all that is made of them, (n_nodes,).

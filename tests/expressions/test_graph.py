@@ -36,7 +36,9 @@ def test_a_program_builds_the_same_graph_again(made):
     program = Program.from_graph(graph, outputs)
     again = Graph()
     rebuilt = program.rebuild(again)
-    assert again.count_operations(rebuilt) <= graph.count_operations(outputs) == program.n_operations
+    assert (
+        again.count_operations(rebuilt) <= graph.count_operations(outputs) == program.n_operations
+    )
     np.testing.assert_allclose(
         evaluated(again, rebuilt), evaluated(graph, outputs), rtol=1e-9, atol=1e-9
     )
