@@ -21,7 +21,7 @@ from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import DataError, ParamreduceError
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import exported_model
+from paramreduce_cli.export.writing import make_exported_model
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     FloatArray,
@@ -41,7 +41,7 @@ from paramreduce_cli.records import (
 from paramreduce_cli.reduction.models import make_base_model as base_model
 from paramreduce_cli.reduction.models import make_full_model as full_model
 from paramreduce_cli.reduction.models import make_reduced_model
-from paramreduce_cli.report.data_frames import frame
+from paramreduce_cli.report.data_frames import make_data_frame as frame
 from paramreduce_cli.running.in_memory import run_in_memory
 from paramreduce_cli.running.pipeline import find_maker, list_stages_to_run
 from paramreduce_cli.running.runner import Callbacks, Runner, format_arguments, make_provenance
@@ -72,10 +72,10 @@ __all__ = [
 
 
 def load_config(path: Path | str, overrides: Sequence[str] = ()) -> Config:
-    """Read a robot's YAML.
+    """Return the config of a robot from its YAML file.
 
     Args:
-        path: The file.
+        path: YAML file.
         overrides: ``key.key=value`` texts that replace what the file says.
 
     Raises:
@@ -93,7 +93,7 @@ def build_model(config: Config) -> Model:
     Raises:
         ParamreduceError: The config describes no mechanism that can be.
     """
-    return _made(Model, config)
+    return _run_stage(Model, config)
 
 
 def optimize_trajectories(config: Config, model: Model, *, jobs: int = 0) -> Trajectories:
@@ -105,12 +105,12 @@ def optimize_trajectories(config: Config, model: Model, *, jobs: int = 0) -> Tra
         jobs: Worker processes, which a script starts below ``if __name__ == "__main__":`` alone; 0 for none. The numbers
             do not depend on them.
     """
-    return _made(Trajectories, config, model, jobs=jobs)
+    return _run_stage(Trajectories, config, model, jobs=jobs)
 
 
 def process_log(config: Config, model: Model) -> MeasuredLog:
     """Make the logs ready that ``sampling.log`` names."""
-    return _made(MeasuredLog, config, model)
+    return _run_stage(MeasuredLog, config, model)
 
 
 def sample(
@@ -126,7 +126,7 @@ def sample(
     Returns:
         Sets that are computed block by block whenever they are read.
     """
-    return _made(Samples, config, model, source)
+    return _run_stage(Samples, config, model, source)
 
 
 def reduce(
@@ -140,14 +140,14 @@ def reduce(
         model: Of the robot, for criteria that need one.
         jobs: Threads of proofs.
     """
-    return _made(Reduction, config or Settings(), samples, model, jobs=jobs)
+    return _run_stage(Reduction, config or Settings(), samples, model, jobs=jobs)
 
 
 def reduce_terms(
     config: Config, model: Model, samples: Samples, reduction: Reduction, *, jobs: int = 0
 ) -> TermReduction:
     """Leave terms out of the functions of reduced models, and fit what is left."""
-    return _made(TermReduction, config, model, samples, reduction, jobs=jobs)
+    return _run_stage(TermReduction, config, model, samples, reduction, jobs=jobs)
 
 
 def validate(
@@ -169,7 +169,7 @@ def validate(
             the operations of hundreds of models; then a script has its code under
             ``if __name__ == "__main__":``.
     """
-    return _made(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
+    return _run_stage(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
 
 
 def identify(
@@ -180,7 +180,7 @@ def identify(
     log: MeasuredLog | None = None,
 ) -> Identification:
     """Identify base parameters and those of the selected model from measured torques."""
-    return _made(Identification, config, model, samples, validation, log)
+    return _run_stage(Identification, config, model, samples, validation, log)
 
 
 def make_report(
@@ -214,19 +214,19 @@ def make_report(
         *more,
         make_provenance(wanted, robot, {}, {}, ""),
     )
-    return _made(Report, wanted, *records)
+    return _run_stage(Report, wanted, *records)
 
 
 def chosen(
     reduction: Reduction, heuristic: str, n: int, model: Model | None = None
 ) -> ReducedModel:
-    """A reduced model by heuristic and size.
+    """Return a reduced model by heuristic and size.
 
     Args:
         reduction: From :func:`reduce`.
-        heuristic: Such as ``swap`` or ``swap@operations``.
+        heuristic: Name of the heuristic, such as ``swap`` or ``swap@operations``.
         n: Number of parameters.
-        model: Of the robot, whose values order what the parameters stand for.
+        model: Model of the robot, whose values order the expressions of the parameters.
 
     Raises:
         KeyError: There is no such model.
@@ -247,13 +247,13 @@ def code(
     single: bool = False,
     validation: Validation | None = None,
 ) -> dict[str, bytes]:
-    """Files of a model in some language, checked against plain recursion.
+    """Return the files of a model in some language, checked against textbook recursion.
 
     Args:
-        model: Of the robot.
-        parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
-        language: c, casadi, latex, matlab or python.
-        title: What the model is called in the files; how many parameters it has if empty.
+        model: Model of the robot.
+        parameters: Model from :func:`chosen`, :func:`full_model` or :func:`base_model`.
+        language: Language: c, casadi, latex, matlab or python.
+        title: Title of the model in the files; the number of its parameters if empty.
         constant: Whether the values are part of the code.
         single: Whether numbers have single precision, in C.
         validation: Says in which ranges errors were measured.
@@ -261,7 +261,7 @@ def code(
     Raises:
         ParamreduceError: The functions do not compute what the straightforward model does.
     """
-    exported = exported_model(
+    exported = make_exported_model(
         model, parameters, title=title or f"{parameters.n} parameters",
         constant=constant, single=single, origin="from Python", validation=validation,
     )  # fmt: skip
@@ -272,11 +272,11 @@ def code(
 def inverse_dynamics(
     model: Model, parameters: ReducedModel
 ) -> Callable[[FloatArray, FloatArray, FloatArray], FloatArray]:
-    """Torques of a model as a function of a motion.
+    """Return the torques of a model as a function of a motion.
 
     Args:
-        model: Of the robot.
-        parameters: From :func:`chosen`, :func:`full_model` or :func:`base_model`.
+        model: Model of the robot.
+        parameters: Model from :func:`chosen`, :func:`full_model` or :func:`base_model`.
 
     Returns:
         A function of q, dq, ddq, (n_samples, n_q) each, rad or m and their rates, that gives
@@ -338,7 +338,7 @@ def run(
 
 
 def open_results(folder: Path | str) -> Results:
-    """What a results folder holds."""
+    """Return the records of a results folder, loaded when they are first asked for."""
     return Results(Path(folder))
 
 
@@ -355,12 +355,12 @@ class Results:
 
     @cached_property
     def model(self) -> Model:
-        """The robot's model."""
+        """Model of the robot."""
         return self._record(Model)
 
     @cached_property
     def trajectories(self) -> Trajectories:
-        """Of both sets."""
+        """Trajectories of all sets."""
         return self._record(Trajectories)
 
     @cached_property
@@ -375,7 +375,7 @@ class Results:
 
     @cached_property
     def validation(self) -> Validation:
-        """What they are worth, and the selected one."""
+        """Errors and costs of all models, and the selected model."""
         return self._record(Validation)
 
     @cached_property
@@ -392,7 +392,8 @@ class Results:
         return load_file(Store(self.folder).get_path(kind), kind, None, find_maker(kind).name)[0]
 
 
-def _made(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
+def _run_stage(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
+    """Run the stage that makes a kind of record."""
     stage = find_maker(kind)
     if not isinstance(config, Config | Settings):
         raise TypeError(

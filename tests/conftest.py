@@ -146,7 +146,7 @@ def figures_not_drawn(request, monkeypatch):
         return
     from paramreduce_cli.report import rendering
 
-    draw = rendering.rendered
+    draw = rendering.render_figures
 
     def rendered(names, data, formats, **how):
         if Wanted.figures:
@@ -210,7 +210,7 @@ def formulations_as_searches_begin():
 
     Tests of the leanest ones ask for ``searched_formulations``.
     """
-    search = formulations_module._best
+    search = formulations_module._run_chain
 
     def best(mechanism, asked):
         if Wanted.formulations:
@@ -218,7 +218,7 @@ def formulations_as_searches_begin():
         return [tuple(asked.start) for _ in asked.dropped]
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(formulations_module, "_best", best)
+        patch.setattr(formulations_module, "_run_chain", best)
         yield
 
 

@@ -21,9 +21,9 @@ from paramreduce_cli.cli import cli
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import get_schema
 from paramreduce_cli.config.terms import TermsSection
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import find_chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import exported_model
+from paramreduce_cli.export.writing import make_exported_model
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.running.sweep import SweepSection
 
@@ -161,8 +161,8 @@ def test_every_command_on_any_page_can_be_called(tmp_path, monkeypatch):
 def test_calls_of_exported_c_compile(tmp_path):
     """Those that the docs show, of another robot with loops."""
     model = model_of("four_bar")
-    chosen, title = chosen_model("full", model, None, None)
-    for name, content in languages["c"](exported_model(model, chosen, title=title)).items():
+    chosen, title = find_chosen_model("full", model, None, None)
+    for name, content in languages["c"](make_exported_model(model, chosen, title=title)).items():
         (tmp_path / name).write_bytes(content)
     (text,) = (text for _, text in blocks("c"))
     arrays = ["phi", "z", "q", "dq", "ddq", "dz", "ddz", "R", "b", "tau", "M", "delta"]

@@ -14,7 +14,7 @@ from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.registry import Registry, list_names
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.sections import place_of
+from paramreduce_cli.report.sections import get_place
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.stages import stages
 
@@ -49,8 +49,8 @@ def test_names_are_listed_without_importing(room):
 
 @pytest.mark.parametrize("name", [*figures, *tables])
 def test_figures_and_tables_have_places_of_their_own(name):
-    place = place_of(figures[name] if name in figures else tables[name])
-    others = [place_of(f) for r in (figures, tables) for _, f in r.items()]
+    place = get_place(figures[name] if name in figures else tables[name])
+    others = [get_place(f) for r in (figures, tables) for _, f in r.items()]
     assert [(p.section, p.order) for p in others].count((place.section, place.order)) == 1
 
 

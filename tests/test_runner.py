@@ -81,7 +81,7 @@ def test_a_kill_ends_more_than_a_search_for_proofs(two_link_copy, monkeypatch):
     runner = Runner(
         config_of("two_link"),
         Store(two_link_copy),
-        callbacks=Callbacks(interrupted=interruption.heeded),
+        callbacks=Callbacks(interrupted=interruption.clear),
     )
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])
@@ -145,7 +145,7 @@ def test_what_a_swallowed_interruption_may_have_spoilt_is_not_written(two_link_c
     runner = Runner(
         config_of("two_link"),
         Store(two_link_copy),
-        callbacks=Callbacks(interrupted=interruption.heeded, check=interruption.check),
+        callbacks=Callbacks(interrupted=interruption.clear, check=interruption.check),
     )
     with pytest.raises(KeyboardInterrupt):
         runner.run(STAGES["reduce"])

@@ -21,8 +21,8 @@ from paramreduce_cli.cli.suggestions import (
     suggest_after_usage_error,
 )
 from paramreduce_cli.cli.terminal import (
-    complain,
     interruption,
+    print_error,
     say,
     show_errors,
     show_start,
@@ -47,14 +47,14 @@ def main() -> None:
     except ParamreduceError as error:
         show_errors(describe_error(error, _call()))
         if further := _suggest(suggest_after_error, error):
-            complain(further)
+            print_error(further)
         code = error.exit_code
     except click.ClickException as error:
         show_errors(describe_usage_error(error))
-        complain(_suggest(suggest_after_usage_error, error))
+        print_error(_suggest(suggest_after_usage_error, error))
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
-        complain(
+        print_error(
             "\nInterrupted. Finished stages are kept, and of the stage at work its finished trajectories, samples, proofs and "
             "functions. The same command does the rest."
         )
@@ -68,7 +68,7 @@ def main() -> None:
     except Exception as error:
         if os.environ.get("PARAMREDUCE_DEBUG"):
             raise
-        complain(
+        print_error(
             f"Error: something went wrong inside paramreduce ({type(error).__name__}: {error}). "
             "This is a bug; PARAMREDUCE_DEBUG=1 shows where."
         )

@@ -92,4 +92,4 @@ def make_store(config: Config | None, results: Path | None) -> Store:
 
 def make_callbacks(progress: Callable[[Progress], None]) -> Callbacks:
     """Return the functions that a run calls at the terminal."""
-    return Callbacks(progress, warn_user, interruption.heeded, interruption.check)
+    return Callbacks(progress, warn_user, interruption.clear, interruption.check)

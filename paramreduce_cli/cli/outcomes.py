@@ -1,6 +1,6 @@
 """What is said of stages that have run."""
 
-from paramreduce_cli.cli.terminal import complain, say
+from paramreduce_cli.cli.terminal import print_error, say
 from paramreduce_cli.running.runner import Outcome
 
 NOT_ACCEPTED = 1
@@ -15,7 +15,7 @@ def say_outcome(outcome: Outcome) -> None:
 def say_verdict(accepted: bool | None, verdict: str, quiet: bool) -> int:
     """Say whether the selected model is accepted; returns the exit code."""
     if accepted is False:
-        complain(f"Not accepted: {verdict}")
+        print_error(f"Not accepted: {verdict}")
         return NOT_ACCEPTED
     if not quiet:
         say(verdict)

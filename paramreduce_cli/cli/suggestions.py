@@ -61,7 +61,9 @@ class UnknownCommandError(click.UsageError):
 
 def describe_error(error: ParamreduceError, call: Call) -> str:
     """Return the message of an error, whose commands have the arguments of the call."""
-    return error.describe(_own_arguments(call.words) or _usual_config(error.rejected) or "CONFIG")
+    return error.describe(
+        _keep_config_arguments(call.words) or _guess_config(error.rejected) or "CONFIG"
+    )
 
 
 def suggest_after_error(error: ParamreduceError, call: Call) -> str:
@@ -84,8 +86,8 @@ def suggest_after_usage_error(error: click.ClickException, call: Call) -> str:
     words = list(call.words)
     meant = ""
     if isinstance(error, click.NoSuchOption) and call.command is not None:
-        option = _meant_option(error.option_name, call.command, words)
-        changed = [_with_option(word, error.option_name, option) for word in words if option]
+        option = _find_option(error.option_name, call.command, words)
+        changed = [_replace_option(word, error.option_name, option) for word in words if option]
         meant = _format_call(changed) if option else ""
     elif isinstance(error, click.MissingParameter) and _is_config(error.param):
         meant = _insert_config(words)
@@ -159,11 +161,11 @@ def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
     if word == words[0]:
         return None if config is None or len(words) > 1 else ["run", str(config)]
     if words[0] in (*stages, *_OF_CONFIGS):
-        return None if config is None else _exchanged(words, word, str(config))
+        return None if config is None else _exchange_word(words, word, str(config))
     if words[0] not in _OF_RESULTS:
         return None
     if results is not None and results.resolve() != Path(word).resolve():
-        return _exchanged(words, word, str(results))
+        return _exchange_word(words, word, str(results))
     return None if config is None else ["run", str(config)]
 
 
@@ -173,7 +175,7 @@ def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
         return None
     here = {path.stem: path for path in list_configs(Path())}
     near = difflib.get_close_matches(word, here, n=1, cutoff=_LIKE_ROBOT)
-    return _exchanged(words, word, str(here[near[0]])) if near else None
+    return _exchange_word(words, word, str(here[near[0]])) if near else None
 
 
 def _suggest_example(word: str) -> str:
@@ -187,9 +189,11 @@ def _suggest_example(word: str) -> str:
 def _correct_call(error: ParamreduceError, words: list[str]) -> list[str] | None:
     """Return the call with a choice or an option of the error; None where the error has none."""
     if error.choices:
-        return _exchanged(words, error.rejected, find_nearest_choice(error.rejected, error.choices))
+        return _exchange_word(
+            words, error.rejected, find_nearest_choice(error.rejected, error.choices)
+        )
     if error.options:
-        return _exchanged(words, error.rejected, error.options[-1]) or [*words, *error.options]
+        return _exchange_word(words, error.rejected, error.options[-1]) or [*words, *error.options]
     if error.rejected.startswith("results/") and (config := guess_config(error.rejected)):
         return ["run", str(config)]
     return words if isinstance(error, ConfigError) and error.in_file else None
@@ -232,7 +236,7 @@ def _limit_to_range(choice: str, number: str) -> str:
     return f"{name}:{min(known, key=lambda one: abs(one - wanted))}"
 
 
-def _exchanged(words: Sequence[str], one: str, other: str) -> list[str] | None:
+def _exchange_word(words: Sequence[str], one: str, other: str) -> list[str] | None:
     """Return the words with another word, or another value after ``--option=``; None where it is not there."""
     changed = []
     for word in words:
@@ -242,7 +246,7 @@ def _exchanged(words: Sequence[str], one: str, other: str) -> list[str] | None:
     return changed if changed != list(words) else None
 
 
-def _meant_option(name: str, command: click.Command, words: Sequence[str]) -> str | None:
+def _find_option(name: str, command: click.Command, words: Sequence[str]) -> str | None:
     """Return the option that takes the value, is spelt alike, or begins with the one letter that was typed."""
     taken = [parameter for parameter in command.params if isinstance(parameter, click.Option)]
     value = " ".join(words).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
@@ -257,13 +261,13 @@ def _meant_option(name: str, command: click.Command, words: Sequence[str]) -> st
     return near[0] if near else None
 
 
-def _with_option(word: str, name: str, meant: str | None) -> str:
+def _replace_option(word: str, name: str, meant: str | None) -> str:
     """Return a word, which may be joined to its value, with the option that is meant."""
     option, equals, value = word.partition("=")
     return f"{meant}{equals}{value}" if option == name else word
 
 
-def _usual_config(rejected: str) -> str:
+def _guess_config(rejected: str) -> str:
     """Return the config of the results in which a rejected file is; empty if there is none."""
     path = Path(rejected)
     if path.suffix not in (".h5", ".json", ".html"):
@@ -272,7 +276,7 @@ def _usual_config(rejected: str) -> str:
     return "" if config is None else shlex.quote(str(config))
 
 
-def _own_arguments(words: Sequence[str]) -> str:
+def _keep_config_arguments(words: Sequence[str]) -> str:
     """Return the config of a call, and the options that change it or say where its results are."""
     kept: list[str] = []
     following = False

@@ -107,7 +107,7 @@ VERBOSE = click.option(
 def say(message: str) -> None:
     """Print to standard output, without markup."""
     journal.note(message)
-    out.print(harmless(message), markup=False)
+    out.print(escape_controls(message), markup=False)
 
 
 def say_table(table: rich.table.Table, least: int = 0) -> None:
@@ -123,10 +123,10 @@ def say_table(table: rich.table.Table, least: int = 0) -> None:
     out.print(table, width=max(out.width, least))
 
 
-def complain(message: str) -> None:
+def print_error(message: str) -> None:
     """Print to standard error, without markup."""
     journal.note(message)
-    err.print(harmless(message), markup=False)
+    err.print(escape_controls(message), markup=False)
 
 
 def emit(**event: Any) -> None:
@@ -141,20 +141,20 @@ _STEERS = re.compile(r"[\x00-\x08\x0b-\x1f\x7f-\x9f\u200e\u200f\u202a-\u202e\u20
 """Control characters but for tabs and new lines, and those that turn the direction of text."""
 
 
-def harmless(text: str) -> str:
-    """A text in which what would steer a terminal is spelled out; names in files may hold it."""
+def escape_controls(text: str) -> str:
+    """Return a text with control sequences spelled out; names in files may hold them."""
     return _STEERS.sub(lambda found: ascii(found[0])[1:-1], text)
 
 
 def show_errors(text: str) -> None:
     """Print each line of an error's message."""
     for line in text.splitlines():
-        complain(f"Error: {line}")
+        print_error(f"Error: {line}")
 
 
 def warn_user(message: str) -> None:
     """Tell the user something that does not stop the work."""
-    complain(f"Warning: {message}{'' if message.endswith('?') else '.'}")
+    print_error(f"Warning: {message}{'' if message.endswith('?') else '.'}")
 
 
 def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
@@ -164,7 +164,7 @@ def show_warning(message: Warning | str, category: type[Warning], *_: Any, **__:
 
 
 class Interruption:
-    """Ctrl-C, or a polite kill, that cannot get lost.
+    """A Ctrl-C or SIGTERM that cannot get lost.
 
     A KeyboardInterrupt raised while a library calls back into Python may be swallowed there;
     it is remembered and raised again at the next step of the work.
@@ -180,12 +180,13 @@ class Interruption:
         sys.unraisablehook = _show_unraisable
 
     def _note(self, number: int, _: object) -> None:
+        """Remember the signal and raise KeyboardInterrupt."""
         if self._met != signal.SIGTERM:  # after a kill nothing is a wish to go on
             self._met = number
         raise KeyboardInterrupt
 
-    def heeded(self) -> None:
-        """Go on after a Ctrl-C that has ended a search, not the work.
+    def clear(self) -> None:
+        """Forget a Ctrl-C that has ended a search, not the work.
 
         Raises:
             KeyboardInterrupt: It was a kill, which asks for an end of all.
@@ -223,7 +224,7 @@ def show_progress(
     Yields:
         The progress callback.
     """
-    with _shown_progress(label, quiet, as_json) as show:
+    with _choose_progress(label, quiet, as_json) as show:
 
         def step(p: Progress) -> None:
             show(p)
@@ -234,22 +235,25 @@ def show_progress(
 
 
 @contextmanager
-def _shown_progress(label: str, quiet: bool, as_json: bool) -> Iterator[Callable[[Progress], None]]:
+def _choose_progress(
+    label: str, quiet: bool, as_json: bool
+) -> Iterator[Callable[[Progress], None]]:
+    """Yield the progress callback for the terminal, for files and for --json."""
     if as_json:
         yield _Lines(1.0, lambda p, left: emit(event="progress", **vars(p), left=left)).show
     elif quiet:
         yield lambda _: None
     elif journal.verbose:
-        yield _Lines(0.0, lambda p, left: complain(_plain_line(p, left))).show
+        yield _Lines(0.0, lambda p, left: print_error(_format_line(p, left))).show
     elif not err.is_terminal:
-        yield _PacedLines(lambda p, left: complain(f"{label}: {_plain_line(p, left)}")).show
+        yield _PacedLines(lambda p, left: print_error(f"{label}: {_format_line(p, left)}")).show
     else:
-        with _moving_line(label) as show:
+        with _show_line(label) as show:
             yield show
 
 
 @contextmanager
-def _moving_line(label: str) -> Iterator[Callable[[Progress], None]]:
+def _show_line(label: str) -> Iterator[Callable[[Progress], None]]:
     """Show one line on a terminal: the task at hand and the seconds that it still takes; the line vanishes at the end."""
     columns = (
         rich.progress.SpinnerColumn(),
@@ -282,10 +286,10 @@ def show_start(name: str) -> Iterator[None]:
 
 
 class _PacedLines:
-    """Lines of progress, one every ten seconds.
+    """A printer of progress with one line every ten seconds.
 
     Args:
-        tell: Given a step and the seconds that are left for its task; None where that cannot be told.
+        tell: Callback with a step and the seconds that are left for its task, None where that is unknown.
     """
 
     _PAUSE = 10.0
@@ -301,10 +305,10 @@ class _PacedLines:
         begun = self._begun.setdefault(p.task, now)
         if now - self._told >= self._PAUSE and p.done < p.total:
             self._told = now
-            self._tell(p, _seconds_left(p, now - begun))
+            self._tell(p, _estimate_seconds_left(p, now - begun))
 
 
-def _seconds_left(p: Progress, passed: float) -> float | None:
+def _estimate_seconds_left(p: Progress, passed: float) -> float | None:
     """Return the seconds that a task still takes, None where that cannot be told."""
     share = p.done / p.total if p.total else 1.0
     return passed * (1 - share) / share if 0 < share < 1 else None
@@ -315,11 +319,11 @@ _FIRST_PAUSE = 2.0
 
 
 class _Lines:
-    """Progress as lines, not too often; the end of a task unless it was brief and says nothing.
+    """A printer of progress as lines; the end of a task is printed unless the task was brief.
 
     Args:
-        pause: Between two lines of a task, s.
-        tell: Given a step and the time that is left, s; None where that cannot be told.
+        pause: Time between two lines of a task, s.
+        tell: Callback with a step and the seconds that are left, None where that is unknown.
     """
 
     def __init__(self, pause: float, tell: Callable[[Progress, float | None], None]) -> None:
@@ -344,10 +348,11 @@ class _Lines:
                 return
         else:
             self._told[p.task] = now
-        self._tell(p, _seconds_left(p, now - begun))
+        self._tell(p, _estimate_seconds_left(p, now - begun))
 
 
-def _plain_line(p: Progress, left: float | None) -> str:
+def _format_line(p: Progress, left: float | None) -> str:
+    """Return a step of progress as text."""
     share = f"{100 * p.done / p.total:.0f} %" if p.total == 1 else f"{p.done:.4g} of {p.total:.4g}"
     state = "done" if p.done >= p.total else share if p.done else "begun"
     rest = f", about {left:.0f} s left" if left is not None and left >= 1 else ""

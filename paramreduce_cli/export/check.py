@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.export.term_sizes import entry_sizes
+from paramreduce_cli.export.term_sizes import find_entry_sizes
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean.checking import TOLERANCE, refuse_if_off
@@ -18,14 +18,14 @@ _GUESS = 0.01
 """How far off the guesses of the position problem are in the self-test, rad or m."""
 
 
-def random_cases(
+def make_random_cases(
     mechanism: Mechanism,
     model: ReducedModel,
     count: int,
     rng: np.random.Generator,
     simplified: TermModel | None = None,
 ) -> dict[str, FloatArray]:
-    """Random states with the results of plain recursion, by the names of the functions' arrays.
+    """Return random states and the results of textbook recursion, by the names of the functions' arrays.
 
     Where terms were left out, results are those of the simplified program, which plain recursion does
     not know; states are inside the ranges that it holds in, those of loops anywhere.
@@ -57,7 +57,7 @@ def random_cases(
         "K": K @ expansion,
     }
     if mechanism.loops is None:
-        return result | _simplified(simplified, result, np.eye(mechanism.n_q)[None])
+        return result | _evaluate_pruned(simplified, result, np.eye(mechanism.n_q)[None])
     dependent, independent = list(mechanism.dependent), list(mechanism.independent)
     R = Coordinates(mechanism, once=True).compute_tangent(q)[:, dependent]
     b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
@@ -68,13 +68,13 @@ def random_cases(
     tangent = np.zeros((count, mechanism.n_q, mechanism.n_dof))
     tangent[:, dependent] = R
     tangent[:, independent] = np.eye(mechanism.n_dof)
-    return result | loops | _simplified(simplified, result | loops, tangent)
+    return result | loops | _evaluate_pruned(simplified, result | loops, tangent)
 
 
-def _simplified(
+def _evaluate_pruned(
     simplified: TermModel | None, stored: Mapping[str, FloatArray], tangent: FloatArray
 ) -> dict[str, FloatArray]:
-    """Results of a function with terms left out, projected on the independent coordinates."""
+    """Return the results of a function with pruned terms, projected on the independent coordinates."""
     if simplified is None:
         return {}
     count = len(stored["q"])
@@ -120,9 +120,9 @@ def check(
         FormulationError: They are not the same.
     """
     for function in functions:
-        for name, got in _evaluated(function, stored).items():
+        for name, got in _evaluate_function(function, stored).items():
             wanted = stored[name].reshape(got.shape)
-            sizes = entry_sizes(name, wanted, least[name])
+            sizes = find_entry_sizes(name, wanted, least[name])
             refuse_if_off(f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance)
 
 
@@ -141,14 +141,15 @@ def check_against_mechanism(
     """
     plain = Dynamics(model.mechanism, once=True)
     wanted = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
-    off = (stored["tau"] - wanted) / entry_sizes("tau", wanted, least["tau"])
+    off = (stored["tau"] - wanted) / find_entry_sizes("tau", wanted, least["tau"])
     refuse_if_off("the full model", off, np.ones(1))
 
 
-def single_precision_errors(
+def measure_single_precision(
     functions: tuple[Function, ...], stored: Mapping[str, FloatArray], least: Mapping[str, float]
 ) -> dict[str, float]:
-    """What single precision costs: the largest error of each result, a share of its largest value.
+    """Return the largest rounding error of each result in single precision, relative to the largest value of the
+    result.
 
     That is with NumPy's sines and without contraction; compiled code has been found 1.5 times as far off.
 
@@ -164,7 +165,7 @@ def single_precision_errors(
             / max(np.abs(stored[name]).max(), least[name])
         )
         for function in functions
-        for name, got in _evaluated(function, rounded).items()
+        for name, got in _evaluate_function(function, rounded).items()
     }
 
 
@@ -183,7 +184,7 @@ def check_closures(
     """
     values: dict[str, FloatArray] = {}
     for function in closures:
-        values |= _evaluated(function, stored)
+        values |= _evaluate_function(function, stored)
     along = values["Phi_d"] @ stored["R"]
     drift = np.einsum("kij,kj->ki", values["Phi_d"], stored["b"])
     for what, off, name, against in (
@@ -191,11 +192,13 @@ def check_closures(
         ("closure_jacobian", along + values["Phi_z"], "Phi_z", along),
         ("closure_bias", drift - values["gamma"], "gamma", drift),
     ):
-        refuse_if_off(what, off / entry_sizes(name, against, least[name]), np.ones(1))
+        refuse_if_off(what, off / find_entry_sizes(name, against, least[name]), np.ones(1))
 
 
-def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str, FloatArray]:
-    """Results of a function for stored arguments, (n_states, ...) by name."""
+def _evaluate_function(
+    function: Function, stored: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the results of a function for stored arguments, (n_states, ...) by name."""
     inputs = [
         column
         for argument in function.arguments
@@ -212,7 +215,7 @@ def _evaluated(function: Function, stored: Mapping[str, FloatArray]) -> dict[str
 
 
 def find_unsafe_mass_matrices(M: FloatArray) -> str:
-    """What is wrong with the mass matrices of random states; empty if nothing is."""
+    """Describe what is wrong with the mass matrices of random states; return an empty text if nothing is."""
     values = np.linalg.eigvalsh(M)
     bad = int(np.sum(values[:, 0] <= SINGULAR_MASS * np.abs(values).max()))
     if not bad:

@@ -28,21 +28,21 @@ IDENTIFIED, CONSISTENT = "identified", "consistent"
 """From measured torques: all base parameters, and standard parameters that a machine can have."""
 
 
-def chosen_model(
+def find_chosen_model(
     text: str | None,
     model: Model | None,
     reduction: Reduction | None,
     validation: Validation | None,
     identification: Identification | None = None,
 ) -> tuple[ReducedModel, str]:
-    """The model that is asked for, and its title.
+    """Return the model that the user names, and its title.
 
     Args:
         text: ``full``, ``base``, ``identified``, ``consistent`` or ``HEURISTIC:N``; None for the selected one.
-        model: Of the robot; None of samples that were brought without one.
-        reduction: Where reduced models are; not needed for ``full`` and ``base``.
-        validation: Says which one is selected.
-        identification: Where identified models are; needed for these alone.
+        model: Model of the robot; None for user-supplied samples without one.
+        reduction: Reduced models; not needed for ``full`` and ``base``.
+        validation: Validation, which says which model is selected.
+        identification: Identified models; needed for these alone.
 
     Raises:
         ConfigError: There is none of that name.
@@ -53,7 +53,7 @@ def chosen_model(
         return make_base_model(model), "base parameters"
     if text in (IDENTIFIED, CONSISTENT) and model is not None:
         assert identification is not None
-        return _identified(text, model, identification)
+        return _make_identified_model(text, model, identification)
     assert reduction is not None
     if text is None:
         assert validation is not None
@@ -86,9 +86,10 @@ def chosen_model(
     return make_reduced_model(reduction, choice.heuristic, row, known), title
 
 
-def _identified(
+def _make_identified_model(
     text: str, model: Model, identification: Identification
 ) -> tuple[ReducedModel, str]:
+    """Return the identified or the physically consistent model, and its title."""
     if text == IDENTIFIED:
         found = identification.full
         chosen = make_base_model(model)
@@ -105,11 +106,11 @@ def _identified(
     return make_full_model(replace(model, values=consistency.standard)), worth
 
 
-def simplified_model(found: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:
-    """A function with terms left out: its parameters, itself and its title.
+def find_pruned_model(found: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:
+    """Return the parameters of a function with pruned terms, the function and its title.
 
     Args:
-        found: What was simplified.
+        found: Result of the search of terms.
         name: ``inverse`` or ``direct``.
 
     Raises:

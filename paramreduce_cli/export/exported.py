@@ -24,7 +24,7 @@ class ParameterValue:
 
 @dataclass(frozen=True)
 class ExportedModel:
-    """A model with all that its code says about it."""
+    """A reduced model with everything that its code says about it."""
 
     robot: str
     heading: tuple[str, ...]
@@ -59,8 +59,8 @@ class ExportedModel:
         known = set(self.independent.tolist())
         return tuple(k for k in range(len(self.coordinates)) if k not in known)
 
-    def sides(self, first: int = 0) -> dict[str, object]:
-        """Dependent and independent coordinates, for templates: positions counted from ``first``."""
+    def list_coordinates(self, first: int = 0) -> dict[str, object]:
+        """Return the positions of dependent and independent coordinates, counted from ``first``, for templates."""
         sides = {"dependent": list(self.dependent), "independent": self.independent.tolist()}
         numbers = {"n_d": len(self.dependent), "n_z": self.independent.size}
         shifted = {key: [k + first for k in some] for key, some in sides.items()}
@@ -68,11 +68,11 @@ class ExportedModel:
 
     @property
     def name(self) -> str:
-        """The robot's name as an identifier."""
-        return identifier(self.robot)
+        """Name of the robot as an identifier."""
+        return make_identifier(self.robot)
 
-    def sizes(self) -> dict[str, Argument]:
-        """All arrays of all functions, by name."""
+    def collect_arrays(self) -> dict[str, Argument]:
+        """Return all arguments and results of all functions, by name."""
         arrays = (a for f in (*self.functions, *self.closures) for a in (*f.arguments, *f.results))
         return {array.name: array for array in arrays}
 
@@ -104,56 +104,56 @@ _FITTED = (
 )
 
 
-def identifier(name: str) -> str:
-    """A name for files and Python's module, with which names in code begin."""
+def make_identifier(name: str) -> str:
+    """Return a name for files, for Python's module and as the prefix of names in code."""
     word = re.sub(r"[^A-Za-z0-9_]", "_", name)
     taken = keyword.iskeyword(word) or word in _TAKEN | sys.stdlib_module_names
     return word if re.match(r"[A-Za-z]", word) and not taken else f"robot_{word}"
 
 
-def plain(text: str) -> str:
-    """Text that cannot end a comment or a string: printable, without quotes, backslashes and */."""
+def make_harmless(text: str) -> str:
+    """Return text that cannot end a comment or a string: printable, without quotes, backslashes and */."""
     kept = "".join(c if c.isprintable() else " " for c in text)
     for bad, good in (("\\", "/"), ('"', "'"), ("*/", "* /"), ("/*", "/ *"), ("???", "? ? ?")):
         kept = kept.replace(bad, good)
     return kept
 
 
-def about(model: ExportedModel, first: int = 0) -> list[str]:
-    """The lines that open every file.
+def write_header(model: ExportedModel, first: int = 0) -> list[str]:
+    """Return the lines that open every file.
 
     Args:
-        model: What is exported.
-        first: What the language counts from.
+        model: Model that is exported.
+        first: Number that the language counts from, 0 or 1.
     """
-    lines = [plain(line) for line in model.heading]
+    lines = [make_harmless(line) for line in model.heading]
     lines += [
         "",
         "Coordinates, in this order; forces are in N m where they are in rad, in N where in m:",
     ]
-    lines += _listed(model, range(len(model.coordinates)), first)
+    lines += _list_coordinates(model, range(len(model.coordinates)), first)
     if model.closures:
         lines += ["", "Independent coordinates, in the order of z, dz, ddz, tau, M, delta and K:"]
-        lines += _listed(model, model.independent.tolist(), first)
+        lines += _list_coordinates(model, model.independent.tolist(), first)
         lines += ["", "Dependent coordinates, in the order of the rows of R and b:"]
-        lines += _listed(model, model.dependent, first)
+        lines += _list_coordinates(model, model.dependent, first)
     kind = "constants of the code" if model.constant else "in this order"
     explained = any(p.expression for p in model.parameters)
     lines += [
         "",
         "First moments and inertias are about the origin of their body's frame, in its axes. Frames:",
-        *(plain(line) for line in model.frames),
+        *(make_harmless(line) for line in model.frames),
         "",
         *(line.format(kind) for line in (_MADE_OF if explained else _FITTED)),
     ]
     for k, p in enumerate(model.parameters, first):
-        made_of = f", {plain(p.expression)}" if p.expression else ""
-        lines.append(f"  {k}: {plain(p.name)} = {p.value:.9g} {p.unit}{made_of}")
-    return [part for line in lines for part in wrapped(line)]
+        made_of = f", {make_harmless(p.expression)}" if p.expression else ""
+        lines.append(f"  {k}: {make_harmless(p.name)} = {p.value:.9g} {p.unit}{made_of}")
+    return [part for line in lines for part in wrap_line(line)]
 
 
-def wrapped(line: str) -> list[str]:
-    """A line in parts of a readable width, all but the first indented; signs and factors stay with their terms."""
+def wrap_line(line: str) -> list[str]:
+    """Split a line into parts of a readable width, all but the first indented; signs and factors stay with their terms."""
     if len(line) <= _WIDTH:
         return [line]
     together = re.sub(
@@ -166,8 +166,8 @@ def wrapped(line: str) -> list[str]:
     return [part.replace(_FIXED, " ") for part in parts]
 
 
-def _listed(model: ExportedModel, positions: Iterable[int], first: int) -> list[str]:
+def _list_coordinates(model: ExportedModel, positions: Iterable[int], first: int) -> list[str]:
     return [
-        f"  {k}: {plain(model.coordinates[i])}, {model.units[i]}"
+        f"  {k}: {make_harmless(model.coordinates[i])}, {model.units[i]}"
         for k, i in enumerate(positions, first)
     ]

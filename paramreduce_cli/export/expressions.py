@@ -12,7 +12,7 @@ FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sqrt", "atan2", "tanh
 
 @dataclass(frozen=True)
 class Language:
-    """How a language writes expressions."""
+    """A language with its way to write expressions."""
 
     calls: Mapping[str, str]
     """Its names of :data:`FUNCTIONS`."""
@@ -21,8 +21,8 @@ class Language:
     element: Callable[[Argument, int], str]
     """An element of an array, by its position row by row."""
 
-    def leaves(self, function: Function) -> dict[int, str]:
-        """Texts of constants and inputs, by node."""
+    def write_leaves(self, function: Function) -> dict[int, str]:
+        """Return the texts of constants and inputs, by node."""
         places = function.list_places(function.arguments)
         names = {}
         for number, node in enumerate(function.program.nodes):
@@ -32,9 +32,12 @@ class Language:
                 names[number] = self.element(*places[int(node.number)])
         return names
 
-    def expression(self, names: Mapping[int, str], node: Node) -> str:
-        """An operation on what has names."""
-        operation, operands = node.operation, [signed(names, value) for value in node.operands]
+    def write_expression(self, names: Mapping[int, str], node: Node) -> str:
+        """Return the text of an operation whose operands have names."""
+        operation, operands = (
+            node.operation,
+            [write_signed(names, value) for value in node.operands],
+        )
         if operation == "inv":
             return f"1 / {names[node.operands[0] >> 1]}"
         if operation in self.calls:
@@ -44,16 +47,16 @@ class Language:
             return f"{a} {operation} {b}"
         return f"{a} - {b[1:]}" if operation == "+" else f"{a} {operation} ({b})"
 
-    def body(self, function: Function) -> tuple[list[tuple[str, str]], list[str]]:
-        """Names and texts of the operations one after the other, and texts of the results."""
-        names = self.leaves(function)
+    def write_body(self, function: Function) -> tuple[list[tuple[str, str]], list[str]]:
+        """Return names and texts of the operations in order, and the texts of the results."""
+        names = self.write_leaves(function)
         lines = []
         for number, node in function.iterate_steps():
-            lines.append((f"t{number}", self.expression(names, node)))
+            lines.append((f"t{number}", self.write_expression(names, node)))
             names[number] = f"t{number}"
-        return lines, [signed(names, value) for value in function.program.outputs]
+        return lines, [write_signed(names, value) for value in function.program.outputs]
 
 
-def signed(names: Mapping[int, str], value: int) -> str:
-    """A signed reference as text."""
+def write_signed(names: Mapping[int, str], value: int) -> str:
+    """Return a signed reference as text."""
     return f"-{names[value >> 1]}" if value & 1 else names[value >> 1]

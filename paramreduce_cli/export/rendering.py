@@ -7,7 +7,9 @@ import jinja2
 
 
 @cache
-def _environment() -> jinja2.Environment:
+def _make_environment() -> jinja2.Environment:
+    """Return the environment that loads templates and rejects unknown names in them."""
+
     def load(name: str) -> str:
         return (files("paramreduce_cli.export") / "templates" / name).read_text(encoding="utf-8")
 
@@ -21,6 +23,6 @@ def _environment() -> jinja2.Environment:
     )
 
 
-def rendered(template: str, **context: object) -> str:
-    """A file from its template, by the template's name without ``.jinja``."""
-    return _environment().get_template(f"{template}.jinja").render(context)
+def render_template(template: str, **context: object) -> str:
+    """Return a file from its template, by the template's name without ``.jinja``."""
+    return _make_environment().get_template(f"{template}.jinja").render(context)

@@ -19,12 +19,14 @@ _SAME = 1e-9
 """By which frames may differ, m or without unit."""
 
 
-def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) -> dict[str, bytes]:
-    """The robot's own file with other parameters.
+def write_robot_file(
+    config: Config, model: Model, standard: FloatArray, kind: str
+) -> dict[str, bytes]:
+    """Return the robot's own file with other parameters.
 
     Args:
-        config: With the file that it was made from.
-        model: Of the robot.
+        config: Config that names the robot's file.
+        model: Model of the robot.
         standard: Standard parameters that are written, (n_parameters,).
         kind: One of :data:`paramreduce_cli.importing.formats.formats`, which the file must be of.
 
@@ -43,10 +45,10 @@ def robot_file(config: Config, model: Model, standard: FloatArray, kind: str) ->
     robot = read_robot(config.source)
     form = formats[kind]()
     _check_same(config, config.source, robot, gravity=form.holds_gravity)
-    bodies = _bodies(model.mechanism, standard)
+    bodies = _make_pseudo_inertias(model.mechanism, standard)
     _warn_of_losses(model.mechanism, standard, bodies, form)
-    inertials = {name: _inertial(name, body) for name, body in bodies.items()}
-    drives = _drives(model.mechanism, standard)
+    inertials = {name: _make_inertial(name, body) for name, body in bodies.items()}
+    drives = _sum_drives(model.mechanism, standard)
     return {file.name: form.write(file, robot, inertials, drives)}
 
 
@@ -73,8 +75,8 @@ def _check_same(
         )
 
 
-def _bodies(mechanism: Mechanism, standard: FloatArray) -> dict[str, FloatArray]:
-    """Pseudo-inertia matrices of the bodies with their payloads, (4, 4) each."""
+def _make_pseudo_inertias(mechanism: Mechanism, standard: FloatArray) -> dict[str, FloatArray]:
+    """Return the pseudo-inertia matrices of the bodies with their payloads, (4, 4) each."""
     result = {}
     for k, body in enumerate(mechanism.bodies):
         whole = np.zeros((4, 4))
@@ -85,7 +87,8 @@ def _bodies(mechanism: Mechanism, standard: FloatArray) -> dict[str, FloatArray]
     return result
 
 
-def _inertial(name: str, body: FloatArray) -> Inertial | None:
+def _make_inertial(name: str, body: FloatArray) -> Inertial | None:
+    """Return mass, centre of mass and inertia of a body; None if all are zero."""
     mass = float(body[3, 3])
     if not body.any():
         return None
@@ -98,8 +101,8 @@ def _inertial(name: str, body: FloatArray) -> Inertial | None:
     return Inertial(mass, com, np.trace(second) * np.eye(3) - second)
 
 
-def _drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
-    """What acts on the joint of each body, by the keys of a drive in a config.
+def _sum_drives(mechanism: Mechanism, standard: FloatArray) -> dict[str, dict[str, float]]:
+    """Return what acts on the joint of each body, by the keys of a drive in a config.
 
     Of drives along one coordinate, seen from that: with a weight w, inertia, friction and stiffness of
     a drive are w^2 times as large there, Coulomb friction w times.

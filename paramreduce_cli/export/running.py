@@ -9,7 +9,7 @@ import numpy as np
 
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import Exported, exported_model
+from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.functions import Argument
 from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed
@@ -41,7 +41,7 @@ class RunningModel:
         self._phi = np.ascontiguousarray(chosen.values)
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # nothing is simulated with it
-            exported = exported_model(model, chosen, title="", what=what)
+            exported = make_exported_model(model, chosen, title="", what=what)
         files: dict[str, bytes] = languages["c"](exported)
         (self._function,) = exported.functions
         stem = next(file[:-2] for file in files if file.endswith(".h"))
@@ -65,7 +65,7 @@ class RunningModel:
 
     @property
     def language(self) -> str:
-        """In which it runs."""
+        """Language that the functions run in."""
         return "C" if self._library is not None else "Python"
 
     def __call__(self, *states: FloatArray, rounds: int = 1) -> FloatArray:
@@ -94,8 +94,8 @@ class RunningModel:
         )
         return np.concatenate(results, axis=1)
 
-    def seconds(self, *states: FloatArray) -> float:
-        """Of one evaluation, mean over some states, s."""
+    def measure_time(self, *states: FloatArray) -> float:
+        """Return the mean time of one evaluation over some states, s."""
         self(*states)
         rounds = _ROUNDS if self._library is not None else 1
         started = time.perf_counter()
@@ -103,10 +103,12 @@ class RunningModel:
         return (time.perf_counter() - started) / rounds / len(states[0])
 
 
-def speed(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:
-    """How long models take on the same states, by the names of what :class:`RunningModel` takes."""
+def measure_speeds(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:
+    """Return how long models take on the same states, by the names of what :class:`RunningModel` takes."""
     # In turns, and the shortest: whatever else the machine does meets all of them alike.
     handed = {name: [states[key] for key in model.takes] for name, model in models.items()}
-    turns = [{name: m.seconds(*handed[name]) for name, m in models.items()} for _ in range(_TURNS)]
+    turns = [
+        {name: m.measure_time(*handed[name]) for name, m in models.items()} for _ in range(_TURNS)
+    ]
     least = {name: min(turn[name] for turn in turns) for name in models}
     return Speed(least, next(m.language for m in models.values()))

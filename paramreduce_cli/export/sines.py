@@ -47,18 +47,18 @@ SINGLE = Sines(
 )
 
 
-def polynomial(coefficients: Sequence[str]) -> str:
-    """A polynomial in w by even and odd powers, so that few operations wait for each other; w2 is the square of w.
+def write_polynomial(coefficients: Sequence[str]) -> str:
+    """Return a polynomial in w by even and odd powers, so that few operations wait for each other.
 
     Args:
-        coefficients: As they are written, constant term first.
+        coefficients: Coefficients as text, constant term first.
     """
-    even, odd = _nested(coefficients[::2]), _nested(coefficients[1::2])
+    even, odd = _write_horner(coefficients[::2]), _write_horner(coefficients[1::2])
     return f"{even} + w * {odd}"
 
 
-def _nested(coefficients: Sequence[str]) -> str:
-    """Horner's scheme in w2."""
+def _write_horner(coefficients: Sequence[str]) -> str:
+    """Return Horner's scheme in w2, the square of w, as text."""
     *lower, text = coefficients
     for one in reversed(lower):
         text = f"({one} + w2 * {text})"

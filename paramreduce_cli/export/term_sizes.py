@@ -33,8 +33,8 @@ def estimate_term_sizes(
     reach = mechanism.size + float(np.abs(stored["q"]).max())
     tangent = max(1.0, float(np.abs(stored["R"]).max())) if "R" in stored else 1.0
     fall = float(np.linalg.norm(mechanism.gravity)) + reach * change
-    moments = _by_kind(mechanism, reach * fall, fall, change) * tangent
-    inertias = _by_kind(mechanism, reach**2, reach, 1.0) * tangent**2
+    moments = _assign_by_kind(mechanism, reach * fall, fall, change) * tangent
+    inertias = _assign_by_kind(mechanism, reach**2, reach, 1.0) * tangent**2
     values = np.abs(model.standard)
     kept = moments[model.kept]
     sizes = {
@@ -52,15 +52,15 @@ def estimate_term_sizes(
     return {**least, "b": max(float(np.abs(stored["ddq"]).max()), _SMALLEST)}
 
 
-def _by_kind(mechanism: Mechanism, mass: float, moment: float, inertia: float) -> FloatArray:
+def _assign_by_kind(mechanism: Mechanism, mass: float, moment: float, inertia: float) -> FloatArray:
     """Assign a value to each inertial parameter by its kind, zero to those of drives, (n_parameters,)."""
     values = dict.fromkeys(INERTIAL, inertia)
     values |= {Kind.M: mass, Kind.MX: moment, Kind.MY: moment, Kind.MZ: moment}
     return np.array([values.get(parameter.kind, 0.0) for parameter in mechanism.parameters])
 
 
-def entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArray:
-    """Size by which each entry of a result is judged: of its joint, of all states.
+def find_entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArray:
+    """Return the size by which each entry of a result is judged.
 
     Args:
         name: Name of the result.

@@ -6,19 +6,21 @@ from paramreduce_cli.records import ErrorRange, FloatArray, Mechanism, TermModel
 from paramreduce_cli.texts import format_percent, format_percent_range
 
 
-def within(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
-    """Ranges of states, (3, n_dof) each, a line for every joint."""
+def describe_ranges(mechanism: Mechanism, lower: FloatArray, upper: FloatArray) -> list[str]:
+    """Describe ranges of states, (3, n_dof) each, in one line for every joint."""
     lines = []
     for j, name in enumerate(mechanism.coordinate_names):
         extremes = zip(lower[:, j], upper[:, j], strict=True)
         lines.append(
-            _state(mechanism, j, name, [f"{low:.4g} to {high:.4g}" for low, high in extremes])
+            _describe_state(
+                mechanism, j, name, [f"{low:.4g} to {high:.4g}" for low, high in extremes]
+            )
         )
     return lines
 
 
-def _state(mechanism: Mechanism, j: int, name: str, values: list[str]) -> str:
-    """Position, velocity and acceleration of a joint."""
+def _describe_state(mechanism: Mechanism, j: int, name: str, values: list[str]) -> str:
+    """Describe position, velocity and acceleration of a joint."""
     unit = mechanism.bodies[mechanism.independent[j]].unit
     position, velocity, acceleration = values
     return (
@@ -27,11 +29,11 @@ def _state(mechanism: Mechanism, j: int, name: str, values: list[str]) -> str:
     )
 
 
-def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
-    """Where a function with terms left out holds, how far it strays elsewhere, and where most."""
+def describe_validity(mechanism: Mechanism, term: TermModel) -> list[str]:
+    """Describe where a function with pruned terms holds, how far it deviates elsewhere, and where most."""
     lines = [
         "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are",
-        *within(mechanism, term.lower, term.upper),
+        *describe_ranges(mechanism, term.lower, term.upper),
     ]
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
     if known := " / ".join(format_percent(error) for error in errors if np.isfinite(error)):
@@ -44,7 +46,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     where = "both sets"
     if term.random_states or term.mass_states:
         lines.append("Random states inside the limits were looked at, with these ranges:")
-        lines += within(mechanism, *term.drawn)
+        lines += describe_ranges(mechanism, *term.drawn)
     if term.random_states:
         where = "these"
         lines.append(
@@ -59,7 +61,7 @@ def validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     worst = mechanism.coordinate_names[term.worst_joint]
     lines.append(f"The worst one, against the nominal torque, is that of {worst}, at")
     lines += [
-        _state(mechanism, j, name, [f"{value:.4g}" for value in term.worst_state[:, j]])
+        _describe_state(mechanism, j, name, [f"{value:.4g}" for value in term.worst_state[:, j]])
         for j, name in enumerate(mechanism.coordinate_names)
     ]
     if np.isfinite(term.smallest_eigenvalue):

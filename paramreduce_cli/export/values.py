@@ -3,28 +3,28 @@
 import json
 
 from paramreduce_cli import __version__
-from paramreduce_cli.export.validity import validity
+from paramreduce_cli.export.validity import describe_validity
 from paramreduce_cli.records import Mechanism, ReducedModel, TermModel
 
 VALUES = "values"
 """Name of the format, beside languages and robots' files."""
 
 
-def values_file(
+def write_values(
     chosen: ReducedModel,
     title: str,
     origin: str,
     mechanism: Mechanism | None = None,
     simplified: TermModel | None = None,
 ) -> dict[str, bytes]:
-    """The parameters that a model keeps, as JSON: in their order what they are called, worth, and stand for.
+    """Return the parameters that a model keeps as JSON: names, values and expressions, in their order.
 
     Args:
-        chosen: The model, with expressions.
-        title: What it is called.
-        origin: The artifact it is from, and its digest.
-        mechanism: Says units, coordinates and frames; None where there is none.
-        simplified: The function that they are of with terms left out; where it holds is said of a mechanism.
+        chosen: Reduced model with expressions.
+        title: Title of the model.
+        origin: Artifact that the model is from, and its digest.
+        mechanism: Mechanism, which gives units, coordinates and frames; None where there is none.
+        simplified: Function with pruned terms whose parameters these are.
     """
     found = zip(chosen.names, chosen.values.tolist(), chosen.expressions, strict=True)
     units = [] if mechanism is None else chosen.list_units(mechanism.parameters)
@@ -36,7 +36,7 @@ def values_file(
     }  # fmt: skip
     holds = {}
     if mechanism is not None and simplified is not None:
-        holds = {"holds": validity(mechanism, simplified)}
+        holds = {"holds": describe_validity(mechanism, simplified)}
     data = {
         "title": title,
         "from": origin,

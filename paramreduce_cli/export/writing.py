@@ -13,12 +13,12 @@ from paramreduce_cli.export.check import (
     check_against_mechanism,
     check_closures,
     find_unsafe_mass_matrices,
-    random_cases,
-    single_precision_errors,
+    make_random_cases,
+    measure_single_precision,
 )
 from paramreduce_cli.export.exported import ExportedModel, ParameterValue
 from paramreduce_cli.export.term_sizes import estimate_term_sizes
-from paramreduce_cli.export.validity import validity, within
+from paramreduce_cli.export.validity import describe_ranges, describe_validity
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.lean.functions import LeanFunctions
 from paramreduce_cli.records import (
@@ -44,7 +44,7 @@ _LOOPS = {"z", "dz", "ddz", "guess", "q", "dq", "ddq", "R", "b"}
 
 
 class Exported(StrEnum):
-    """Which functions are exported."""
+    """A selection of functions to export."""
 
     IDM = "idm"
     DDM = "ddm"
@@ -53,14 +53,14 @@ class Exported(StrEnum):
 
 
 _FUNCTIONS = {
-    Exported.IDM: ("inverse",),
-    Exported.DDM: ("direct",),
-    Exported.BOTH: ("inverse", "direct"),
-    Exported.REGRESSOR: ("regressor",),
+    Exported.IDM: (LeanFunctions.make_inverse,),
+    Exported.DDM: (LeanFunctions.make_direct,),
+    Exported.BOTH: (LeanFunctions.make_inverse, LeanFunctions.make_direct),
+    Exported.REGRESSOR: (LeanFunctions.make_regressor,),
 }
 
 
-def exported_model(
+def make_exported_model(
     model: Model,
     chosen: ReducedModel,
     *,
@@ -73,13 +73,13 @@ def exported_model(
     validation: Validation | None = None,
     tell: Tell = lambda _: None,
 ) -> ExportedModel:
-    """A model for :data:`paramreduce_cli.export.languages.languages` to write, its functions checked.
+    """Return a model for :data:`paramreduce_cli.export.languages.languages` to write, its functions checked.
 
     Args:
-        model: Of the robot.
-        chosen: The model that is exported, with expressions.
-        title: What it is called.
-        what: Which functions.
+        model: Model of the robot.
+        chosen: Reduced model to export, with expressions.
+        title: Title of the model.
+        what: Functions to export.
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
         origin: Of the model, for the comment that opens every file.
@@ -93,13 +93,13 @@ def exported_model(
     """
     mechanism = model.mechanism
     tell(Progress(_TASK, 0, 2, "functions"))
-    functions = exported_functions(model, chosen, what, constant=constant, simplified=simplified)
+    functions = make_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
     if mechanism.loops is not None:
-        closures = tuple(LeanFunctions(model, chosen, constant=constant).closures())
+        closures = tuple(LeanFunctions(model, chosen, constant=constant).make_closures())
     tell(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
-    checked = random_cases(mechanism, chosen, _CHECKED, rng, simplified)
+    checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified)
     least = estimate_term_sizes(mechanism, chosen, checked)
     check(functions, checked, least)
     whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
@@ -109,26 +109,26 @@ def exported_model(
         check_closures(closures, checked, least)
     unsafe = ""
     # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
-    if simplified is None and "direct" in _FUNCTIONS[what]:
+    if simplified is None and what in (Exported.DDM, Exported.BOTH):
         unsafe = find_unsafe_mass_matrices(checked["M"])
     if unsafe:
         warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
-    worth = _worth(model, unsafe, simplified, validation)
+    worth = _describe_accuracy(model, unsafe, simplified, validation)
     if single:
-        worth.append(_rounding(functions, checked, least))
+        worth.append(_describe_rounding(functions, checked, least))
     used = {a.name for f in functions for a in (*f.arguments, *f.results)}
     if mechanism.loops is not None:
         used |= _LOOPS
-    stored = random_cases(mechanism, chosen, _CASES, rng, simplified)
+    stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified)
     tell(Progress(_TASK, 2, 2))
     return ExportedModel(
         robot=mechanism.robot,
-        heading=(f"{mechanism.robot}: {title}.", *worth, *_made(mechanism, origin)),
-        frames=_frames(mechanism),
+        heading=(f"{mechanism.robot}: {title}.", *worth, *_describe_origin(mechanism, origin)),
+        frames=_describe_frames(mechanism),
         coordinates=mechanism.generalised_names,
         units=tuple(body.unit for body in mechanism.bodies),
         independent=np.array(mechanism.independent, dtype=np.int64),
-        parameters=_parameter_values(model, chosen),
+        parameters=_list_values(model, chosen),
         symbols=mechanism.symbols,
         constant=constant,
         functions=functions,
@@ -139,24 +139,24 @@ def exported_model(
     )
 
 
-def _worth(
+def _describe_accuracy(
     model: Model, unsafe: str, simplified: TermModel | None, validation: Validation | None
 ) -> list[str]:
-    """What a model is worth, and where it holds, line by line."""
+    """Describe how accurate a model is and where it holds, line by line."""
     lines = [f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []
     if model.unmeasured:
         names = ", ".join(model.unmeasured)
         lines.append(f"NOT PREDICTED, as not measured: the torques of {names}.")
     if validation is not None:
         lines.append("Errors were measured on motions within")
-        lines += within(model.mechanism, validation.lower, validation.upper)
+        lines += describe_ranges(model.mechanism, validation.lower, validation.upper)
     if simplified is not None:
-        lines += validity(model.mechanism, simplified)
+        lines += describe_validity(model.mechanism, simplified)
     return lines
 
 
-def _made(mechanism: Mechanism, origin: str) -> tuple[str, str]:
-    """Under what gravity it holds, and what made it."""
+def _describe_origin(mechanism: Mechanism, origin: str) -> tuple[str, str]:
+    """Return the gravity that the model holds under, and what made it."""
     gravity = " ".join(f"{g:.6g}" for g in mechanism.gravity)
     return (
         f"Gravity in the base frame, m/s^2: {gravity}",
@@ -164,30 +164,30 @@ def _made(mechanism: Mechanism, origin: str) -> tuple[str, str]:
     )
 
 
-def _rounding(
+def _describe_rounding(
     functions: tuple[Function, ...], checked: Mapping[str, FloatArray], least: Mapping[str, float]
 ) -> str:
-    """What single precision costs, on the states that the functions are checked on."""
-    errors = single_precision_errors(functions, checked, least)
+    """Describe the rounding error in single precision, on the states that the functions are checked on."""
+    errors = measure_single_precision(functions, checked, least)
     listed = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
     return f"Single precision, on {_CHECKED} random states off by about (of the largest): {listed}."
 
 
-def _frames(mechanism: Mechanism) -> tuple[str, ...]:
-    """The geometry of the config, line by line."""
+def _describe_frames(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the geometry of the config, line by line."""
     header, *rows = mechanism.table
     lines = Table(mechanism.frames, header, tuple(rows)).to_text().splitlines()
     return tuple(f"  {line}".rstrip() for line in lines if line)
 
 
-def _parameter_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
-    """Values with units."""
+def _list_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
+    """Return the values of the parameters with units."""
     units = chosen.list_units(model.mechanism.parameters)
     found = zip(chosen.names, chosen.values.tolist(), units, chosen.expressions, strict=True)
     return tuple(ParameterValue(*one) for one in found)
 
 
-def exported_functions(
+def make_functions(
     model: Model,
     chosen: ReducedModel,
     what: Exported,
@@ -195,14 +195,14 @@ def exported_functions(
     constant: bool = False,
     simplified: TermModel | None = None,
 ) -> tuple[Function, ...]:
-    """Functions of a model.
+    """Return the functions of a model.
 
     Args:
-        model: Of the robot.
-        chosen: The model.
-        what: Which functions.
+        model: Model of the robot.
+        chosen: Reduced model.
+        what: Functions to return.
         constant: Whether the values of the parameters are part of them.
-        simplified: The one function with terms left out.
+        simplified: The one function with pruned terms.
     """
     lean = LeanFunctions(model, chosen, constant=constant, simplified=simplified)
-    return tuple(getattr(lean, name)() for name in _FUNCTIONS[what])
+    return tuple(make(lean) for make in _FUNCTIONS[what])

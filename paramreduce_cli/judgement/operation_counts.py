@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from paramreduce_cli.lean.counting import Counts, count_all, structure
+from paramreduce_cli.lean.counting import Counts, count_all, digest_structure
 from paramreduce_cli.records import (
     CountedDynamics,
     HeuristicValidation,
@@ -41,7 +41,7 @@ class OperationCounts:
             for name, found in reduction.heuristics.items()
             for row, n in enumerate(found.n)
         }
-        self._structures = {key: structure(one, model) for key, one in self._models.items()}
+        self._structures = {key: digest_structure(one, model) for key, one in self._models.items()}
 
     @property
     def are_few(self) -> bool:

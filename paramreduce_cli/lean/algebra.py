@@ -15,8 +15,8 @@ _MOST = 1 << 12
 _remembering: list[Any] = []
 
 
-def remembered(function: F) -> F:
-    """A function of expressions that is worked out once for equal arguments.
+def cache_expressions(function: F) -> F:
+    """Return a function of expressions that is evaluated once for equal arguments.
 
     Formulations that are compared differ at one joint, and most of what they need is the same.
     """
@@ -73,18 +73,18 @@ class Scalar:
         """Whether it is anything but the constant zero."""
         return self.value != ZERO
 
-    def sine(self) -> Scalar:
-        """The sine of an angle."""
+    def take_sine(self) -> Scalar:
+        """Return the sine of an angle."""
         return Scalar(self.graph, self.graph.call("sin", self.value))
 
-    def cosine(self) -> Scalar:
-        """The cosine of an angle."""
+    def take_cosine(self) -> Scalar:
+        """Return the cosine of an angle."""
         return Scalar(self.graph, self.graph.call("cos", self.value))
 
     def sign(self) -> Scalar:
-        """The sign: -1, 0 or 1."""
+        """Return the sign: -1, 0 or 1."""
         return Scalar(self.graph, self.graph.call("sign", self.value))
 
-    def tanh(self) -> Scalar:
-        """The hyperbolic tangent."""
+    def take_tanh(self) -> Scalar:
+        """Return the hyperbolic tangent."""
         return Scalar(self.graph, self.graph.call("tanh", self.value))

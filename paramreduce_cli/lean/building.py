@@ -4,9 +4,9 @@ from collections.abc import Callable, Collection, Sequence
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.choices import JointFormulation
-from paramreduce_cli.lean.direct import mass_matrix
-from paramreduce_cli.lean.drives import with_drives, with_rotors
-from paramreduce_cli.lean.inverse import torques
+from paramreduce_cli.lean.direct import build_mass_matrix
+from paramreduce_cli.lean.drives import add_drives, add_rotors
+from paramreduce_cli.lean.inverse import build_torques
 from paramreduce_cli.lean.kinematics import Kinematics
 from paramreduce_cli.lean.tree import Tree
 
@@ -14,21 +14,21 @@ Build = Callable[[Tree, Sequence[JointFormulation], Graph, Collection[int]], lis
 """Makes the outputs of a model in a graph: tree, choices, graph, dropped parameters."""
 
 
-def inverse_outputs(
+def build_inverse_outputs(
     tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
 ) -> list[int]:
-    """Torques, (n_q,)."""
+    """Return the torques of all joints as outputs of a graph, (n_q,)."""
     kinematics = Kinematics(tree, choices, graph, dropped=dropped)
-    found = with_drives(tree, kinematics.symbols, torques(kinematics), moving=True)
+    found = add_drives(tree, kinematics.symbols, build_torques(kinematics), moving=True)
     return [torque.value for torque in found]
 
 
-def direct_outputs(
+def build_direct_outputs(
     tree: Tree, choices: Sequence[JointFormulation], graph: Graph, dropped: Collection[int] = ()
 ) -> list[int]:
-    """The lower triangle of M, row by row, then delta."""
+    """Return the lower triangle of M, row by row, then delta, as outputs of a graph."""
     kinematics = Kinematics(tree, choices, graph, moving=False, dropped=dropped)
     symbols = kinematics.symbols
-    M = with_rotors(tree, symbols, mass_matrix(kinematics))
-    bias = with_drives(tree, symbols, torques(kinematics), moving=False)
+    M = add_rotors(tree, symbols, build_mass_matrix(kinematics))
+    bias = add_drives(tree, symbols, build_torques(kinematics), moving=False)
     return [entry.value for row in [*M, bias] for entry in row]

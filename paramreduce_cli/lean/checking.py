@@ -8,9 +8,9 @@ from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.factoring import Values
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.lean.choices import from_data
-from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.lean.tree import choose_frames
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism
 
@@ -48,9 +48,9 @@ def check_formulations(
         "direct": np.hstack([M[:, rows, columns], delta]),
     }
     inputs = [*np.broadcast_to(phi, (q.shape[0], phi.size)).T, *q.T, *dq.T, *ddq.T]
-    tree = lean_tree(mechanism)
+    tree = choose_frames(mechanism)
     dropped = np.setdiff1d(np.arange(phi.size), kept).tolist()
-    builds = {"inverse": inverse_outputs, "direct": direct_outputs}
+    builds = {"inverse": build_inverse_outputs, "direct": build_direct_outputs}
     for kind, wanted in expected.items():
         for choices in getattr(formulations, kind):
             graph = Graph()

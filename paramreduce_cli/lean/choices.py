@@ -5,14 +5,14 @@ from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from typing import Any
 
-from paramreduce_cli.lean.motion import Diagonal, Rates
+from paramreduce_cli.lean.motion import AngularAcceleration, Diagonal
 from paramreduce_cli.lean.tree import Joint
 from paramreduce_cli.lean.wrench import Gauge
 from paramreduce_cli.records import BASE
 
 
-class Place(StrEnum):
-    """Where a part of a body's inertia is met by the motion."""
+class InertiaPlace(StrEnum):
+    """A recursion step at which a part of a body's inertia is multiplied with the motion."""
 
     OWN = "own"
     """In the body's frame, whose motion is turned by the joint's angle."""
@@ -24,24 +24,24 @@ class Place(StrEnum):
 
 @dataclass(frozen=True)
 class JointFormulation:
-    """Of one joint."""
+    """A choice of the equivalent formulas at one joint."""
 
     aligned: bool = False
     """Whether a parallel axis adds its angle to that of the joint before."""
     gauge: Gauge = Gauge.NONE
-    mass: Place = Place.BEFORE
-    axial: Place = Place.BEFORE
+    mass: InertiaPlace = InertiaPlace.BEFORE
+    axial: InertiaPlace = InertiaPlace.BEFORE
     """First moment along the axis."""
-    radial: Place = Place.OWN
+    radial: InertiaPlace = InertiaPlace.OWN
     """First moments across the axis."""
-    polar: Place = Place.OWN
+    polar: InertiaPlace = InertiaPlace.OWN
     """Izz"""
-    tilt: Place = Place.OWN
+    tilt: InertiaPlace = InertiaPlace.OWN
     """Ixz, Iyz"""
-    plane: Place = Place.OWN
+    plane: InertiaPlace = InertiaPlace.OWN
     """Ixx, Ixy, Iyy"""
     diagonal: Diagonal = Diagonal.SQUARES
-    rates: Rates = Rates.COLUMN
+    rates: AngularAcceleration = AngularAcceleration.COLUMN
     reach_turned: bool = False
     """Whether the place of an aligned joint is turned, not its acceleration."""
     projected: bool = False
@@ -55,22 +55,22 @@ _TOGETHER = (("tilt", "plane"), ("polar", "tilt", "plane"), ("radial", "polar", 
 OPTIONS: dict[str, tuple[Any, ...]] = {
     "aligned": (False, True),
     "gauge": tuple(Gauge),
-    **{name: tuple(Place) for name in _PLACED},
+    **{name: tuple(InertiaPlace) for name in _PLACED},
     "diagonal": tuple(Diagonal),
-    "rates": tuple(Rates),
+    "rates": tuple(AngularAcceleration),
     "reach_turned": (False, True),
     "projected": (False, True),
 }
 """All values of every choice."""
 
 
-def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
-    """What else may be chosen at a joint: one thing differs, or several parts are in one other place.
+def list_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
+    """List the choices that differ from a joint's choice in one thing, or in the place of several inertia parts.
 
-    Whether wrenches are projected is for :func:`far_reaching` alone.
+    Whether wrenches are projected is for :func:`list_distant_alternatives` alone.
     """
-    names = _effective(choice, joint)
-    places = tuple(Place) if joint.revolute else (Place.OWN, Place.BEFORE)
+    names = _list_effective_fields(choice, joint)
+    places = tuple(InertiaPlace) if joint.revolute else (InertiaPlace.OWN, InertiaPlace.BEFORE)
     single = [
         replace(choice, **{name: value})  # type: ignore[arg-type]
         for name in names
@@ -84,26 +84,26 @@ def alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulatio
     return [c for c in dict.fromkeys(single + together) if c != choice]
 
 
-def far_reaching(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
-    """Alternatives that matter to every wrench that is handed on past a joint, from however far."""
-    names = _aligning(choice, joint) + ["projected"] * (joint.parent != BASE)
+def list_distant_alternatives(choice: JointFormulation, joint: Joint) -> list[JointFormulation]:
+    """List the alternatives that change every wrench that passes a joint, from however far."""
+    names = _list_alignment_fields(choice, joint) + ["projected"] * (joint.parent != BASE)
     return [replace(choice, **{name: not getattr(choice, name)}) for name in names]  # type: ignore[arg-type]
 
 
-def _effective(choice: JointFormulation, joint: Joint) -> list[str]:
-    """What makes a difference at a joint."""
+def _list_effective_fields(choice: JointFormulation, joint: Joint) -> list[str]:
+    """Return the fields of a choice that make a difference at a joint."""
     names = list(_PLACED)
     if joint.revolute:
         names += ["gauge", "diagonal", "rates"]
-    return names + _aligning(choice, joint)
+    return names + _list_alignment_fields(choice, joint)
 
 
-def _aligning(choice: JointFormulation, joint: Joint) -> list[str]:
+def _list_alignment_fields(choice: JointFormulation, joint: Joint) -> list[str]:
     return ["aligned"] * joint.parallel + ["reach_turned"] * (joint.parallel and choice.aligned)
 
 
 def to_data(choice: JointFormulation) -> dict[str, str | bool]:
-    """As plain values."""
+    """Return a choice as plain values."""
     return {
         f.name: value if isinstance(value := getattr(choice, f.name), bool) else str(value)
         for f in fields(choice)
@@ -111,8 +111,13 @@ def to_data(choice: JointFormulation) -> dict[str, str | bool]:
 
 
 def from_data(data: Mapping[str, str | bool]) -> JointFormulation:
-    """From plain values."""
-    kinds = {"gauge": Gauge, "diagonal": Diagonal, "rates": Rates, **dict.fromkeys(_PLACED, Place)}
+    """Return the choice that plain values describe."""
+    kinds = {
+        "gauge": Gauge,
+        "diagonal": Diagonal,
+        "rates": AngularAcceleration,
+        **dict.fromkeys(_PLACED, InertiaPlace),
+    }
     return JointFormulation(
         **{name: kinds[name](value) if name in kinds else value for name, value in data.items()}  # type: ignore[arg-type]
     )

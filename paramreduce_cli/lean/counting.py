@@ -5,7 +5,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from paramreduce_cli.lean.model import LeanModels, lean_models
+from paramreduce_cli.lean.model import LeanModels, get_lean_models
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import (
     BoolArray,
@@ -19,14 +19,14 @@ from paramreduce_cli.records import (
 from paramreduce_cli.resources.processes import start_workers
 
 COUNTS = ("operations_inverse", "operations_direct")
-"""Names of the counts of lean models, which :meth:`Counts.lean` returns in this order."""
+"""Names of the counts of lean models, which :meth:`Counts.count_lean` returns in this order."""
 TEXTBOOK_COUNTS = (
     "operations_inverse_plain",
     "operations_direct_plain",
     "operations_inverse_paper_rule",
     "operations_direct_paper_rule",
 )
-"""Names of the counts of textbook recursion, without and with sign changes, which :meth:`Counts.textbook` returns."""
+"""Names of the counts of textbook recursion, without and with sign changes, which :meth:`Counts.count_textbook` returns."""
 _MANY = 5_000
 """Models times parameters, from which on the start of processes pays: an arm of six joints takes 2 ms a parameter, a process 4 s."""
 _AT_ONCE = 8
@@ -34,11 +34,11 @@ _AT_ONCE = 8
 
 
 class Counts:
-    """Operations of the inverse and direct dynamics.
+    """Operation counts of the inverse and direct dynamics of reduced models.
 
     Args:
-        model: Of the robot.
-        counted: Which functions are counted where there are loops.
+        model: Model of the robot.
+        counted: Functions that are counted where the mechanism has loops.
     """
 
     def __init__(self, model: Model, counted: CountedDynamics) -> None:
@@ -51,7 +51,7 @@ class Counts:
 
     @cached_property
     def _lean(self) -> LeanModels:
-        return lean_models(self._model, independent=self._independent)
+        return get_lean_models(self._model, independent=self._independent)
 
     def estimate(self, kept: BoolArray, *, direct: bool = False) -> int:
         """Return nearly the operations of the lean inverse dynamics; it takes microseconds.
@@ -61,14 +61,14 @@ class Counts:
             direct: Whether the direct dynamics is meant instead.
         """
         indices: IntArray = (kept & self._model.affecting).nonzero()[0]
-        return self._lean.estimate(indices, direct=direct)
+        return self._lean.estimate_operations(indices, direct=direct)
 
-    def lean(self, model: ReducedModel) -> list[int]:
+    def count_lean(self, model: ReducedModel) -> list[int]:
         """Return :data:`COUNTS` of a model; its values do not matter."""
         model = model.drop_unaffecting(self._model.affecting)
-        return [f(model).n_operations for f in (self._lean.inverse, self._lean.direct)]
+        return [f(model).n_operations for f in (self._lean.build_inverse, self._lean.build_direct)]
 
-    def textbook(self, model: ReducedModel) -> list[int]:
+    def count_textbook(self, model: ReducedModel) -> list[int]:
         """Return :data:`TEXTBOOK_COUNTS` of a model; its values do not matter."""
         model = model.drop_unaffecting(self._model.affecting)
         return [
@@ -94,7 +94,7 @@ def count_all(
     Returns:
         (n_models, 2)
     """
-    keys = [structure(one, model) for one in chosen]
+    keys = [digest_structure(one, model) for one in chosen]
     different = dict(zip(keys, chosen, strict=True))
     tasks = list(different.items())
     known: dict[bytes, list[int]] = {}
@@ -110,7 +110,7 @@ def count_all(
     return np.array([known[key] for key in keys], dtype=np.int64)
 
 
-def structure(one: ReducedModel, model: Model) -> bytes:
+def digest_structure(one: ReducedModel, model: Model) -> bytes:
     """Return what the operations of a reduced model depend on: which parameters are kept, and which share a value."""
     one = one.drop_unaffecting(model.affecting)
     ties = one.ties
@@ -119,4 +119,4 @@ def structure(one: ReducedModel, model: Model) -> bytes:
 
 def _count(counts: Counts, chunk: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:
     """Count the models of a chunk, by structure."""
-    return {structure: counts.lean(one) for structure, one in chunk}
+    return {structure: counts.count_lean(one) for structure, one in chunk}

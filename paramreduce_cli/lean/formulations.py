@@ -15,18 +15,18 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import Build, build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.lean.choices import (
+    InertiaPlace,
     JointFormulation,
-    Place,
-    alternatives,
-    far_reaching,
     from_data,
+    list_alternatives,
+    list_distant_alternatives,
     to_data,
 )
-from paramreduce_cli.lean.motion import Rates
-from paramreduce_cli.lean.search import best_choices
-from paramreduce_cli.lean.tree import Tree, lean_tree
+from paramreduce_cli.lean.motion import AngularAcceleration
+from paramreduce_cli.lean.search import search_choices
+from paramreduce_cli.lean.tree import Tree, choose_frames
 from paramreduce_cli.records import (
     BoolArray,
     Formulation,
@@ -45,8 +45,8 @@ _MOMENTS = (Kind.IXX, Kind.IYY, Kind.IZZ)
 _INVERSE_STARTS = (
     JointFormulation(),
     JointFormulation(aligned=True),
-    JointFormulation(mass=Place.REST, axial=Place.REST),
-    JointFormulation(aligned=True, radial=Place.REST, rates=Rates.DIRECT),
+    JointFormulation(mass=InertiaPlace.REST, axial=InertiaPlace.REST),
+    JointFormulation(aligned=True, radial=InertiaPlace.REST, rates=AngularAcceleration.DIRECT),
 )
 _SUITED = 2
 """Formulations from which one that suits a subset of parameters is searched: those that are leanest for it."""
@@ -55,11 +55,14 @@ _CROSSED = 0.4
 _VARIED = 2
 """Choices that are varied at once, at most."""
 _AT_REST = JointFormulation(
-    aligned=True, rates=Rates.DIRECT, radial=Place.REST, polar=Place.REST, tilt=Place.REST,
-    plane=Place.REST,
+    aligned=True, rates=AngularAcceleration.DIRECT, radial=InertiaPlace.REST, polar=InertiaPlace.REST, tilt=InertiaPlace.REST,
+    plane=InertiaPlace.REST,
 )  # fmt: skip
 _COMPOSITE = JointFormulation(
-    radial=Place.BEFORE, polar=Place.BEFORE, tilt=Place.BEFORE, plane=Place.BEFORE
+    radial=InertiaPlace.BEFORE,
+    polar=InertiaPlace.BEFORE,
+    tilt=InertiaPlace.BEFORE,
+    plane=InertiaPlace.BEFORE,
 )
 """The bias from the composite bodies that the mass matrix is made of."""
 _DIRECT_STARTS = (_COMPOSITE, replace(_COMPOSITE, aligned=True), _AT_REST, *_INVERSE_STARTS)
@@ -72,8 +75,8 @@ _Choices = tuple[JointFormulation, ...]
 """One for each joint."""
 
 
-class _Searches(NamedTuple):
-    """Searches of which each begins where the one before has ended."""
+class _SearchChain(NamedTuple):
+    """A chain of searches, each of which begins where the previous one has ended."""
 
     direct: bool
     """Of the direct dynamics, not of the inverse."""
@@ -83,13 +86,13 @@ class _Searches(NamedTuple):
     """Parameters that are zero in each."""
 
 
-def formulations(
+def find_formulations(
     mechanism: Mechanism, affecting: BoolArray, base: IntArray, run: Run | None = None
 ) -> Formulations:
-    """Search the formulations of a mechanism.
+    """Search the leanest formulations of a mechanism for several sets of parameters.
 
     Args:
-        mechanism: Its tree is what counts.
+        mechanism: Mechanism whose tree is formulated.
         affecting: Parameters that change the torques at all, (n_parameters,).
         base: Indices of the base parameters.
         run: Workers, and an audience that is told how many of the six searches have ended.
@@ -101,19 +104,19 @@ def formulations(
         DataError: A process died.
     """
     run = run or Run()
-    tree = lean_tree(mechanism)
+    tree = choose_frames(mechanism)
     everything = set(range(affecting.size))
     useless = everything - set(affecting.nonzero()[0].tolist())
     regrouped = everything - set(base.tolist())
-    minor = useless | (everything - _main_parameters(tree))
+    minor = useless | (everything - _find_main_parameters(tree))
     asked = [
-        _Searches(direct, (_starts(direct)[0],) * len(tree.joints), dropped)
+        _SearchChain(direct, (_starts(direct)[0],) * len(tree.joints), dropped)
         for direct in (False, True)
         for dropped in ((frozenset(useless), frozenset(regrouped)), (frozenset(minor),))
     ]
-    found: dict[_Searches, list[_Choices]] = {}
+    found: dict[_SearchChain, list[_Choices]] = {}
     total = sum(len(one.dropped) for one in asked)
-    for one, best in _searched(mechanism, asked, run.jobs):
+    for one, best in _run_searches(mechanism, asked, run.jobs):
         found[one] = best
         run.progress(Progress("search for formulations", sum(map(len, found.values())), total))
 
@@ -129,45 +132,47 @@ def _starts(direct: bool) -> tuple[JointFormulation, ...]:
     return _DIRECT_STARTS if direct else _INVERSE_STARTS
 
 
-def _searched(
-    mechanism: Mechanism, asked: Sequence[_Searches], jobs: int
-) -> Iterator[tuple[_Searches, list[_Choices]]]:
-    """In any order."""
-    pays = len(lean_tree(mechanism).joints) >= _MANY
-    with start_workers(min(jobs, len(asked)) if pays else 1, partial(_same, mechanism)) as pool:
+def _run_searches(
+    mechanism: Mechanism, asked: Sequence[_SearchChain], jobs: int
+) -> Iterator[tuple[_SearchChain, list[_Choices]]]:
+    """Yield each chain of searches with its results, in any order."""
+    pays = len(choose_frames(mechanism).joints) >= _MANY
+    with start_workers(
+        min(jobs, len(asked)) if pays else 1, partial(_return_mechanism, mechanism)
+    ) as pool:
         yield from pool.map_unordered(_work, asked)
     forget()
 
 
-def _same(mechanism: Mechanism) -> Mechanism:
+def _return_mechanism(mechanism: Mechanism) -> Mechanism:
     return mechanism
 
 
-def _work(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
-    return _best(mechanism, asked)
+def _work(mechanism: Mechanism, asked: _SearchChain) -> list[_Choices]:
+    return _run_chain(mechanism, asked)
 
 
-def _best(mechanism: Mechanism, asked: _Searches) -> list[_Choices]:
-    """What each search ends with."""
-    tree, build = lean_tree(mechanism), _build(asked.direct)
+def _run_chain(mechanism: Mechanism, asked: _SearchChain) -> list[_Choices]:
+    """Return the choices that each search of a chain ends with."""
+    tree, build = choose_frames(mechanism), _build(asked.direct)
     choices, found = list(asked.start), []
     for dropped in asked.dropped:
-        choices = best_choices(tree, build, choices, dropped)
+        choices = search_choices(tree, build, choices, dropped)
         found.append(tuple(choices))
     return found
 
 
 def _build(direct: bool) -> Build:
-    return direct_outputs if direct else inverse_outputs
+    return build_direct_outputs if direct else build_inverse_outputs
 
 
-def formulations_for(
+def add_formulations(
     model: Model, subsets: Iterable[IntArray], *, direct: bool, jobs: int = 1
 ) -> Formulations:
-    """The formulations of a model, and more that suit some subsets of its parameters.
+    """Return the formulations of a model, and more that suit some subsets of its parameters.
 
     Args:
-        model: Of the robot, with formulations.
+        model: Model of the robot, with formulations.
         subsets: Indices of the parameters that are not zero, of each.
         direct: Whether they are for the direct dynamics, not for the inverse.
         jobs: Processes.
@@ -178,7 +183,7 @@ def formulations_for(
     Raises:
         DataError: A process died.
     """
-    tree, build = lean_tree(model.mechanism), _build(direct)
+    tree, build = choose_frames(model.mechanism), _build(direct)
     everything = frozenset(range(model.affecting.size))
     known = model.formulations.direct if direct else model.formulations.inverse
     starts = [tuple(map(from_data, choices)) for choices in known]
@@ -191,44 +196,44 @@ def formulations_for(
             return graph.count_operations(build(tree, choices, graph, dropped))
 
         suited = heapq.nsmallest(_SUITED, starts, key=count)
-        asked += [_Searches(direct, start, (dropped,)) for start in suited]
+        asked += [_SearchChain(direct, start, (dropped,)) for start in suited]
     forget()
-    found = dict(_searched(model.mechanism, asked, jobs))
+    found = dict(_run_searches(model.mechanism, asked, jobs))
     different = dict.fromkeys([*starts, *(best for one in asked for best in found[one])])
     data = tuple(tuple(map(to_data, choices)) for choices in different)
     return replace(model.formulations, **{"direct" if direct else "inverse": data})
 
 
-def varied(
+def vary_formulation(
     formulation: Formulation,
     others: Sequence[Formulation],
     mechanism: Mechanism,
     rng: np.random.Generator,
 ) -> Formulation:
-    """A formulation with one or two other choices at random, or as another one is at joints in a row.
+    """Return a formulation with one or two random changes, or with the choices of another one at joints in a row.
 
     Args:
-        formulation: Of the mechanism.
-        others: Which have what goes well together.
-        mechanism: Whose joints they are of.
-        rng: Where chance comes from.
+        formulation: Formulation of the mechanism.
+        others: Formulations to copy choices from.
+        mechanism: Mechanism with the joints.
+        rng: Random generator.
     """
     if rng.random() < _CROSSED:
         other = others[int(rng.integers(len(others)))]
         first, last = np.sort(rng.integers(len(formulation), size=2))
         return (*formulation[:first], *other[first : last + 1], *formulation[last + 1 :])
-    tree = lean_tree(mechanism)
+    tree = choose_frames(mechanism)
     choices = list(map(from_data, formulation))
     for _ in range(rng.integers(1, _VARIED, endpoint=True)):
         k = int(rng.integers(len(choices)))
         joint = tree.joints[k]
-        alike = alternatives(choices[k], joint) + far_reaching(choices[k], joint)
+        alike = list_alternatives(choices[k], joint) + list_distant_alternatives(choices[k], joint)
         choices[k] = alike[int(rng.integers(len(alike)))]
     return tuple(map(to_data, choices))
 
 
-def _main_parameters(tree: Tree) -> set[int]:
-    """Positions of masses, first moments and the moments of inertia about the joints' axes."""
+def _find_main_parameters(tree: Tree) -> set[int]:
+    """Return the positions of masses, first moments and the moments of inertia about the joints' axes."""
     result = set()
     for joint in tree.joints:
         for rigid in joint.rigid:

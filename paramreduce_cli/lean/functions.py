@@ -9,20 +9,20 @@ from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.model import lean_models
-from paramreduce_cli.lean.projection import projected_direct, projected_inverse
+from paramreduce_cli.lean.model import get_lean_models
+from paramreduce_cli.lean.projection import project_direct_outputs, project_inverse_outputs
 from paramreduce_cli.multibody.loops.closures import express_equations
 from paramreduce_cli.records import Model, ReducedModel, TermModel
 
 
 class LeanFunctions:
-    """Functions of a reduced model.
+    """Functions of a reduced model, ready for export.
 
     Args:
-        model: Of the robot.
-        reduced: Which parameters are kept, and their values.
+        model: Model of the robot.
+        reduced: Parameters that are kept, and their values.
         constant: Whether the values are part of the functions.
-        simplified: One of the functions with terms left out, whose parameters ``reduced`` are.
+        simplified: Function with pruned terms; ``reduced`` holds its parameters.
     """
 
     def __init__(
@@ -36,7 +36,7 @@ class LeanFunctions:
         mechanism = model.mechanism
         self._simplified = simplified
         self._mechanism = mechanism
-        self._models = lean_models(model, independent=True)
+        self._models = get_lean_models(model, independent=True)
         self._reduced = reduced.drop_unaffecting(model.affecting)
         self._constant = constant
         q, z = mechanism.n_q, mechanism.n_dof
@@ -54,30 +54,32 @@ class LeanFunctions:
             b = "accelerations of the dependent coordinates at ddz = 0"
             self._arguments += (Argument("R", (q - z, z), R), Argument("b", (q - z,), b))
 
-    def inverse(self) -> Function:
-        """Torques of a motion."""
+    def make_inverse(self) -> Function:
+        """Return the function that gives the torques of a motion."""
         tau = Argument("tau", (self._mechanism.n_dof,), "torques or forces, N m or N")
         text = "Torques of the independent coordinates for a motion."
-        graph, outputs = self._model(self._models.inverse, projected_inverse)
-        return self._function("inverse_dynamics", text, (tau,), graph, outputs)
+        graph, outputs = self._build_lean_outputs(
+            self._models.build_inverse, project_inverse_outputs
+        )
+        return self._make_function("inverse_dynamics", text, (tau,), graph, outputs)
 
-    def direct(self) -> Function:
-        """Mass matrix and bias."""
+    def make_direct(self) -> Function:
+        """Return the function that gives the mass matrix and the bias."""
         z = self._mechanism.n_dof
         M = Argument("M", (z, z), "mass matrix")
         delta = Argument("delta", (z,), "torques without acceleration, N m or N")
         text = "Mass matrix and remainder, gravity and friction included: tau = M ddz + delta."
-        graph, outputs = self._model(self._models.direct, projected_direct)
+        graph, outputs = self._build_lean_outputs(self._models.build_direct, project_direct_outputs)
         lower, bias = outputs[:-z], outputs[-z:]
         rows = range(z)
         full = [lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for i in rows for j in rows]
-        return self._function("direct_dynamics", text, (M, delta), graph, full + bias)
+        return self._make_function("direct_dynamics", text, (M, delta), graph, full + bias)
 
-    def regressor(self) -> Function:
-        """Torques as a linear map of the parameters."""
+    def make_regressor(self) -> Function:
+        """Return the function that gives the regressor: torques are linear in the parameters."""
         n, z = self._reduced.n, self._mechanism.n_dof
         start, place = self._models.n_parameters, self._reduced.position
-        program = self._models.inverse(self._reduced)
+        program = self._models.build_inverse(self._reduced)
         graph = Graph()
         columns = []
         for value in range(n):
@@ -91,16 +93,16 @@ class LeanFunctions:
         outputs = [columns[j][i] for i in range(z) for j in range(n)]
         K = Argument("K", (z, n), "torques for unit values of the parameters")
         text = "Torques as a linear map of the parameters: tau = K phi."
-        return self._function(
+        return self._make_function(
             "regressor", text, (K,), *minimise_operations([Values(graph, outputs)])
         )
 
-    def _model(
+    def _build_lean_outputs(
         self, model: Callable[..., Program], project: Callable[..., list[int]]
     ) -> tuple[Graph, list[int]]:
-        """Outputs of a lean model, its parameters numbered as those that are kept."""
+        """Return the outputs of a lean model in a graph whose parameters are numbered like those that are kept."""
         if self._simplified is not None:
-            program = self._without_terms(self._simplified, project)
+            program = self._build_pruned_program(self._simplified, project)
         else:
             program = model(self._reduced, constant=self._constant)
         start, n, place = self._models.n_parameters, self._reduced.n, self._reduced.position
@@ -112,8 +114,10 @@ class LeanFunctions:
 
         return graph, program.rebuild(graph, substitute)
 
-    def _without_terms(self, simplified: TermModel, project: Callable[..., list[int]]) -> Program:
-        """A simplified program with inputs as those of lean models, of the independent coordinates."""
+    def _build_pruned_program(
+        self, simplified: TermModel, project: Callable[..., list[int]]
+    ) -> Program:
+        """Return a pruned program with inputs like those of lean models, for the independent coordinates."""
         start, n = self._models.n_parameters, simplified.values.size
         first = [int(np.flatnonzero(simplified.position == k)[0]) for k in range(n)]
         graph = Graph()
@@ -133,10 +137,10 @@ class LeanFunctions:
             return Program.from_graph(*minimise_operations([Values(graph, outputs)]))
         return Program.from_graph(graph, outputs)
 
-    def _function(
+    def _make_function(
         self, name: str, text: str, results: tuple[Argument, ...], graph: Graph, outputs: list[int]
     ) -> Function:
-        """Without arguments that its kind never needs; the others stay, used or not."""
+        """Return a function without the arguments that its kind never needs."""
         needed = {
             "inverse_dynamics": {"phi", "q", "dq", "ddq", "R"},
             "direct_dynamics": {"phi", "q", "dq", "R", "b"},
@@ -147,8 +151,8 @@ class LeanFunctions:
         program = Program.from_graph(graph, outputs)
         return Function(name, text, self._arguments, results, program).restrict_arguments(needed)
 
-    def closures(self) -> list[Function]:
-        """What the position, velocity and acceleration problems of loops are made of."""
+    def make_closures(self) -> list[Function]:
+        """Return the functions that the position, velocity and acceleration problems of loops consist of."""
         mechanism = self._mechanism
         q, dq = ca.SX.sym("q", mechanism.n_q), ca.SX.sym("dq", mechanism.n_q)
         equations = express_equations(mechanism, q)

@@ -8,12 +8,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from paramreduce_cli.expressions.vectors import Vector, add, scale
-from paramreduce_cli.lean.algebra import Scalar, remembered
+from paramreduce_cli.lean.algebra import Scalar, cache_expressions
 
 
 @dataclass(frozen=True)
 class Inertia:
-    """Mass, first moments and inertia tensor about one point, in one frame."""
+    """The mass, first moments and inertia tensor of a body about one point, in one frame."""
 
     m: Scalar
     d: Vector
@@ -24,7 +24,7 @@ class Inertia:
     yz: Scalar
     zz: Scalar
 
-    @remembered
+    @cache_expressions
     def __add__(self, other: Inertia) -> Inertia:
         return Inertia(
             self.m + other.m,
@@ -42,9 +42,9 @@ class Inertia:
         tensor = (self.xx, self.xy, self.xz, self.yy, self.yz, self.zz)
         return any(bool(value) for value in (self.m, *self.d, *tensor))
 
-    @remembered
-    def shifted(self, r: Vector) -> Inertia:
-        """The same about another point; r is from that point to the present one.
+    @cache_expressions
+    def move_point(self, r: Vector) -> Inertia:
+        """Return the inertia about another point; r leads from the new point to the present one.
 
         The theorem of parallel axes: with the first moments h before and h' = h + m r after, the tensor gains
         (r . (h + h')) 1 - (r h' + h' r') with one h and one h', which is symmetric.
@@ -67,11 +67,11 @@ class Inertia:
             self.zz + (px + py),
         )
 
-    def cycled(self) -> Inertia:
-        """In axes renamed so that x becomes z, y becomes x and z becomes y."""
+    def cycle_axes(self) -> Inertia:
+        """Return the inertia in renamed axes: x becomes z, y becomes x and z becomes y."""
         x, y, z = self.d
         return Inertia(self.m, (y, z, x), self.yy, self.yz, self.xy, self.zz, self.xz, self.xx)
 
-    def with_moment(self, d: Vector) -> Inertia:
-        """With other first moments."""
+    def replace_first_moments(self, d: Vector) -> Inertia:
+        """Return the inertia with other first moments."""
         return replace(self, d=d)

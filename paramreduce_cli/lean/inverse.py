@@ -12,59 +12,62 @@ At the joints that hand it on, only the moment about z of w(U; J) is needed.
 from dataclasses import replace
 
 from paramreduce_cli.expressions.vectors import dot
-from paramreduce_cli.lean.algebra import Scalar, remembered
-from paramreduce_cli.lean.choices import JointFormulation, Place
+from paramreduce_cli.lean.algebra import Scalar, cache_expressions
+from paramreduce_cli.lean.choices import InertiaPlace, JointFormulation
 from paramreduce_cli.lean.inertia import Inertia
 from paramreduce_cli.lean.kinematics import JointState, Kinematics
 from paramreduce_cli.lean.wrench import (
     Gauge,
     Wrench,
-    force_along_z,
-    inertial_wrench,
-    pushed,
-    spin_about_z,
+    compute_force_along_z,
+    compute_inertial_wrench,
+    compute_moment_about_z,
+    compute_rotation_wrench,
+    compute_translation_wrench,
     split_off,
-    turning_wrench,
 )
 from paramreduce_cli.records import BASE
 
 
-def torques(kinematics: Kinematics) -> list[Scalar]:
-    """Torques and forces of the joints, in the signs of the coordinates as described."""
+def build_torques(kinematics: Kinematics) -> list[Scalar]:
+    """Return the torques and forces of the joints, in the signs of the coordinates as described."""
     n = len(kinematics.states)
-    nothing = kinematics.symbols.no_inertia()
-    zero = kinematics.symbols.vector((0, 0, 0))
-    own = [kinematics.body(i) for i in range(n)]
+    nothing = kinematics.symbols.make_zero_inertia()
+    zero = kinematics.symbols.make_vector((0, 0, 0))
+    own = [kinematics.sum_body_inertia(i) for i in range(n)]
     at_rest = [nothing] * n
     wrench_own, wrench_rest = [Wrench(zero, zero)] * n, [Wrench(zero, zero)] * n
     result = [zero[0]] * n
     for i in reversed(range(n)):
         state, choice = kinematics.states[i], kinematics.choices[i]
-        axial, rest = axial_part(own[i], choice, state)
+        axial, rest = split_axial_part(own[i], choice, state)
         wrench = wrench_own[i]
-        if kept := part(rest, choice, Place.OWN):
-            wrench = wrench + inertial_wrench(
-                kept, state.body_motion, state.body_acceleration, form(state, choice, Place.OWN)
+        if kept := select_part(rest, choice, InertiaPlace.OWN):
+            wrench = wrench + compute_inertial_wrench(
+                kept,
+                state.body_motion,
+                state.body_acceleration,
+                select_gauge(state, choice, InertiaPlace.OWN),
             )
-        wrench = turned_out(wrench, state) + wrench_rest[i]
-        if kept := part(rest, choice, Place.REST):
-            wrench = wrench + inertial_wrench(
-                state.turn.inertia(kept),
-                kinematics.rest_components(i),
+        wrench = rotate_to_rest(wrench, state) + wrench_rest[i]
+        if kept := select_part(rest, choice, InertiaPlace.REST):
+            wrench = wrench + compute_inertial_wrench(
+                state.turn.rotate_inertia(kept),
+                kinematics.express_at_rest(i),
                 state.rest_acceleration,
-                form(state, choice, Place.REST),
+                select_gauge(state, choice, InertiaPlace.REST),
             )
-        handed = part(rest, choice, Place.BEFORE)
+        handed = select_part(rest, choice, InertiaPlace.BEFORE)
         if handed:
-            handed = state.turn.inertia(handed)
-            wrench = wrench + turning_wrench(handed, state.joint_turning)
+            handed = state.turn.rotate_inertia(handed)
+            wrench = wrench + compute_rotation_wrench(handed, state.joint_turning)
         handed = handed + at_rest[i]
         if state.joint.revolute:
-            along = wrench.moment[2] + spin_about_z(
+            along = wrench.moment[2] + compute_moment_about_z(
                 handed, state.rest_motion, state.rest_acceleration
             )
         else:
-            along = wrench.force[2] + force_along_z(
+            along = wrench.force[2] + compute_force_along_z(
                 handed, state.rest_motion, state.rest_acceleration
             )
         result[i] = result[i] + state.joint.sign * along
@@ -72,43 +75,43 @@ def torques(kinematics: Kinematics) -> list[Scalar]:
         if parent == BASE:
             continue
         if handed:
-            wrench = wrench + pushed(handed, state.relative_acceleration)
+            wrench = wrench + compute_translation_wrench(handed, state.relative_acceleration)
         if choice.projected:
-            for j, along in projections(kinematics, i, wrench).items():
+            for j, along in project_on_ancestors(kinematics, i, wrench).items():
                 result[j] = result[j] + kinematics.states[j].joint.sign * along
         elif state.aligned:
-            wrench_rest[parent] = wrench_rest[parent] + wrench.moved(state.reach)
+            wrench_rest[parent] = wrench_rest[parent] + wrench.move_point(state.reach)
         else:
-            wrench_own[parent] = wrench_own[parent] + on_body_before(wrench, state)
-        hand_on(kinematics, i, axial, handed, own, at_rest)
+            wrench_own[parent] = wrench_own[parent] + transfer_to_parent(wrench, state)
+        transfer_inertia(kinematics, i, axial, handed, own, at_rest)
     return result
 
 
-def axial_part(
+def split_axial_part(
     body: Inertia, choice: JointFormulation, state: JointState
 ) -> tuple[Inertia, Inertia]:
-    """What a hinge cannot tell from a part of the body before, as far as it is chosen, and the rest."""
-    nothing = _no_inertia(body)
+    """Split an inertia into the part that a hinge cannot tell from inertia of the parent body, and the rest."""
+    nothing = _make_zero_inertia(body)
     if not state.joint.revolute:
         return nothing, body
     s, rest = split_off(body, choice.gauge)
-    m = body.m if choice.mass is Place.BEFORE else nothing.m
-    z = body.d[2] if choice.axial is Place.BEFORE else nothing.m
+    m = body.m if choice.mass is InertiaPlace.BEFORE else nothing.m
+    z = body.d[2] if choice.axial is InertiaPlace.BEFORE else nothing.m
     axial = replace(nothing, m=m, d=(nothing.m, nothing.m, z), xx=s, yy=s)
     return axial, replace(rest, m=rest.m - m, d=(rest.d[0], rest.d[1], rest.d[2] - z))
 
 
-def _no_inertia(body: Inertia) -> Inertia:
+def _make_zero_inertia(body: Inertia) -> Inertia:
     zero = body.m - body.m
     return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
 
-@remembered
-def part(body: Inertia, choice: JointFormulation, place: Place) -> Inertia:
-    """The part of an inertia that is met at a place."""
+@cache_expressions
+def select_part(body: Inertia, choice: JointFormulation, place: InertiaPlace) -> Inertia:
+    """Return the part of an inertia that is multiplied with the motion at a place."""
     zero = body.m - body.m
 
-    def kept(where: Place, value: Scalar) -> Scalar:
+    def kept(where: InertiaPlace, value: Scalar) -> Scalar:
         return value if where is place else zero
 
     radial, tilt, plane = choice.radial, choice.tilt, choice.plane
@@ -124,35 +127,39 @@ def part(body: Inertia, choice: JointFormulation, place: Place) -> Inertia:
     )
 
 
-def form(state: JointState, choice: JointFormulation, place: Place) -> Gauge:
-    """What is known of the moments of inertia at a place."""
+def select_gauge(state: JointState, choice: JointFormulation, place: InertiaPlace) -> Gauge:
+    """Return the gauge that the moments of inertia have at a place."""
     if not (state.joint.revolute and choice.polar is choice.plane is place):
         return Gauge.NONE
-    if place is Place.OWN or choice.gauge is Gauge.FLAT:
+    if place is InertiaPlace.OWN or choice.gauge is Gauge.FLAT:
         return choice.gauge
     return Gauge.NONE
 
 
-def turned_out(wrench: Wrench, state: JointState) -> Wrench:
-    """From the body's frame to that at rest."""
-    return Wrench(state.turn.out(wrench.force), state.turn.out(wrench.moment))
+def rotate_to_rest(wrench: Wrench, state: JointState) -> Wrench:
+    """Return a wrench of the body's frame in the frame at rest."""
+    return Wrench(state.turn.to_parent(wrench.force), state.turn.to_parent(wrench.moment))
 
 
-def on_body_before(wrench: Wrench, state: JointState) -> Wrench:
-    """From the frame at rest to that of the body before, about its origin; not where aligned."""
-    turned = Wrench(state.rest_to_parent.out(wrench.force), state.rest_to_parent.out(wrench.moment))
-    return turned.moved(state.reach)
+def transfer_to_parent(wrench: Wrench, state: JointState) -> Wrench:
+    """Return a wrench of the frame at rest in the parent body's frame, about its origin; for joints that are not
+    aligned.
+    """
+    turned = Wrench(
+        state.rest_to_parent.to_parent(wrench.force), state.rest_to_parent.to_parent(wrench.moment)
+    )
+    return turned.move_point(state.reach)
 
 
-def projections(kinematics: Kinematics, i: int, wrench: Wrench) -> dict[int, Scalar]:
-    """What a wrench about the origin of joint i, at rest, needs of all joints before."""
+def project_on_ancestors(kinematics: Kinematics, i: int, wrench: Wrench) -> dict[int, Scalar]:
+    """Return the torques that a wrench about the origin of joint i, at rest, needs at all joints before."""
     return {
         j: dot(w, wrench.moment) + dot(v, wrench.force)
-        for j, (w, v) in kinematics.screws(i).items()
+        for j, (w, v) in kinematics.find_screws(i).items()
     }
 
 
-def hand_on(
+def transfer_inertia(
     kinematics: Kinematics,
     i: int,
     axial: Inertia,
@@ -160,22 +167,22 @@ def hand_on(
     own: list[Inertia],
     at_rest: list[Inertia],
 ) -> None:
-    """Add inertia to that of the body before.
+    """Add a joint's inertia to the inertia of the parent body.
 
     Args:
-        kinematics: Of the tree.
-        i: The joint.
-        axial: Part that may as well be of the body before.
-        handed: In the frame at rest.
-        own: Of all bodies, in their frames; changed.
-        at_rest: Of all bodies, in their frames at rest; changed.
+        kinematics: Kinematics of the tree.
+        i: Number of the joint.
+        axial: Part that may as well belong to the parent body.
+        handed: Inertia in the frame at rest.
+        own: Inertias of all bodies, in their frames; changed in place.
+        at_rest: Inertias of all bodies, in their frames at rest; changed in place.
     """
     state = kinematics.states[i]
     parent = state.joint.parent
     if state.aligned:
-        place = kinematics.symbols.vector(state.joint.place)
-        own[parent] = own[parent] + axial.shifted(place)
-        at_rest[parent] = at_rest[parent] + handed.shifted(state.reach)
+        place = kinematics.symbols.make_vector(state.joint.place)
+        own[parent] = own[parent] + axial.move_point(place)
+        at_rest[parent] = at_rest[parent] + handed.move_point(state.reach)
     else:
-        both = state.rest_to_parent.inertia(handed + axial)
-        own[parent] = own[parent] + both.shifted(state.reach)
+        both = state.rest_to_parent.rotate_inertia(handed + axial)
+        own[parent] = own[parent] + both.move_point(state.reach)

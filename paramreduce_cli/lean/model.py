@@ -12,10 +12,10 @@ import numpy as np
 from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import ZERO, Graph
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.building import Build, direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import Build, build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.lean.choices import from_data
-from paramreduce_cli.lean.projection import projected_direct, projected_inverse
-from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.lean.projection import project_direct_outputs, project_inverse_outputs
+from paramreduce_cli.lean.tree import choose_frames
 from paramreduce_cli.records import BoolArray, Formulation, IntArray, Mechanism, Model, ReducedModel
 
 if TYPE_CHECKING:
@@ -33,23 +33,24 @@ class _Variants:
 
     @cached_property
     def _counts(self) -> list[LiveCount]:
+        """Return one estimator of operations per formulation."""
         from paramreduce_cli.expressions.live import LiveCount  # Numba is slow to load
 
         return [LiveCount(program) for program in self.programs]
 
-    def estimates(self, zero: BoolArray) -> list[int]:
-        """Operations of each, nearly, with some parameters zero."""
+    def estimate_operations(self, zero: BoolArray) -> list[int]:
+        """Return the approximate operations of each formulation with some parameters zero."""
         return [count(zero) for count in self._counts]
 
-    def promising(self, zero: BoolArray) -> list[int]:
-        """Numbers of those that may turn out to be the leanest."""
-        estimates = self.estimates(zero)
+    def select_promising(self, zero: BoolArray) -> list[int]:
+        """Return the numbers of the formulations that may turn out to be the leanest."""
+        estimates = self.estimate_operations(zero)
         most = _NEAR * min(estimates)
         return [k for k, count in enumerate(estimates) if count <= most]
 
 
-def lean_models(model: Model, *, independent: bool = False) -> LeanModels:
-    """Return the lean models of a robot.
+def get_lean_models(model: Model, *, independent: bool = False) -> LeanModels:
+    """Return the lean models of a robot; those of the last robots are kept.
 
     Those of the robots asked for last are kept: all formulations of an arm of six joints take half a second to write.
 
@@ -57,7 +58,7 @@ def lean_models(model: Model, *, independent: bool = False) -> LeanModels:
         model: Model of the robot, with formulations to choose from.
         independent: See :class:`LeanModels`.
     """
-    return _kept_lean_models(_SameModel(model), independent)
+    return _make_lean_models(_SameModel(model), independent)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +75,7 @@ class _SameModel:
 
 
 @lru_cache(2)
-def _kept_lean_models(same: _SameModel, independent: bool) -> LeanModels:
+def _make_lean_models(same: _SameModel, independent: bool) -> LeanModels:
     return LeanModels(same.model, independent=independent)
 
 
@@ -85,7 +86,7 @@ class LeanModels:
     coordinates are asked for, the dependent rows of R, row by row, and of b.
 
     Args:
-        model: Of the robot, with formulations to choose from.
+        model: Model of the robot, with formulations to choose from.
         independent: Whether d_z and [M_zz | delta_z] are meant, with R and b handed in, instead of
             d_q and [M_qq | delta_q]; on an open tree they are the same.
     """
@@ -94,7 +95,7 @@ class LeanModels:
         mechanism = model.mechanism
         self._model, self.mechanism = model, mechanism
         self._useless = frozenset(np.flatnonzero(~model.affecting).tolist())
-        self._tree = lean_tree(mechanism)
+        self._tree = choose_frames(mechanism)
         self._projected = independent and mechanism.loops is not None
         self.n_parameters = mechanism.n_parameters
 
@@ -104,18 +105,23 @@ class LeanModels:
 
     @cached_property
     def _inverse(self) -> _Variants:
-        return self._variants(inverse_outputs, self.formulations(), projected_inverse)
+        return self._build_variants(
+            build_inverse_outputs, self.get_formulations(), project_inverse_outputs
+        )
 
     @cached_property
     def _direct(self) -> _Variants:
-        return self._variants(direct_outputs, self.formulations(direct=True), projected_direct)
+        return self._build_variants(
+            build_direct_outputs, self.get_formulations(direct=True), project_direct_outputs
+        )
 
-    def _variants(
+    def _build_variants(
         self,
         build: Build,
         formulations: tuple[Formulation, ...],
         project: Callable[[Mechanism, Graph, Sequence[int]], list[int]],
     ) -> _Variants:
+        """Return the programs of all formulations, with the parameters that are always dropped as zero."""
         programs = []
         for formulation in formulations:
             graph = Graph()
@@ -126,43 +132,43 @@ class LeanModels:
             programs.append(Program.from_graph(*Values(graph, outputs).simplify()))
         return _Variants(programs)
 
-    def inverse(
+    def build_inverse(
         self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
     ) -> Program:
-        """The inverse dynamics of a model; the torques, (n_q,) or (n_dof,).
+        """Return the inverse dynamics of a model; its outputs are the torques, (n_q,) or (n_dof,).
 
         Args:
-            model: Which parameters are kept, and which have one value.
+            model: Model that says which parameters are kept, and which have one value.
             constant: Whether their values are known, and so part of the program.
             rewritten: Whether it is rewritten as far as that saves operations.
         """
-        return self._leanest(self._inverse, model, constant, rewritten)
+        return self._build_leanest(self._inverse, model, constant, rewritten)
 
-    def direct(
+    def build_direct(
         self, model: ReducedModel, *, constant: bool = False, rewritten: bool = True
     ) -> Program:
-        """[M | delta] of a model: the lower triangle of M, row by row, then delta.
+        """Return [M | delta] of a model: the lower triangle of M, row by row, then delta.
 
         Args:
-            model: Which parameters are kept, and which have one value.
+            model: Model that says which parameters are kept, and which have one value.
             constant: Whether their values are known, and so part of the program.
             rewritten: Whether it is rewritten as far as that saves operations.
         """
-        return self._leanest(self._direct, model, constant, rewritten)
+        return self._build_leanest(self._direct, model, constant, rewritten)
 
-    def formulation(self, model: ReducedModel, *, direct: bool = False) -> Formulation:
-        """The one with the fewest operations before they are rewritten."""
+    def choose_formulation(self, model: ReducedModel, *, direct: bool = False) -> Formulation:
+        """Return the formulation with the fewest operations before rewriting."""
         variants = self._direct if direct else self._inverse
-        _, number = self._settled(variants, model, constant=False)
-        return self.formulations(direct=direct)[number]
+        _, number = self._choose_simplified(variants, model, constant=False)
+        return self.get_formulations(direct=direct)[number]
 
-    def formulations(self, *, direct: bool = False) -> tuple[Formulation, ...]:
-        """All that there are."""
+    def get_formulations(self, *, direct: bool = False) -> tuple[Formulation, ...]:
+        """Return all formulations of the inverse or of the direct dynamics."""
         known = self._model.formulations
         return known.direct if direct else known.inverse
 
-    def alone(self, formulation: Formulation, *, direct: bool = False) -> LeanModels:
-        """The same in one formulation of the inverse or of the direct dynamics."""
+    def restrict_to(self, formulation: Formulation, *, direct: bool = False) -> LeanModels:
+        """Return lean models with a single formulation of the inverse or of the direct dynamics."""
         known = self._model.formulations
         if direct:
             found = replace(known, direct=(formulation,))
@@ -170,48 +176,49 @@ class LeanModels:
             found = replace(known, inverse=(formulation,))
         return LeanModels(replace(self._model, formulations=found), independent=self._projected)
 
-    def estimate(self, kept: IntArray, *, direct: bool = False) -> int:
-        """Operations, nearly: quick enough to compare thousands of subsets.
+    def estimate_operations(self, kept: IntArray, *, direct: bool = False) -> int:
+        """Return the approximate operations, quick enough to compare thousands of subsets.
 
         Args:
             kept: Indices of the parameters that are not zero.
-            direct: Whether those of the direct dynamics are meant, not of the inverse.
+            direct: Whether the direct dynamics are counted, not the inverse.
         """
         variants = self._direct if direct else self._inverse
-        return min(variants.estimates(self._dropped(kept)))
+        return min(variants.estimate_operations(self._mark_dropped(kept)))
 
-    def _dropped(self, kept: IntArray) -> BoolArray:
+    def _mark_dropped(self, kept: IntArray) -> BoolArray:
+        """Return a mask of the parameters that are not kept, (n_parameters,)."""
         zero = np.ones(self.n_parameters, dtype=np.bool_)
         zero[kept] = False
         return zero
 
-    def _leanest(
+    def _build_leanest(
         self, variants: _Variants, model: ReducedModel, constant: bool, rewritten: bool
     ) -> Program:
-        """The formulation with the fewest operations."""
+        """Return the program with the fewest operations among all formulations."""
         if not rewritten:
-            return Program.from_graph(*self._settled(variants, model, constant)[0])
+            return Program.from_graph(*self._choose_simplified(variants, model, constant)[0])
         return Program.from_graph(
-            *minimise_operations(self._promising(variants, model, constant).values())
+            *minimise_operations(self._specialise_promising(variants, model, constant).values())
         )
 
-    def _settled(
+    def _choose_simplified(
         self, variants: _Variants, model: ReducedModel, constant: bool
     ) -> tuple[Values, int]:
-        """The same before it is rewritten, and its number."""
-        ways = self._promising(variants, model, constant)
+        """Return the values of the leanest formulation before rewriting, and its number."""
+        ways = self._specialise_promising(variants, model, constant)
         settled = [(way.simplify(), number) for number, way in ways.items()]
         return min(settled, key=lambda way: way[0].n_operations)
 
-    def _promising(
+    def _specialise_promising(
         self, variants: _Variants, model: ReducedModel, constant: bool
     ) -> dict[int, Values]:
-        """What may turn out to be the leanest, by number of the formulation."""
-        numbers = variants.promising(self._dropped(model.kept))
-        return {k: self._written(variants.programs[k], model, constant) for k in numbers}
+        """Return the formulations that may turn out to be the leanest, by number."""
+        numbers = variants.select_promising(self._mark_dropped(model.kept))
+        return {k: self._specialise_program(variants.programs[k], model, constant) for k in numbers}
 
-    def _written(self, program: Program, model: ReducedModel, constant: bool) -> Values:
-        """A formulation for a model, without what is zero then."""
+    def _specialise_program(self, program: Program, model: ReducedModel, constant: bool) -> Values:
+        """Return a formulation for a model, without the parameters that the model drops."""
         ties, values = model.ties, model.standard
         kept = frozenset(model.kept.tolist())
         graph = Graph()

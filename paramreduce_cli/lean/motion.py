@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 from paramreduce_cli.expressions.vectors import Vector, dot
-from paramreduce_cli.lean.algebra import Scalar, remembered
-from paramreduce_cli.lean.turns import ConstantTurn, Turn
+from paramreduce_cli.lean.algebra import Scalar, cache_expressions
+from paramreduce_cli.lean.turns import ConstantRotation, JointRotation
 
 
-class Rates(StrEnum):
-    """How angular accelerations, and U with them, go from frame to frame."""
+class AngularAcceleration(StrEnum):
+    """A way to compute the angular acceleration of a frame, and with it U, from that of its parent."""
 
     COLUMN = "column"
     """U's column along the axis is turned."""
@@ -24,7 +24,7 @@ class Rates(StrEnum):
 
 
 class Diagonal(StrEnum):
-    """How the diagonal of U is made."""
+    """A way to compute the diagonal of U."""
 
     SQUARES = "squares"
     """From the squares of all rates."""
@@ -36,7 +36,7 @@ class Diagonal(StrEnum):
 
 @dataclass(frozen=True)
 class FrameMotion:
-    """Rates of a frame in its own components.
+    """The rates of a frame, in its own components.
 
     Attributes:
         omega: Angular velocity.
@@ -52,19 +52,19 @@ class FrameMotion:
     U: tuple[Vector, Vector, Vector]
     steps: Vector
 
-    def along_z(self) -> Vector:
-        """U z"""
+    def multiply_z(self) -> Vector:
+        """Return U z."""
         return (self.U[0][2], self.U[1][2], self.U[2][2])
 
-    @remembered
-    def moved(self, r: Vector) -> Vector:
-        """U r"""
+    @cache_expressions
+    def multiply(self, r: Vector) -> Vector:
+        """Return U r."""
         return (dot(self.U[0], r), dot(self.U[1], r), dot(self.U[2], r))
 
 
-@remembered
-def motion(omega: Vector, rate: Vector) -> FrameMotion:
-    """From the rates alone."""
+@cache_expressions
+def make_frame_motion(omega: Vector, rate: Vector) -> FrameMotion:
+    """Return the motion of a frame from its rates alone."""
     products = (omega[1] * omega[2], omega[0] * omega[2], omega[0] * omega[1])
     xx, yy, zz = (component * component for component in omega)
     (yz, xz, xy), (x, y, z) = products, rate
@@ -72,39 +72,39 @@ def motion(omega: Vector, rate: Vector) -> FrameMotion:
     return FrameMotion(omega, rate, products, U, (yy - zz, zz - xx, xx - yy))
 
 
-@remembered
-def turned(
+@cache_expressions
+def add_rotation(
     frame: FrameMotion,
-    turn: Turn,
+    turn: JointRotation,
     speed: Scalar,
     acceleration: Scalar,
     diagonal: Diagonal,
-    rates: Rates,
+    rates: AngularAcceleration,
 ) -> FrameMotion:
-    """The motion of a frame that turns about z against another.
+    """Return the motion of a frame that rotates about the z axis of another frame.
 
     Args:
-        frame: FrameMotion of the other, in its own components.
-        turn: By what it is turned already.
-        speed: Of the turning, rad/s.
-        acceleration: Of the turning, rad/s^2.
-        diagonal: How the diagonal of U is made.
-        rates: How the angular acceleration gets here.
+        frame: Motion of the other frame, in its own components.
+        turn: Rotation between the frames now.
+        speed: Speed of the joint, rad/s.
+        acceleration: Acceleration of the joint, rad/s^2.
+        diagonal: Way to compute the diagonal of U.
+        rates: Way to compute the angular acceleration.
     """
-    x, y, _ = turn.back(frame.omega)
+    x, y, _ = turn.to_child(frame.omega)
     z = frame.omega[2] + speed
     rate_z = frame.rate[2] + acceleration
     yz, xz, xy = y * z, x * z, x * y
     u_zz = frame.U[2][2]
-    if rates is Rates.DIRECT:
-        before_x, before_y, _ = turn.back(frame.rate)
+    if rates is AngularAcceleration.DIRECT:
+        before_x, before_y, _ = turn.to_child(frame.rate)
         rate_x, rate_y = before_x + y * speed, before_y - x * speed
         u_xz, u_yz = xz + rate_y, yz - rate_x
     else:
-        u_xz, u_yz, _ = turn.back(frame.along_z())
+        u_xz, u_yz, _ = turn.to_child(frame.multiply_z())
         rate_x, rate_y = yz - u_yz, u_xz - xz
     u_zx, u_zy = xz - rate_y, yz + rate_x
-    if rates is Rates.DOUBLED:
+    if rates is AngularAcceleration.DOUBLED:
         twice = 2 * z
         u_zx, u_zy = twice * x - u_xz, twice * y - u_yz
     if diagonal is Diagonal.SQUARES:
@@ -125,12 +125,12 @@ def turned(
     return FrameMotion((x, y, z), (rate_x, rate_y, rate_z), (yz, xz, xy), U, steps)
 
 
-@remembered
-def seen_through(turn: ConstantTurn, frame: FrameMotion) -> FrameMotion:
-    """The same motion in the components of a frame fixed in it."""
+@cache_expressions
+def change_components(turn: ConstantRotation, frame: FrameMotion) -> FrameMotion:
+    """Return the same motion in the components of another frame fixed in the first."""
     if not turn.is_permutation:
-        return motion(turn.back(frame.omega), turn.back(frame.rate))
-    axes = turn.pattern()
+        return make_frame_motion(turn.to_child(frame.omega), turn.to_child(frame.rate))
+    axes = turn.find_permutation()
 
     def component(i: int, j: int) -> Scalar:
         (k, a), (m, b) = axes[i], axes[j]
@@ -147,8 +147,8 @@ def seen_through(turn: ConstantTurn, frame: FrameMotion) -> FrameMotion:
 
     rows = [(component(i, 0), component(i, 1), component(i, 2)) for i in range(3)]
     return FrameMotion(
-        turn.back(frame.omega),
-        turn.back(frame.rate),
+        turn.to_child(frame.omega),
+        turn.to_child(frame.rate),
         (product(1, 2), product(0, 2), product(0, 1)),
         (rows[0], rows[1], rows[2]),
         (step(1, 2), step(2, 0), step(0, 1)),
@@ -156,8 +156,8 @@ def seen_through(turn: ConstantTurn, frame: FrameMotion) -> FrameMotion:
 
 
 @dataclass(frozen=True)
-class Turning:
-    """What turning about z at a speed and an acceleration adds to U, C = U_after - U_before.
+class RotationEffect:
+    """The change C = U_after - U_before that a rotation about z adds to U.
 
     Only three of its entries differ: ``-loss`` in xx and yy, the acceleration off the diagonal,
     and twice ``half`` in the row of z.
@@ -172,8 +172,8 @@ class Turning:
     loss: Scalar
     half: tuple[Scalar, Scalar]
 
-    def moved(self, r: Vector) -> Vector:
-        """C r"""
+    def multiply(self, r: Vector) -> Vector:
+        """Return C r."""
         x, y, _ = r
         return (
             -(self.loss * x) - self.acceleration * y,
@@ -182,13 +182,13 @@ class Turning:
         )
 
 
-def turning(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> Turning:
-    """Of a frame that turns about z of another, whose motion is given."""
+def make_rotation_effect(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> RotationEffect:
+    """Return the change of U by a rotation about the z axis of a frame whose motion is given."""
     x, y, z = frame.omega
-    return Turning(acceleration, speed * (z + (z + speed)), (speed * x, speed * y))
+    return RotationEffect(acceleration, speed * (z + (z + speed)), (speed * x, speed * y))
 
 
-def slide(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> Vector:
-    """Acceleration that sliding along z of a moving frame adds."""
+def accelerate_along_z(frame: FrameMotion, speed: Scalar, acceleration: Scalar) -> Vector:
+    """Return the acceleration that sliding along the z axis of a moving frame adds."""
     twice = 2 * speed
     return (twice * frame.omega[1], -(twice * frame.omega[0]), acceleration)

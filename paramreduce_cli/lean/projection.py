@@ -15,29 +15,37 @@ _STATES = 3
 """q, dq and ddq come before R and b among the inputs."""
 
 
-def projected_inverse(mechanism: Mechanism, graph: Graph, outputs: Sequence[int]) -> list[int]:
-    """Torques in the independent coordinates, from those of the tree."""
+def project_inverse_outputs(
+    mechanism: Mechanism, graph: Graph, outputs: Sequence[int]
+) -> list[int]:
+    """Return the torques in the independent coordinates, from those of the tree."""
     d_q = [Scalar(graph, value) for value in outputs]
-    R, _ = _tangent(mechanism, graph)
-    return [_dot(column, d_q, graph).value for column in zip(*R, strict=True)]
+    R, _ = _read_tangent(mechanism, graph)
+    return [_multiply_vectors(column, d_q, graph).value for column in zip(*R, strict=True)]
 
 
-def projected_direct(mechanism: Mechanism, graph: Graph, outputs: Sequence[int]) -> list[int]:
-    """The lower triangle of M_zz, row by row, then delta_z, from those of the tree."""
+def project_direct_outputs(mechanism: Mechanism, graph: Graph, outputs: Sequence[int]) -> list[int]:
+    """Return the lower triangle of M_zz, row by row, then delta_z, from those of the tree."""
     n = mechanism.n_q
     flat = [Scalar(graph, value) for value in outputs]
     lower, delta = flat[:-n], flat[-n:]
     M = [[lower[max(i, j) * (max(i, j) + 1) // 2 + min(i, j)] for j in range(n)] for i in range(n)]
-    R, b = _tangent(mechanism, graph)
+    R, b = _read_tangent(mechanism, graph)
     columns = list(zip(*R, strict=True))
-    MR = [[_dot(row, column, graph) for row in M] for column in columns]
-    bias = [delta[i] + _dot(M[i], b, graph) for i in range(n)]
-    M_zz = [_dot(columns[i], MR[j], graph) for i in range(len(columns)) for j in range(i + 1)]
-    return [x.value for x in [*M_zz, *(_dot(column, bias, graph) for column in columns)]]
+    MR = [[_multiply_vectors(row, column, graph) for row in M] for column in columns]
+    bias = [delta[i] + _multiply_vectors(M[i], b, graph) for i in range(n)]
+    M_zz = [
+        _multiply_vectors(columns[i], MR[j], graph)
+        for i in range(len(columns))
+        for j in range(i + 1)
+    ]
+    return [
+        x.value for x in [*M_zz, *(_multiply_vectors(column, bias, graph) for column in columns)]
+    ]
 
 
-def _tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], list[Scalar]]:
-    """R, (n_q, n_dof), and b, (n_q,)."""
+def _read_tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], list[Scalar]]:
+    """Return R, (n_q, n_dof), and b, (n_q,), as inputs of a graph."""
     n_z, dependent = mechanism.n_dof, mechanism.dependent
     zero, one = Scalar(graph, graph.constant(0.0)), Scalar(graph, graph.constant(1.0))
     R = [[zero] * n_z for _ in range(mechanism.n_q)]
@@ -51,7 +59,7 @@ def _tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]], li
     return R, b
 
 
-def _dot(a: Sequence[Scalar], b: Sequence[Scalar], graph: Graph) -> Scalar:
+def _multiply_vectors(a: Sequence[Scalar], b: Sequence[Scalar], graph: Graph) -> Scalar:
     result = Scalar(graph, graph.constant(0.0))
     for x, y in zip(a, b, strict=True):
         result = result + x * y

@@ -12,7 +12,11 @@ from dataclasses import dataclass, replace
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
 from paramreduce_cli.lean.building import Build
-from paramreduce_cli.lean.choices import JointFormulation, alternatives, far_reaching
+from paramreduce_cli.lean.choices import (
+    JointFormulation,
+    list_alternatives,
+    list_distant_alternatives,
+)
 from paramreduce_cli.lean.tree import Joint, Tree
 from paramreduce_cli.records import BASE, Rigid
 
@@ -28,24 +32,24 @@ _found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
 
 
-def best_choices(
+def search_choices(
     tree: Tree, build: Build, start: Sequence[JointFormulation], dropped: Collection[int]
 ) -> list[JointFormulation]:
-    """Choices from which no single change saves an operation.
+    """Search choices from which no single change saves an operation.
 
     Args:
-        tree: The tree.
-        build: The model.
+        tree: Tree to formulate.
+        build: Function that builds the model.
         start: One choice per joint.
         dropped: Positions of parameters that are zero.
     """
     result = list(start)
-    for branch in _branches(tree):
-        part, some = _restricted(tree, branch, dropped)
+    for branch in _split_branches(tree):
+        part, some = _extract_subtree(tree, branch, dropped)
         begin = [result[i] for i in branch]
-        key = (build, _signature(part), frozenset(some), tuple(begin))
+        key = (build, _make_signature(part), frozenset(some), tuple(begin))
         if key not in _found:
-            _found[key] = _descended(part, build, begin, some)
+            _found[key] = _search_pieces(part, build, begin, some)
         for i, choice in zip(branch, _found[key], strict=True):
             result[i] = choice
     return result
@@ -53,7 +57,7 @@ def best_choices(
 
 @dataclass(frozen=True)
 class _Piece:
-    """What is counted to compare the alternatives at a joint."""
+    """A part of the tree that is counted to compare the alternatives at a joint."""
 
     joints: list[int]
     tree: Tree
@@ -61,19 +65,20 @@ class _Piece:
     dropped: Collection[int]
 
 
-def _descended(
+def _search_pieces(
     tree: Tree, build: Build, start: Sequence[JointFormulation], dropped: Collection[int]
 ) -> list[JointFormulation]:
+    """Improve the choices of a tree that is small or a single branch: first near each joint, then as a whole."""
     pieces = []
     for i in range(len(start)):
-        joints = _near(tree, i)
-        pieces.append(_Piece(joints, *_restricted(tree, joints, dropped)))
+        joints = _find_near_joints(tree, i)
+        pieces.append(_Piece(joints, *_extract_subtree(tree, joints, dropped)))
     whole = _Piece(list(range(len(start))), tree, dropped)
-    choices = _settled(tree, start, build, pieces, alternatives)
-    return _settled(tree, choices, build, [whole] * len(start), far_reaching)
+    choices = _improve_choices(tree, start, build, pieces, list_alternatives)
+    return _improve_choices(tree, choices, build, [whole] * len(start), list_distant_alternatives)
 
 
-def _settled(
+def _improve_choices(
     tree: Tree,
     start: Sequence[JointFormulation],
     build: Build,
@@ -83,11 +88,11 @@ def _settled(
     """Take better choices, from the tips inwards, until there are none.
 
     Args:
-        tree: The tree.
+        tree: Tree to formulate.
         start: One choice per joint.
-        build: The model.
-        pieces: What is counted, per joint.
-        options: What may be chosen instead.
+        build: Function that builds the model.
+        pieces: Part of the tree that is counted, per joint.
+        options: Function that lists the alternatives at a joint.
     """
     choices = list(start)
     waiting = set(range(len(choices)))
@@ -100,20 +105,20 @@ def _settled(
         if pieces[i] is not piece:
             piece, graph = pieces[i], Graph()
             forget()
-        found = _best_choice(i, choices, build, pieces[i], graph, options)
+        found = _improve_joint(i, choices, build, pieces[i], graph, options)
         if found != choices[i]:
             choices[i] = found
-            waiting |= {k for k in _neighbours(tree, i) if looks[k] < _LOOKS}
+            waiting |= {k for k in _find_neighbours(tree, i) if looks[k] < _LOOKS}
     return choices
 
 
-def _neighbours(tree: Tree, i: int) -> set[int]:
-    """The joints just before and beyond one."""
+def _find_neighbours(tree: Tree, i: int) -> set[int]:
+    """Return the parent and the children of a joint."""
     beyond = {k for k, joint in enumerate(tree.joints) if joint.parent == i}
     return beyond | ({tree.joints[i].parent} - {BASE})
 
 
-def _best_choice(
+def _improve_joint(
     i: int,
     choices: Sequence[JointFormulation],
     build: Build,
@@ -121,7 +126,7 @@ def _best_choice(
     graph: Graph,
     options: Options,
 ) -> JointFormulation:
-    """The choice at joint i from which no single change saves an operation."""
+    """Return the choice at joint i from which no single change saves an operation."""
 
     def count(choice: JointFormulation) -> int:
         some = [choice if k == i else choices[k] for k in piece.joints]
@@ -139,26 +144,26 @@ def _best_choice(
         found = others[counts.index(best)]
 
 
-def _near(tree: Tree, i: int) -> list[int]:
-    """A joint, those shortly before it and those just beyond."""
+def _find_near_joints(tree: Tree, i: int) -> list[int]:
+    """Return a joint, its closest ancestors and its children."""
     before = [i]
     while len(before) <= _BEFORE and (parent := tree.joints[before[-1]].parent) != BASE:
         before.append(parent)
-    return sorted({*before, *_neighbours(tree, i)})
+    return sorted({*before, *_find_neighbours(tree, i)})
 
 
-def _branches(tree: Tree) -> list[list[int]]:
-    """Joints of every subtree on the base."""
+def _split_branches(tree: Tree) -> list[list[int]]:
+    """Return the joints of every subtree on the base."""
     roots: list[int] = []
     for i, joint in enumerate(tree.joints):
         roots.append(i if joint.parent == BASE else roots[joint.parent])
     return [[i for i, root in enumerate(roots) if root == first] for first in sorted(set(roots))]
 
 
-def _restricted(
+def _extract_subtree(
     tree: Tree, branch: list[int], dropped: Collection[int]
 ) -> tuple[Tree, frozenset[int]]:
-    """A subtree as a tree of its own, in the base turned as its first joint is."""
+    """Return a subtree as a tree on its own base, and the positions of its dropped parameters."""
     place = {i: k for k, i in enumerate(branch)}
     positions = [p for i in branch for p in tree.joints[i].columns]
     renumbered = {position: k for k, position in enumerate(positions)}
@@ -166,7 +171,7 @@ def _restricted(
         replace(
             joint,
             parent=place.get(joint.parent, BASE),
-            rigid=tuple(_renumbered(rigid, renumbered) for rigid in joint.rigid),
+            rigid=tuple(_renumber_columns(rigid, renumbered) for rigid in joint.rigid),
         )
         for joint in (tree.joints[i] for i in branch)
     ]
@@ -178,12 +183,12 @@ def _restricted(
     return Tree(tuple(joints), tree.gravity, len(positions), carried), some
 
 
-def _renumbered(rigid: Rigid, positions: Mapping[int, int]) -> Rigid:
+def _renumber_columns(rigid: Rigid, positions: Mapping[int, int]) -> Rigid:
     return replace(rigid, columns={kind: positions[p] for kind, p in rigid.columns.items()})
 
 
-def _signature(tree: Tree) -> tuple:
-    """Equal for trees with equal counts."""
+def _make_signature(tree: Tree) -> tuple:
+    """Return a key that is equal for trees with equal counts."""
 
     def of(joint: Joint) -> tuple:
         placed = (joint.place.tobytes(), joint.turn.tobytes())

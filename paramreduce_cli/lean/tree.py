@@ -47,7 +47,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Tree:
-    """Joints with the parents before their children, in the order of the mechanism's bodies."""
+    """The joints of a mechanism's tree, parents before their children, in the order of the bodies."""
 
     joints: tuple[Joint, ...]
     gravity: FloatArray
@@ -60,7 +60,7 @@ class Tree:
     """Drives with the positions of their parameters; a part of a tree has none."""
 
 
-def lean_tree(mechanism: Mechanism) -> Tree:
+def choose_frames(mechanism: Mechanism) -> Tree:
     """Choose the frames of a mechanism's tree."""
     joints: list[Joint] = []
     for i, body in enumerate(mechanism.bodies):
@@ -69,13 +69,13 @@ def lean_tree(mechanism: Mechanism) -> Tree:
         if before is not None:
             placed = before.described_to_axis @ placed
         turn, after, sign = clean_rotation(placed[:3, :3]), body.joint_to_body.copy(), 1
-        parallel = before is not None and not _tilts(turn)
+        parallel = before is not None and not _has_tilt(turn)
         if parallel and turn[2, 2] < 0:
             turn, sign = turn @ _FLIP, -1
             after[:3] = _FLIP @ after[:3]
         offset = sign * body.offset
         if body.joint == "revolute" and before is not None:
-            turn, angle = _without_turn_about_z(turn)
+            turn, angle = _split_rotation_about_z(turn)
             offset += angle
         elif parallel:
             after[:3] = turn @ after[:3]
@@ -98,20 +98,20 @@ def lean_tree(mechanism: Mechanism) -> Tree:
     return Tree(tuple(joints), mechanism.gravity, mechanism.n_parameters, drives=drives)
 
 
-def _tilts(rotation: FloatArray) -> bool:
+def _has_tilt(rotation: FloatArray) -> bool:
     """Whether a rotation moves the z axis, however little: the cosine alone would not show it."""
     return bool(np.any(rotation[[2, 2, 0, 1], [0, 1, 2, 2]]))
 
 
-def _without_turn_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
-    """Split off the angle of a turn about z that comes first, if it is in the way.
+def _split_rotation_about_z(turn: FloatArray) -> tuple[FloatArray, float]:
+    """Split off the rotation about z that comes first, unless the whole is a permutation of axes.
 
     Turns by quarters cost nothing where they are; others, about other axes, need fewer products
     without.
     """
-    if np.all((turn == 0) | (np.abs(turn) == 1)) and _tilts(turn):
+    if np.all((turn == 0) | (np.abs(turn) == 1)) and _has_tilt(turn):
         return turn, 0.0
-    sine, cosine = (turn[2, 0], turn[2, 1]) if _tilts(turn) else (turn[1, 0], turn[0, 0])
+    sine, cosine = (turn[2, 0], turn[2, 1]) if _has_tilt(turn) else (turn[1, 0], turn[0, 0])
     angle = float(np.arctan2(sine, cosine))
     c, s = np.cos(angle), np.sin(angle)
     return clean_rotation(turn @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1.0]])), angle

@@ -6,13 +6,13 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from paramreduce_cli.expressions.vectors import Vector, add, cross, scale
-from paramreduce_cli.lean.algebra import Scalar, remembered
+from paramreduce_cli.lean.algebra import Scalar, cache_expressions
 from paramreduce_cli.lean.inertia import Inertia
-from paramreduce_cli.lean.motion import FrameMotion, Turning
+from paramreduce_cli.lean.motion import FrameMotion, RotationEffect
 
 
 class Gauge(StrEnum):
-    """Which part of a body's inertia, s (1 - z z'), is handed to the body before.
+    """A part of a body's inertia, s (1 - z z'), that is handed to the parent body.
 
     A hinge about z cannot tell it apart, so s is chosen for the rest to be simple.
     """
@@ -28,9 +28,9 @@ class Gauge(StrEnum):
     YY_ZZ = "yy=zz"
 
 
-@remembered
+@cache_expressions
 def split_off(body: Inertia, gauge: Gauge) -> tuple[Scalar, Inertia]:
-    """The part s that is handed on and the rest of a body's inertia."""
+    """Split a body's inertia into the part s that is handed to the parent body and the rest."""
     zero = body.m - body.m
     if gauge is Gauge.NONE:
         return zero, body
@@ -52,34 +52,34 @@ class Wrench:
     force: Vector
     moment: Vector
 
-    @remembered
+    @cache_expressions
     def __add__(self, other: Wrench) -> Wrench:
         return Wrench(add(self.force, other.force), add(self.moment, other.moment))
 
-    @remembered
-    def moved(self, r: Vector) -> Wrench:
-        """About another point, from which r leads to the present one."""
+    @cache_expressions
+    def move_point(self, r: Vector) -> Wrench:
+        """Return the wrench about another point, from which r leads to the present one."""
         return Wrench(self.force, add(self.moment, cross(r, self.force)))
 
 
-@remembered
-def inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge: Gauge) -> Wrench:
-    """What a body that moves with a frame needs.
+@cache_expressions
+def compute_inertial_wrench(body: Inertia, frame: FrameMotion, a: Vector, gauge: Gauge) -> Wrench:
+    """Return the wrench that a body needs to move with a frame.
 
     Args:
-        body: In the frame, about its origin.
-        frame: Its motion.
+        body: Inertia in the frame, about its origin.
+        frame: Motion of the frame.
         a: Acceleration of its origin, less gravity.
-        gauge: That the body's inertia is in; gives the cheapest form of the moment.
+        gauge: Gauge of the body's inertia; gives the cheapest form of the moment.
     """
-    force = add(frame.moved(body.d), scale(body.m, a))
-    return Wrench(force, add(_spin(body, frame, gauge), cross(body.d, a)))
+    force = add(frame.multiply(body.d), scale(body.m, a))
+    return Wrench(force, add(_compute_spin_moment(body, frame, gauge), cross(body.d, a)))
 
 
-def _spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
-    """I w' + w x (I w), with the products of w taken from U."""
+def _compute_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
+    """Return I w' + w x (I w), with the products of w taken from U."""
     U, step = frame.U, frame.steps
-    x, y, z = _diagonal_spin(body, frame, gauge)
+    x, y, z = _compute_diagonal_spin_moment(body, frame, gauge)
     return (
         x + body.xz * U[1][0] - body.xy * U[2][0] + body.yz * step[0],
         y + body.xy * U[2][1] - body.yz * U[0][1] + body.xz * step[1],
@@ -87,7 +87,8 @@ def _spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
     )
 
 
-def _diagonal_spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
+def _compute_diagonal_spin_moment(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
+    """Return the part of the spin moment that the diagonal of the inertia tensor needs."""
     U, (rx, ry, rz), (yz, xz, xy) = frame.U, frame.rate, frame.products
     xx, yy, zz = body.xx, body.yy, body.zz
     if gauge is Gauge.FLAT:
@@ -99,9 +100,9 @@ def _diagonal_spin(body: Inertia, frame: FrameMotion, gauge: Gauge) -> Vector:
     return (xx * rx + (zz - yy) * yz, yy * ry + (xx - zz) * xz, zz * rz + (yy - xx) * xy)
 
 
-@remembered
-def spin_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
-    """The moment about z that a body needs to move with a frame."""
+@cache_expressions
+def compute_moment_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
+    """Return the moment about z that a body needs to move with a frame."""
     U, d = frame.U, body.d
     return (
         body.zz * frame.rate[2]
@@ -113,14 +114,14 @@ def spin_about_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
     )
 
 
-def force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
-    """The force along z that a body needs to move with a frame."""
-    return frame.moved(body.d)[2] + body.m * a[2]
+def compute_force_along_z(body: Inertia, frame: FrameMotion, a: Vector) -> Scalar:
+    """Return the force along z that a body needs to move with a frame."""
+    return frame.multiply(body.d)[2] + body.m * a[2]
 
 
-@remembered
-def turning_wrench(body: Inertia, turning: Turning) -> Wrench:
-    """What turning about z adds to what a body needs.
+@cache_expressions
+def compute_rotation_wrench(body: Inertia, turning: RotationEffect) -> Wrench:
+    """Return the wrench that a rotation about z adds to what a body needs.
 
     With C = U_after - U_before and S the second moments, it is C d and the skew part of C S, of
     which C leaves little: twice S_xx is Izz - (Ixx - Iyy), twice S_yy is Izz + (Ixx - Iyy), and
@@ -133,9 +134,9 @@ def turning_wrench(body: Inertia, turning: Turning) -> Wrench:
         acceleration * body.yz + loss * body.xz + (k * twice - h * (body.zz - difference)),
         acceleration * body.zz,
     )
-    return Wrench(turning.moved(body.d), moment)
+    return Wrench(turning.multiply(body.d), moment)
 
 
-def pushed(body: Inertia, a: Vector) -> Wrench:
-    """What a body needs for an acceleration of all its points."""
+def compute_translation_wrench(body: Inertia, a: Vector) -> Wrench:
+    """Return the wrench that a body needs for an equal acceleration of all its points."""
     return Wrench(scale(body.m, a), cross(body.d, a))

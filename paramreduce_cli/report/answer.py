@@ -30,7 +30,7 @@ class ShownParameter:
 
 @dataclass(frozen=True)
 class Answer:
-    """What a reader has come for."""
+    """The result that the page begins with: parameters, errors, cost and code."""
 
     parameters: tuple[ShownParameter, ...]
     kinds: tuple[tuple[str, str], ...]
@@ -49,30 +49,31 @@ class Answer:
     """That writes the model as code."""
 
 
-def answer(data: ReportData, asked: str) -> Answer:
-    """What the page begins with.
+def gather_answer(data: ReportData, asked: str) -> Answer:
+    """Gather what the page begins with.
 
     Args:
-        data: What the report is made from.
-        asked: The config and options that name the run at the shell.
+        data: Records that the report shows.
+        asked: Config and options that name the run at the shell.
     """
     export = "paramreduce export" + (f" {asked}" if asked else "")
     return Answer(
-        parameters=_parameters(data, data.validation.selected.model),
-        kinds=_kinds(data),
-        worst_joint=_worst_joint(data),
+        parameters=_list_parameters(data, data.validation.selected.model),
+        kinds=_list_kinds(data),
+        worst_joint=_find_worst_joint(data),
         functions=data.functions,
         nanoseconds=(
-            _nanoseconds(data, data.speed, "d_z with R"),
-            _nanoseconds(data, data.speed_direct, "[M_zz | δ_z] with R and b"),
+            _describe_speed(data, data.speed, "d_z with R"),
+            _describe_speed(data, data.speed_direct, "[M_zz | δ_z] with R and b"),
         ),
-        as_identified=_as_identified(data),
+        as_identified=_has_identified_values(data),
         weighted=_WEIGHTED[data.weighting],
         command=export if data.model is not None else f"{export} --format values",
     )
 
 
-def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:
+def _list_parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:
+    """Return the parameters of the selected model as the page shows them."""
     found = None if data.identification is None else data.identification.reduced
     deviations = {} if found is None else found.find_deviations(model)
     expressions = model.expressions or model.names
@@ -80,7 +81,7 @@ def _parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, 
         ShownParameter(
             name,
             format_measured(value, deviations.get(name))[0],
-            data.unit(parameter).replace("^2", "²"),
+            data.find_unit(parameter).replace("^2", "²"),
             format_measured(value, deviations.get(name))[1],
             relation if relation != name else "",
         )
@@ -103,8 +104,8 @@ _KINDS = {
 """What letters stand for, by those that are explained together."""
 
 
-def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
-    """Of the parameters that are shown."""
+def _list_kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
+    """Return the symbols of the parameters that are shown, with their meanings."""
     if data.model is None:
         return ()
     parameters = data.model.mechanism.parameters
@@ -117,13 +118,14 @@ def _kinds(data: ReportData) -> tuple[tuple[str, str], ...]:
     )
 
 
-def _as_identified(data: ReportData) -> bool:
+def _has_identified_values(data: ReportData) -> bool:
+    """Return whether the selected model has identified values."""
     found = data.identification
     return found is not None and bool(found.reduced.find_deviations(data.validation.selected.model))
 
 
-def _worst_joint(data: ReportData) -> str:
-    """By the share of its rating, or of its torques where that is not given, on the validation set if there is one."""
+def _find_worst_joint(data: ReportData) -> str:
+    """Return the joint with the largest error relative to its rating or torque, on the validation set if there is one."""
     if data.model is None:
         return ""
     name, rms = list(data.rms_torque.items())[-1]
@@ -136,18 +138,19 @@ def _worst_joint(data: ReportData) -> str:
     shares = np.where(np.isfinite(errors), errors / sizes, -np.inf)
     j = int(shares.argmax())
     label = data.model.mechanism.coordinate_names[j]
-    whole = _two_digits(rms[j]) if rms[j] > NO_TORQUE else "no"
-    unit = data.force_unit(j)
-    rating = f" (rated {_two_digits(sizes[j])} {unit})" if rated else ""
+    whole = _format_two_digits(rms[j]) if rms[j] > NO_TORQUE else "no"
+    unit = data.find_force_unit(j)
+    rating = f" (rated {_format_two_digits(sizes[j])} {unit})" if rated else ""
     return f"RMS of the worst joint, {label}: {errors[j]:.2g} of {whole}\N{NO-BREAK SPACE}{unit}{rating}"
 
 
-def _two_digits(value: float) -> str:
-    """Without an exponent, as for the rating of a motor."""
+def _format_two_digits(value: float) -> str:
+    """Return a number with two digits and without an exponent, like the rating of a motor."""
     return np.format_float_positional(value, precision=2, fractional=False, trim="-")
 
 
-def _nanoseconds(data: ReportData, speed: Speed | None, of_loops: str) -> str:
+def _describe_speed(data: ReportData, speed: Speed | None, of_loops: str) -> str:
+    """Return the times of one evaluation of the full and of the selected model, in ns."""
     if speed is None:
         return ""
     full, reduced = (1e9 * seconds for seconds in speed.seconds.values())

@@ -9,7 +9,7 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far two numbers may be apart: relative, and absolute near zero."""
+    """A tolerance for two numbers: relative, and absolute near zero."""
 
     relative: float
     absolute: float = 0.0
@@ -53,112 +53,127 @@ def compare(
     tolerances: Mapping[str, Tolerance] = TOLERANCES,
     only: tuple[str, ...] = (),
 ) -> list[Difference]:
-    """All differences between two summaries, tolerable ones included.
+    """Return all differences between two summaries, tolerable ones included.
 
     Args:
-        first: What is expected.
-        second: What was found.
-        tolerances: By quantity.
-        only: Quantities to look at; all if empty.
+        first: Expected summary.
+        second: Summary that is compared.
+        tolerances: Tolerances by quantity.
+        only: Quantities to compare; all if empty.
     """
     names = only or tuple(QUANTITIES)
     return [d for name in names for d in QUANTITIES[name](first, second, tolerances)]
 
 
-def _model(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+def _compare_models(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
     for key in ("n_dof", "n_parameters", "n_affecting", "n_base", "names"):
-        yield from _exact(f"model.{key}", a["model"][key], b["model"][key])
+        yield from _compare_exactly(f"model.{key}", a["model"][key], b["model"][key])
 
 
-def _exact(what: str, a: Any, b: Any) -> Iterator[Difference]:
+def _compare_exactly(what: str, a: Any, b: Any) -> Iterator[Difference]:
     if a != b:
         yield Difference(what, str(a), str(b), tolerated=False)
 
 
-def _kappa(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
-    """The optimiser is random, so it is gated by its best and its median, and only upwards."""
+def _compare_kappa(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare the best and the median condition number; only larger ones are differences, as the optimiser is random."""
     if a["trajectories"] is None or b["trajectories"] is None:
-        yield from _exact("trajectories", a["trajectories"], b["trajectories"])
+        yield from _compare_exactly("trajectories", a["trajectories"], b["trajectories"])
         return
     limit = 1 + tolerances["kappa"].relative
-    for label, pick in (("best", min), ("median", _median)):
-        x, y = (pick(_kappas(s)) for s in (a, b))
+    for label, pick in (("best", min), ("median", _find_median)):
+        x, y = (pick(_list_kappas(s)) for s in (a, b))
         if x != y:
             yield Difference(f"kappa, {label}", f"{x:.5g}", f"{y:.5g}", tolerated=y <= x * limit)
 
 
-def _kappas(summary: Summary) -> list[float]:
+def _list_kappas(summary: Summary) -> list[float]:
     found = [t["kappa"] for t in summary["trajectories"]["estimation"]]
     return [math.inf if kappa is None else kappa for kappa in found] or [math.inf]
 
 
-def _median(values: list[float]) -> float:
+def _find_median(values: list[float]) -> float:
     ordered = sorted(values)
     middle = len(ordered) // 2
     return (ordered[middle] + ordered[~middle]) / 2
 
 
-def _numbers(part: str) -> Quantity:
+def _compare_numbers(part: str) -> Quantity:
+    """Return the comparison of one quantity of all validated models."""
+
     def quantity(
         a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
     ) -> Iterator[Difference]:
         for name, rows in a["validation"].items():
             others = {row["n"]: row for row in b["validation"].get(name, [])}
-            yield from _exact(f"sizes of {part}, {name}", [r["n"] for r in rows], [*others])
-            left_out = _open_sizes(a, b, name)
+            yield from _compare_exactly(
+                f"sizes of {part}, {name}", [r["n"] for r in rows], [*others]
+            )
+            left_out = _find_open_sizes(a, b, name)
             if part != "torque_error":
-                left_out |= _tied_sizes(a, b, name)
+                left_out |= _find_tied_sizes(a, b, name)
             for x in (row for row in rows if row["n"] not in left_out):
                 y = others.get(x["n"], x)
                 if part == "operations" and None in {*x[part].values(), *y[part].values()}:
                     continue  # counted in one run at most, as only what is shown is counted
-                yield from _row(f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part])
+                yield from _compare_rows(
+                    f"{name}, n = {x['n']}", part, x[part], y[part], tolerances[part]
+                )
 
     return quantity
 
 
-def _row(
+def _compare_rows(
     where: str, part: str, x: Mapping[str, Any], y: Mapping[str, Any], tolerance: Tolerance
 ) -> Iterator[Difference]:
-    yield from _exact(f"{part}, {where}", sorted(x), sorted(y))
+    """Compare the entries of one quantity of one model."""
+    yield from _compare_exactly(f"{part}, {where}", sorted(x), sorted(y))
     for key in x.keys() & y.keys():
-        one, two = _listed(x[key]), _listed(y[key])
-        yield from _exact(f"entries of {part}.{key}, {where}", len(one), len(two))
+        one, two = _list_values(x[key]), _list_values(y[key])
+        yield from _compare_exactly(f"entries of {part}.{key}, {where}", len(one), len(two))
         for k, (p, q) in enumerate(zip(one, two, strict=False)):
             if p != q:
                 joint = f", joint {k + 1}" if isinstance(x[key], list) else ""
                 if isinstance(x[key], dict):
                     joint = f", {list(x[key])[k]}"
                 what = f"{part}.{key}, {where}{joint}"
-                yield Difference(what, _text(p), _text(q), tolerance.holds(p, q))
+                yield Difference(what, _format_number(p), _format_number(q), tolerance.holds(p, q))
 
 
-def _listed(value: Any) -> list[Any]:
+def _list_values(value: Any) -> list[Any]:
     if isinstance(value, dict):
         return list(value.values())
     return value if isinstance(value, list) else [value]
 
 
-def _text(value: float | None) -> str:
+def _format_number(value: float | None) -> str:
     return "infinite" if value is None else f"{value:.6g}"
 
 
-def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
-    """Subsets are the same up to ties: another subset with the same error is no difference."""
+def _compare_subsets(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare the subsets; another subset with the same error is no difference."""
     names = [sorted(k for k, v in s["reduction"].items() if "n" in v) for s in (a, b)]
-    yield from _exact("heuristics", *names)
+    yield from _compare_exactly("heuristics", *names)
     for name in a["validation"].keys() & b["validation"].keys() & {*names[0]} & {*names[1]}:
-        first, second = (dict(_named_subsets(s["reduction"][name])) for s in (a, b))
+        first, second = (dict(_iterate_subsets(s["reduction"][name])) for s in (a, b))
         errors = [
             {row["n"]: row["torque_error"]["estimation"] for row in s["validation"][name]}
             for s in (a, b)
         ]
-        yield from _exact(f"sizes of subsets, {name}", list(first), list(second))
-        open_sizes = _open_sizes(a, b, name)
+        yield from _compare_exactly(f"sizes of subsets, {name}", list(first), list(second))
+        open_sizes = _find_open_sizes(a, b, name)
         for n in first.keys() & second.keys():
             x, y = set(first[n]), set(second[n])
             if len(x) != len(y):
-                yield from _exact(f"parameters of the subset, {name}, n = {n}", len(x), len(y))
+                yield from _compare_exactly(
+                    f"parameters of the subset, {name}, n = {n}", len(x), len(y)
+                )
             elif x != y:
                 holds = n in open_sizes or _TIE.holds(errors[0].get(n), errors[1].get(n))
                 yield Difference(
@@ -169,9 +184,9 @@ def _order(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
                 )
 
 
-def _tied_sizes(a: Summary, b: Summary, name: str) -> set[int]:
-    """Sizes at which a heuristic took different subsets with the same error: all else may differ."""
-    found = [dict(_named_subsets(s["reduction"][name])) for s in (a, b) if name in s["reduction"]]
+def _find_tied_sizes(a: Summary, b: Summary, name: str) -> set[int]:
+    """Return the sizes at which a heuristic took different subsets with the same error."""
+    found = [dict(_iterate_subsets(s["reduction"][name])) for s in (a, b) if name in s["reduction"]]
     rows = [
         {row["n"]: row["torque_error"]["estimation"] for row in s["validation"].get(name, [])}
         for s in (a, b)
@@ -185,8 +200,8 @@ def _tied_sizes(a: Summary, b: Summary, name: str) -> set[int]:
     }
 
 
-def _open_sizes(a: Summary, b: Summary, name: str) -> set[int]:
-    """Sizes whose proof ended in one run alone: what a search has found by then is left to chance.
+def _find_open_sizes(a: Summary, b: Summary, name: str) -> set[int]:
+    """Return the sizes whose proof ended in one run alone; their subsets are left to chance.
 
     That the two do not contradict each other is looked at with the proofs.
     """
@@ -196,13 +211,16 @@ def _open_sizes(a: Summary, b: Summary, name: str) -> set[int]:
     return {n for n, status in first.items() if second.get(n, status) != status}
 
 
-def _named_subsets(found: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
+def _iterate_subsets(found: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
+    """Yield each size of a heuristic with the names of its parameters."""
     for k, n in enumerate(found["n"]):
         yield n, found["subsets"][k] if found["order"] is None else found["order"][:n]
 
 
-def _proofs(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
-    """What is proven must agree; how much is proven depends on the machine.
+def _compare_proofs(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare proofs: an error below a proven one, or a lower bound above it, is a contradiction.
 
     An error below a proven one, or a lower bound above it, is a contradiction.
     """
@@ -218,28 +236,38 @@ def _proofs(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iter
             possible = (q > p or equal(p, q)) and (
                 y["lower_bound"] < p or equal(y["lower_bound"], p)
             )
-            yield Difference(what, _text(p), f"{_text(q)}, {y['status']}", possible)
+            yield Difference(
+                what, _format_number(p), f"{_format_number(q)}, {y['status']}", possible
+            )
         elif p != q:
-            yield Difference(what, _text(p), _text(q), equal(p, q))
+            yield Difference(what, _format_number(p), _format_number(q), equal(p, q))
 
 
-def _selected(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
+def _compare_selected(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare the selected models."""
     for key in ("heuristic", "n", "accepted"):
-        yield from _exact(f"selected.{key}", a["selected"][key], b["selected"][key])
+        yield from _compare_exactly(f"selected.{key}", a["selected"][key], b["selected"][key])
     x, y = a["selected"]["parameters"], b["selected"]["parameters"]
-    yield from _exact("selected.parameters", sorted(x), sorted(y))
+    yield from _compare_exactly("selected.parameters", sorted(x), sorted(y))
     for name in x.keys() & y.keys():
         if x[name] != y[name]:
             holds = tolerances["parameters"].holds(x[name], y[name])
-            yield Difference(f"selected.parameters.{name}", _text(x[name]), _text(y[name]), holds)
+            yield Difference(
+                f"selected.parameters.{name}",
+                _format_number(x[name]),
+                _format_number(y[name]),
+                holds,
+            )
 
 
-def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Iterator[Difference]:
-    """Which terms are left out first may hang on round-off, so it is gated by how many operations are
-    left, upwards, and by the budget.
-    """
+def _compare_terms(
+    a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
+) -> Iterator[Difference]:
+    """Compare pruned functions by their operations, upwards only, and by whether they keep to the budget."""
     first, second = ({one["function"]: one for one in s.get("terms", [])} for s in (a, b))
-    yield from _exact("functions without small terms", sorted(first), sorted(second))
+    yield from _compare_exactly("functions without small terms", sorted(first), sorted(second))
     for name in first.keys() & second.keys():
         x, y = first[name], second[name]
         most = x["operations"] * (1 + tolerances["terms"].relative)
@@ -250,12 +278,12 @@ def _terms(a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]) -> Itera
                 str(y["operations"]),
                 y["operations"] <= most,
             )
-        yield from _exact(f"budget of terms, {name}", x["budget"], y["budget"])
-        yield from _kept_budget(name, x, y)
+        yield from _compare_exactly(f"budget of terms, {name}", x["budget"], y["budget"])
+        yield from _check_budget(name, x, y)
 
 
-def _kept_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
-    """What must hold of a function however its terms were left out, as far as it held at first."""
+def _check_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
+    """Check that a function keeps to its budgets where the first one did."""
     parts = ("estimation",) if x.get("held_out") else ("estimation", "validation", "test")
     for kind, part in product(("torque", "acceleration"), parts):
         allowed = x["budget"][kind]
@@ -266,22 +294,22 @@ def _kept_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
             continue
         if now is None or now > allowed:
             what = f"{kind} error without small terms, {name}, {part}"
-            yield Difference(what, f"{before:.6g} of {allowed:.6g}", _text(now), False)
+            yield Difference(what, f"{before:.6g} of {allowed:.6g}", _format_number(now), False)
     before, now = x["smallest_eigenvalue"], y["smallest_eigenvalue"]
     if before is not None and (now is None or now <= 0 < before):
         what = f"smallest eigenvalue without small terms, {name}"
-        yield Difference(what, _text(before), _text(now), False)
+        yield Difference(what, _format_number(before), _format_number(now), False)
 
 
 QUANTITIES: dict[str, Quantity] = {
-    "model": _model,
-    "kappa": _kappa,
-    "order": _order,
-    "proofs": _proofs,
-    "torque_error": _numbers("torque_error"),
-    "acceleration_error": _numbers("acceleration_error"),
-    "operations": _numbers("operations"),
-    "mass_matrix": _numbers("mass_matrix"),
-    "selected": _selected,
-    "terms": _terms,
+    "model": _compare_models,
+    "kappa": _compare_kappa,
+    "order": _compare_subsets,
+    "proofs": _compare_proofs,
+    "torque_error": _compare_numbers("torque_error"),
+    "acceleration_error": _compare_numbers("acceleration_error"),
+    "operations": _compare_numbers("operations"),
+    "mass_matrix": _compare_numbers("mass_matrix"),
+    "selected": _compare_selected,
+    "terms": _compare_terms,
 }

@@ -28,37 +28,37 @@ class Curve:
     own: BoolArray
     """Which rows to draw: those that no curve before has, and where they meet it, (n_rows,)."""
 
-    def drawn(self, values: FloatArray) -> FloatArray:
-        """Values of all rows, not a number where a curve before has the very models."""
+    def hide_shared(self, values: FloatArray) -> FloatArray:
+        """Return values of all rows, NaN where an earlier curve has the same models."""
         return np.where(self.own, values, np.nan)
 
     @property
     def label(self) -> str:
-        """The names, as a legend has them."""
+        """Names of the heuristics, for a legend."""
         return ", ".join(self.names)
 
 
-def curves(data: ReportData) -> list[Curve]:
-    """All heuristics, in their order; colours and markers are the same in all figures."""
+def gather_curves(data: ReportData) -> list[Curve]:
+    """Return the curves of all heuristics, in their order; colours and markers are the same in all figures."""
     found: list[Curve] = []
     seen: dict[int, list[_Values]] = {}
     models: list[list[_Values]] = []
     for k, (name, result) in enumerate(data.validation.heuristics.items()):
         sizes = result.n.tolist()
-        own = [_values(data, ModelChoice(name, n)) for n in sizes]
-        place = _same_curve(own, sizes, found, models)
+        own = [_find_values(data, ModelChoice(name, n)) for n in sizes]
+        place = _find_same_curve(own, sizes, found, models)
         if place is not None:
             found[place] = replace(found[place], names=(*found[place].names, name))
             continue
         fresh = [
-            values is None or not any(_same(values, other) for other in seen.get(n, ()))
+            values is None or not any(_is_same(values, other) for other in seen.get(n, ()))
             for n, values in zip(sizes, own, strict=True)
         ]
         for n, values in zip(sizes, own, strict=True):
             seen.setdefault(n, []).append(values)
         models.append(own)
         colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
-        found.append(Curve((name,), result, colour, marker, _with_neighbours(np.array(fresh))))
+        found.append(Curve((name,), result, colour, marker, _mark_neighbours(np.array(fresh))))
     return found
 
 
@@ -66,25 +66,26 @@ _Values = dict[int, float] | None
 """Of a model by column; None where there is no such model."""
 
 
-def _same_curve(
+def _find_same_curve(
     own: list[_Values], sizes: list[int], found: list[Curve], models: list[list[_Values]]
 ) -> int | None:
-    """Which curve has the very same models, if any."""
+    """Return the position of the curve with the same models; None if there is none."""
     for place, (curve, others) in enumerate(zip(found, models, strict=True)):
-        if curve.result.n.tolist() == sizes and all(map(_same, own, others)):
+        if curve.result.n.tolist() == sizes and all(map(_is_same, own, others)):
             return place
     return None
 
 
-def _with_neighbours(fresh: BoolArray) -> BoolArray:
-    """Those, and what is beside them, so that lines go on to where curves meet."""
+def _mark_neighbours(fresh: BoolArray) -> BoolArray:
+    """Return a mask with the neighbours of marked rows marked too, so that lines reach the point where curves meet."""
     result = fresh.copy()
     result[1:] |= fresh[:-1]
     result[:-1] |= fresh[1:]
     return result
 
 
-def _values(data: ReportData, choice: ModelChoice) -> _Values:
+def _find_values(data: ReportData, choice: ModelChoice) -> _Values:
+    """Return the values of a model by parameter; None if the model does not exist."""
     row = choice.find_row(data.reduction)
     if row is None:
         return None
@@ -92,7 +93,8 @@ def _values(data: ReportData, choice: ModelChoice) -> _Values:
     return dict(zip(found.subsets[row].tolist(), found.parameters[row].tolist(), strict=True))
 
 
-def _same(one: _Values, other: _Values) -> bool:
+def _is_same(one: _Values, other: _Values) -> bool:
+    """Return whether two models have the same parameters and values."""
     if one is None or other is None:
         return one is other
     return set(one) == set(other) and bool(

@@ -46,7 +46,7 @@ class ShownMotion:
 
 @dataclass(frozen=True)
 class ReportData(Artifacts):
-    """What the report is made from; without a model the sections of a mechanism are left out."""
+    """All records that the report shows; without a model the sections of a mechanism are missing."""
 
     title: str
     symmetries: int
@@ -73,34 +73,34 @@ class ReportData(Artifacts):
 
     @property
     def n_affecting(self) -> int:
-        """How many parameters act on the torques: columns of the observation matrix that are not zero."""
+        """Number of parameters that act on the torques: columns of the observation matrix that are not zero."""
         if self.model is None:
             return self.reduction.n_affecting
         return int(self.model.affecting.sum())
 
-    def unit(self, parameter: int) -> str:
-        """Of a standard parameter; empty for columns that were brought without a robot."""
+    def find_unit(self, parameter: int) -> str:
+        """Return the unit of a standard parameter; empty for user-supplied columns without a robot."""
         if self.model is None:
             return ""
         return self.model.mechanism.parameters[parameter].unit
 
-    def force_unit(self, joint: int) -> str:
-        """Of what acts on a joint; nothing is known of those that were brought without a robot."""
+    def find_force_unit(self, joint: int) -> str:
+        """Return the unit of what acts on a joint; empty without a robot."""
         if self.model is None:
             return ""
         mechanism = self.model.mechanism
         kind = mechanism.bodies[mechanism.independent[joint]].joint
         return "N m" if kind == "revolute" else "N"
 
-    def joint_label(self, joint: int) -> str:
-        """Name of a joint's coordinate."""
+    def name_joint(self, joint: int) -> str:
+        """Return the name of a joint's coordinate."""
         if self.model is None:
             return f"joint {joint + 1}"
         return self.model.mechanism.coordinate_names[joint]
 
     @property
     def functions(self) -> tuple[str, str]:
-        """What is counted: inverse and direct dynamics."""
+        """Symbols of the functions whose operations are counted: inverse and direct dynamics."""
         if self.model is None or self.model.mechanism.loops is None:
             return "d", "[M | δ]"
         if self.counted is CountedDynamics.INDEPENDENT:
@@ -109,7 +109,7 @@ class ReportData(Artifacts):
 
     @property
     def robot_model(self) -> Model:
-        """The model, for what is of a mechanism.
+        """Model of the robot, for figures and tables that need a mechanism.
 
         Raises:
             LookupError: There is none.
@@ -119,13 +119,13 @@ class ReportData(Artifacts):
         return self.model
 
 
-def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
-    """Generalised coordinates along the trajectories of both sets, that of :func:`first_motion` first.
+def downsample_motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
+    """Return generalised coordinates along the trajectories of both sets, the characteristic motion first.
 
     Args:
-        samples: Both sets.
-        most: Trajectories of each set at most, the first ones.
-        frames: Of all motions together, about.
+        samples: Samples of both sets.
+        most: Largest number of trajectories of each set.
+        frames: Approximate number of frames of all motions together.
 
     Returns:
         (n_frames, n_q) by the name of each motion, evenly spread over it.
@@ -140,12 +140,14 @@ def motions(samples: Samples, most: int, frames: int) -> dict[str, FloatArray]:
     return {name: q[:: max(1, -(-len(q) * len(whole) // frames))] for name, q in whole.items()}
 
 
-def first_motion(blocks: Iterable[Block], model: ReducedModel, most: int = 1000) -> ShownMotion:
-    """The first trajectory of a set, with full and reduced torques.
+def find_first_motion(
+    blocks: Iterable[Block], model: ReducedModel, most: int = 1000
+) -> ShownMotion:
+    """Return the first trajectory of a set, with full and reduced torques.
 
     Args:
-        blocks: The set.
-        model: The reduced model.
+        blocks: Blocks of the set.
+        model: Reduced model.
         most: Samples from which on every second, fourth, ... one is taken.
     """
     parts: list[Block] = []
@@ -153,11 +155,13 @@ def first_motion(blocks: Iterable[Block], model: ReducedModel, most: int = 1000)
     for block in blocks:
         if block.trajectory != 0:
             break
-        parts.append(_thinned(block, -seen % every, every))
+        parts.append(_downsample_block(block, -seen % every, every))
         seen += block.time.size
         while seen > 2 * most * every:
             first = np.cumsum([0, *(p.time.size for p in parts)])
-            parts = [_thinned(p, -int(k) % 2, 2) for p, k in zip(parts, first[:-1], strict=True)]
+            parts = [
+                _downsample_block(p, -int(k) % 2, 2) for p, k in zip(parts, first[:-1], strict=True)
+            ]
             every *= 2
     phi = model.standard
     time = np.concatenate([p.time for p in parts])
@@ -178,8 +182,8 @@ def first_motion(blocks: Iterable[Block], model: ReducedModel, most: int = 1000)
     )
 
 
-def _thinned(block: Block, first: int, every: int) -> Block:
-    """Some of its samples."""
+def _downsample_block(block: Block, first: int, every: int) -> Block:
+    """Return every n-th sample of a block."""
     picked = slice(first, None, every)
     W = block.W.reshape(*block.tau.shape, block.W.shape[1])[picked]
     states = {

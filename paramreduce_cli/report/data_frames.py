@@ -25,10 +25,10 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-def frame(
+def make_data_frame(
     record: Model | Trajectories | Reduction | Validation | Identification | ReducedModel,
 ) -> pd.DataFrame:
-    """A record as a table; it needs pandas.
+    """Return a record as a table of pandas, which must be installed.
 
     Of a model the standard parameters, a row each: name, body, kind, unit, value, affecting. Of trajectories
     set, number and the numbers that each has reached. Of a reduction all models: heuristic, n,
@@ -44,15 +44,15 @@ def frame(
     """
     import pandas as pd
 
-    return pd.DataFrame(list(_rows(record)))
+    return pd.DataFrame(list(_list_rows(record)))
 
 
 @singledispatch
-def _rows(record: Any) -> Iterator[Row]:
+def _list_rows(record: Any) -> Iterator[Row]:
     raise TypeError(f"no table is made of a {type(record).__name__}")
 
 
-@_rows.register
+@_list_rows.register
 def _(record: Model) -> Iterator[Row]:
     known = zip(
         record.mechanism.parameters, record.values.tolist(), record.affecting.tolist(), strict=True
@@ -62,7 +62,7 @@ def _(record: Model) -> Iterator[Row]:
                "unit": parameter.unit, "value": value, "affecting": affecting}  # fmt: skip
 
 
-@_rows.register
+@_list_rows.register
 def _(record: Trajectories) -> Iterator[Row]:
     for which in SETS:
         for k, trajectory in enumerate(getattr(record, which), 1):
@@ -71,7 +71,7 @@ def _(record: Trajectories) -> Iterator[Row]:
             yield {"set": which, "number": k, **numbers}
 
 
-@_rows.register
+@_list_rows.register
 def _(record: Reduction) -> Iterator[Row]:
     for name, found in record.heuristics.items():
         for k, n in enumerate(found.n.tolist()):
@@ -80,7 +80,7 @@ def _(record: Reduction) -> Iterator[Row]:
             yield {"heuristic": name, "n": n, "torque_error": error, "parameters": kept}
 
 
-@_rows.register
+@_list_rows.register
 def _(record: Validation) -> Iterator[Row]:
     for name, judged in record.heuristics.items():
         columns = {
@@ -96,24 +96,24 @@ def _(record: Validation) -> Iterator[Row]:
                 | {key: column[k] for key, column in columns.items()}
                 | {f"{what}_error_test{end}": value
                    for what in ("torque", "acceleration")
-                   for end, value in _ends(judged.get_errors(what).test[k])}
+                   for end, value in _summarise_motions(judged.get_errors(what).test[k])}
             )  # fmt: skip
 
 
-def _ends(errors: FloatArray) -> Iterator[tuple[str, float]]:
-    """Median and worst error over the motions of the test set, with what their columns' names end with."""
+def _summarise_motions(errors: FloatArray) -> Iterator[tuple[str, float]]:
+    """Yield median and worst error over the motions of the test set, with the ends of their columns' names."""
     found = ErrorRange.summarise(errors)
     yield from (("", found.median), ("_worst", found.worst))
 
 
-@_rows.register
+@_list_rows.register
 def _(record: ReducedModel) -> Iterator[Row]:
     expressions = record.expressions or record.names
     for name, value, text in zip(record.names, record.values.tolist(), expressions, strict=True):
         yield {"name": name, "value": value, "stands_for": text}
 
 
-@_rows.register
+@_list_rows.register
 def _(record: Identification) -> Iterator[Row]:
     for which in ("full", "reduced"):
         found = getattr(record, which)

@@ -14,7 +14,7 @@ from paramreduce_cli.records import (
     IntArray,
     ModelChoice,
 )
-from paramreduce_cli.report.curves import EQUAL, curves
+from paramreduce_cli.report.curves import EQUAL, gather_curves
 from paramreduce_cli.report.data import ReportData
 
 _NUMBERS = 600_000
@@ -23,14 +23,14 @@ _FINEST = np.iinfo(np.uint16).max
 _FUNCTIONS = ("inverse", "direct")
 
 
-def explorer(data: ReportData) -> dict[str, Any]:
-    """Everything that the explorer shows, as plain data with packed arrays.
+def pack_explorer(data: ReportData) -> dict[str, Any]:
+    """Return everything that the explorer shows as plain data with packed arrays.
 
     Torques are not embedded but the observation matrix of one motion, in single precision: the page
     multiplies it with the parameters of whichever model is looked at.
 
     Args:
-        data: What the report is made from.
+        data: Records that the report shows.
     """
     shown = np.flatnonzero(data.reduction.factor[:, :-1].any(axis=0))
     library = _Models(data, shown)
@@ -40,13 +40,13 @@ def explorer(data: ReportData) -> dict[str, Any]:
         "measured": data.identification is not None,
         "counted": data.model is not None,
         "functions": data.functions,
-        "joints": _joints(data),
-        "columns": _columns(data, shown),
-        "curves": _curves(data, library),
-        "terms": _terms(data),
-        "models": library.packed(),
-        "motion": _motion(data, shown),
-        "figure": _figure(data),
+        "joints": _list_joints(data),
+        "columns": _list_columns(data, shown),
+        "curves": _list_curves(data, library),
+        "terms": _list_pruned(data),
+        "models": library.pack(),
+        "motion": _pack_motion(data, shown),
+        "figure": _pack_animation(data),
     }
 
 
@@ -60,8 +60,8 @@ class _Models:
         self._columns: list[np.ndarray] = []
         self._values: list[np.ndarray] = []
 
-    def number(self, choice: ModelChoice) -> int:
-        """Of a heuristic's model; -1 where there is none."""
+    def number_model(self, choice: ModelChoice) -> int:
+        """Return the number of a heuristic's model; -1 if the model does not exist."""
         row = choice.find_row(self._reduction)
         if row is None:
             return -1
@@ -80,60 +80,64 @@ class _Models:
         self._values.append(values)
         return same[-1]
 
-    def packed(self) -> dict[str, Any]:
-        """Columns and values of all, one after the other, and where each begins."""
+    def pack(self) -> dict[str, Any]:
+        """Return columns and values of all models, and where each model begins."""
         starts = np.cumsum([0, *(columns.size for columns in self._columns)])
         return {
-            "starts": packed(starts.astype(np.uint32)),
-            "columns": packed(np.concatenate(self._columns)),
-            "values": packed(np.concatenate(self._values)),
+            "starts": pack_array(starts.astype(np.uint32)),
+            "columns": pack_array(np.concatenate(self._columns)),
+            "values": pack_array(np.concatenate(self._values)),
         }
 
 
-def _curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
-    """Errors and costs by heuristic; those that found the same models are one curve."""
+def _list_curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
+    """Return errors and costs by heuristic; heuristics with the same models share a curve."""
     return [
         {
             "names": curve.names,
             "colour": curve.colour,
             "n": curve.result.n.tolist(),
             "model": [
-                library.number(ModelChoice(curve.names[0], n)) for n in curve.result.n.tolist()
+                library.number_model(ModelChoice(curve.names[0], n))
+                for n in curve.result.n.tolist()
             ],
-            **_worth(data, curve.result),
+            **_list_errors(data, curve.result),
         }
-        for curve in curves(data)
+        for curve in gather_curves(data)
     ]
 
 
-def _worth(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
+def _list_errors(data: ReportData, result: HeuristicValidation) -> dict[str, Any]:
+    """Return errors and costs of all models of a heuristic."""
     counted = data.model is not None
     return {
-        "torque": {s: packed(_drawn(result, "torque", s)) for s in SETS},
+        "torque": {s: pack_array(_get_errors(result, "torque", s)) for s in SETS},
         "joints": {
-            s: packed((result.joint_torque_error[s] * rms).astype(np.float32))
+            s: pack_array((result.joint_torque_error[s] * rms).astype(np.float32))
             for s, rms in data.rms_torque.items()
         },
-        "acceleration": {s: packed(_drawn(result, "acceleration", s)) for s in SETS},
-        "operations": {f: _counted(result.operations[f]) if counted else None for f in _FUNCTIONS},
+        "acceleration": {s: pack_array(_get_errors(result, "acceleration", s)) for s in SETS},
+        "operations": {
+            f: _list_operations(result.operations[f]) if counted else None for f in _FUNCTIONS
+        },
     }
 
 
-def _drawn(result: HeuristicValidation, what: str, which: str) -> FloatArray:
-    """Errors on a set, (m,); medians of the motions of the test set."""
+def _get_errors(result: HeuristicValidation, what: str, which: str) -> FloatArray:
+    """Return the errors on a set, (m,); medians of the motions of the test set."""
     errors: FloatArray = result.get_errors(what)[which]
     if which != "test":
         return errors
     return np.array([ErrorRange.summarise(row).median for row in errors])
 
 
-def _counted(operations: FloatArray) -> list[int | None]:
+def _list_operations(operations: FloatArray) -> list[int | None]:
     """Return operations of models; None of those that were not counted."""
     return [None if np.isnan(one) else int(one) for one in operations]
 
 
-def _terms(data: ReportData) -> dict[str, Any]:
-    """Operations and errors on the estimation set of functions with terms left out."""
+def _list_pruned(data: ReportData) -> dict[str, Any]:
+    """Return operations and errors on the estimation set of pruned functions."""
     found = data.terms.functions if data.terms is not None else {}
     return {
         name: [one.front.operations.tolist(), one.front.torque_error.estimation.tolist()]
@@ -141,21 +145,21 @@ def _terms(data: ReportData) -> dict[str, Any]:
     }
 
 
-def _joints(data: ReportData) -> list[dict[str, Any]]:
-    """Joints whose torques are measured or known, with what they amount to on either set."""
+def _list_joints(data: ReportData) -> list[dict[str, Any]]:
+    """Return the joints whose torques are known, with the size of these torques on every set."""
     return [
         {
             "index": j,
-            "name": data.joint_label(j),
-            "unit": data.force_unit(j),
+            "name": data.name_joint(j),
+            "unit": data.find_force_unit(j),
             "rms": {s: float(rms[j]) for s, rms in data.rms_torque.items()},
         }
         for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
     ]
 
 
-def _columns(data: ReportData, shown: IntArray) -> list[dict[str, str]]:
-    """What is chosen among, with the body or drive that each belongs to."""
+def _list_columns(data: ReportData, shown: IntArray) -> list[dict[str, str]]:
+    """Return the parameters that are selected from, with the body or drive of each."""
     columns = data.reduction.columns
     if data.model is None:
         return [{"name": columns.names[k], "symbol": columns.names[k], "owner": "", "unit": ""}
@@ -170,20 +174,20 @@ def _columns(data: ReportData, shown: IntArray) -> list[dict[str, str]]:
     return result
 
 
-def _motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
-    """Torques and observation matrix of the motion that is shown, thinned to what a page may weigh."""
+def _pack_motion(data: ReportData, shown: IntArray) -> dict[str, Any]:
+    """Return torques and observation matrix of the motion that is shown, downsampled to limit the size of the page."""
     motion, n_dof = data.motion, data.motion.tau.shape[1]
     step = max(1, -(-motion.time.size * n_dof * shown.size // _NUMBERS))
     W = motion.W[::step] @ data.reduction.columns.expansion[:, shown]
     return {
-        "time": packed(motion.time[::step]),
-        "tau": packed(motion.tau[::step].astype(np.float32)),
-        "W": packed(W.astype(np.float32)),
+        "time": pack_array(motion.time[::step]),
+        "tau": pack_array(motion.tau[::step].astype(np.float32)),
+        "W": pack_array(W.astype(np.float32)),
     }
 
 
-def _figure(data: ReportData) -> dict[str, Any] | None:
-    """The mechanism along its motions: points in the base frame, and lines between them by body.
+def _pack_animation(data: ReportData) -> dict[str, Any] | None:
+    """Return the mechanism along its motions: points in the base frame, and lines between them by body.
 
     Coordinates are embedded as shares of the box that they move in, in 16 bits: a step is
     much less than a pixel.
@@ -198,7 +202,7 @@ def _figure(data: ReportData) -> dict[str, Any] | None:
     size = float(np.max(np.nanmax(points, axis=(0, 1)) - low)) or 1.0
     return {
         "count": used.size,
-        "points": packed(np.round((points - low) / size * _FINEST).astype(np.uint16)),
+        "points": pack_array(np.round((points - low) / size * _FINEST).astype(np.uint16)),
         "low": low.tolist(),
         "step": size / _FINEST,
         "motions": [{"name": name, "frames": frames} for name, frames in shown.motions],
@@ -207,8 +211,8 @@ def _figure(data: ReportData) -> dict[str, Any] | None:
     }
 
 
-def packed(array: np.ndarray) -> dict[str, Any]:
-    """An array as text: compressed, and by its type and shape to be read in a browser."""
+def pack_array(array: np.ndarray) -> dict[str, Any]:
+    """Return an array as compressed text, with its type and shape, for a browser to read."""
     content = gzip.compress(np.ascontiguousarray(array).tobytes(), compresslevel=6, mtime=0)
     return {
         "type": array.dtype.name,

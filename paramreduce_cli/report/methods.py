@@ -57,27 +57,29 @@ _HEURISTICS = {"qr": "Ros2019", "forward-selection": "Ros2019", "forward-selecti
 """Where heuristics were published."""
 
 
-def methods(data: ReportData) -> tuple[str, str]:
-    """The paragraph, with keys in brackets, and the BibTeX entries of these."""
-    text = " ".join(_sentences(data))
+def write_methods(data: ReportData) -> tuple[str, str]:
+    """Return a paragraph on the method, with keys in brackets, and the BibTeX entries of these keys."""
+    text = " ".join(_write_sentences(data))
     cited = [key for key in _BIBTEX if f"{key}]" in text or f"{key}," in text]
-    return text, "\n\n".join([*(_entry(key) for key in cited), _SOFTWARE])
+    return text, "\n\n".join([*(_write_entry(key) for key in cited), _SOFTWARE])
 
 
-def _sentences(data: ReportData) -> Iterator[str]:
+def _write_sentences(data: ReportData) -> Iterator[str]:
+    """Yield the sentences of the paragraph, in order."""
     if data.model is not None:
-        yield from _model(data)
-    yield from _excitation(data)
-    yield from _selection(data)
-    yield from _result(data)
+        yield from _write_model(data)
+    yield from _write_excitation(data)
+    yield from _write_selection(data)
+    yield from _write_result(data)
     if data.terms is not None:
-        yield from _terms(data.terms)
+        yield from _write_terms(data.terms)
     if data.identification is not None:
-        yield from _identification(data.identification)
+        yield from _write_identification(data.identification)
     yield f"All of this was done by paramreduce {__version__} [paramreduce]."
 
 
-def _model(data: ReportData) -> Iterator[str]:
+def _write_model(data: ReportData) -> Iterator[str]:
+    """Yield the sentences on the model."""
     model = data.robot_model
     mechanism = model.mechanism
     freedom = f"{mechanism.n_dof} degree{'s' if mechanism.n_dof > 1 else ''} of freedom"
@@ -91,11 +93,12 @@ def _model(data: ReportData) -> Iterator[str]:
     )
 
 
-def _excitation(data: ReportData) -> Iterator[str]:
+def _write_excitation(data: ReportData) -> Iterator[str]:
+    """Yield the sentences on the motions."""
     if data.log is not None:
-        yield _measured(data.log)
+        yield _write_log(data.log)
     elif data.trajectories is not None:
-        yield _trajectories(data.trajectories)
+        yield _write_trajectories(data.trajectories)
     elif data.model is None:
         yield "The observation matrix and the forces were given."
     elif data.simulated:
@@ -104,7 +107,8 @@ def _excitation(data: ReportData) -> Iterator[str]:
         yield "The states of all sets were given."
 
 
-def _measured(log: MeasuredLog) -> str:
+def _write_log(log: MeasuredLog) -> str:
+    """Return the sentence on recorded motions."""
     states = "differentiated positions" if not isfinite(log.state_cutoff) else (
         f"positions and speeds low-passed at {log.state_cutoff:.4g} Hz"
     )  # fmt: skip
@@ -120,7 +124,8 @@ def _measured(log: MeasuredLog) -> str:
     )
 
 
-def _trajectories(found: Trajectories) -> str:
+def _write_trajectories(found: Trajectories) -> str:
+    """Return the sentences on optimised trajectories."""
     count = f"{len(found.estimation)} estimation, {len(found.validation)} validation and {len(found.test)} test trajectories"
     if found.source:
         return (
@@ -146,7 +151,8 @@ _WEIGHTS = {
 }
 
 
-def _selection(data: ReportData) -> Iterator[str]:
+def _write_selection(data: ReportData) -> Iterator[str]:
+    """Yield the sentences on the heuristics."""
     names = list(data.reduction.heuristics)
     cited = []
     for name in names:
@@ -169,7 +175,8 @@ def _selection(data: ReportData) -> Iterator[str]:
         yield "The size was chosen by cross-validation inside the estimation set with the one-standard-error rule [Hastie2009]."
 
 
-def _result(data: ReportData) -> Iterator[str]:
+def _write_result(data: ReportData) -> Iterator[str]:
+    """Yield the sentences on the selected model."""
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.find_row(selected.n)
@@ -201,7 +208,8 @@ _COUNTED = {
 """What is counted, by the function."""
 
 
-def _terms(found: TermReduction) -> Iterator[str]:
+def _write_terms(found: TermReduction) -> Iterator[str]:
+    """Yield the sentences on pruned functions."""
     for name, term in found.functions.items():
         acceleration = ""
         if name == "direct" and isfinite(found.acceleration_budget):
@@ -223,7 +231,8 @@ _ESTIMATORS = {
 }
 
 
-def _identification(found: Identification) -> Iterator[str]:
+def _write_identification(found: Identification) -> Iterator[str]:
+    """Yield the sentences on identified values."""
     yield (
         f"Values were identified from the measured torques by {_ESTIMATORS[found.estimator]}, with standard deviations for "
         f"noise as coloured as the residuals; {format_percent(found.reduced.held_out)} of the torques held out stay unexplained, "
@@ -236,7 +245,8 @@ def _identification(found: Identification) -> Iterator[str]:
         )
 
 
-def _entry(key: str) -> str:
+def _write_entry(key: str) -> str:
+    """Return a BibTeX entry."""
     kind, authors, title, where, year = _BIBTEX[key]
     lines = [f"author = {{{authors}}}", f"title = {{{title}}}", *([where] if where else []), f"year = {{{year}}}"]  # fmt: skip
     return f"@{kind}{{{key},\n  " + ",\n  ".join(lines) + "\n}"

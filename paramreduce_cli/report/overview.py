@@ -15,17 +15,17 @@ HEADER = (
 )  # fmt: skip
 
 
-def overview(rows: Sequence[tuple[str, ...]]) -> Table:
-    """The selected model of every robot, or run, beside its full one, inverse and direct dynamics."""
+def make_overview(rows: Sequence[tuple[str, ...]]) -> Table:
+    """Return a table of the selected model of every robot, or run, beside its full one, inverse and direct dynamics."""
     return Table("Reduced models", ("robot", *HEADER), tuple(rows))
 
 
-def overview_row(summary: Summary, name: str = "") -> tuple[str, ...]:
-    """One robot's row.
+def make_overview_row(summary: Summary, name: str = "") -> tuple[str, ...]:
+    """Return the row of one robot.
 
     Args:
         summary: Contents of its ``summary.json``.
-        name: Of the run, where the robot's does not tell it from others.
+        name: Name of the run, where the robot's name is not enough.
 
     Raises:
         KeyError, TypeError, ValueError: It is no such summary.
@@ -37,19 +37,22 @@ def overview_row(summary: Summary, name: str = "") -> tuple[str, ...]:
         str(model["n_affecting"]),
         str(model["n_base"]),
         str(selected["n"]),
-        *_function(summary, "inverse", "torque_error"),
-        *_function(summary, "direct", "acceleration_error"),
+        *_make_cells(summary, "inverse", "torque_error"),
+        *_make_cells(summary, "direct", "acceleration_error"),
     )
 
 
-def _function(summary: Summary, name: str, error: str) -> tuple[str, ...]:
+def _make_cells(summary: Summary, name: str, error: str) -> tuple[str, ...]:
+    """Return the cells of one function from a summary."""
     errors, reduced = summary["selected"][error], summary["selected"]["operations"][name]
     full = summary["full"].get(f"operations_{name}")
     test = ErrorRange(**errors["test"]) if errors.get("test") else NO_MOTIONS
-    return function_cells(name, full, reduced, errors["estimation"], errors["validation"], test)
+    return make_function_cells(
+        name, full, reduced, errors["estimation"], errors["validation"], test
+    )
 
 
-def function_cells(
+def make_function_cells(
     name: str,
     full: float | None,
     reduced: float | None,
@@ -57,7 +60,7 @@ def function_cells(
     validation: float | None,
     test: ErrorRange,
 ) -> tuple[str, ...]:
-    """What one function costs and how wrong it is: operations of both models, errors on all sets.
+    """Return cost and errors of one function: operations of both models, errors on all sets.
 
     Without a mechanism nothing is counted, and accelerations are not known.
     """

@@ -12,12 +12,12 @@ from typing import Any
 import jinja2
 
 from paramreduce_cli.records import Provenance
-from paramreduce_cli.report.answer import answer
+from paramreduce_cli.report.answer import gather_answer
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.explorer import explorer
+from paramreduce_cli.report.explorer import pack_explorer
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.methods import methods
-from paramreduce_cli.report.sections import PageSection, place_of
+from paramreduce_cli.report.methods import write_methods
+from paramreduce_cli.report.sections import PageSection, get_place
 from paramreduce_cli.report.symbols import explain_symbols
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import format_percent
@@ -48,22 +48,22 @@ def render_page(
     provenance: Provenance,
     code: Mapping[str, bytes],
 ) -> str:
-    """The report as one HTML page with its figures and its explorer inside.
+    """Return the report as one HTML page with its figures and its explorer inside.
 
     Args:
-        data: What the report is made from.
-        summary: As in summary.json.
+        data: Records that the report shows.
+        summary: Contents of summary.json.
         images: SVG of the figures that there are, by name.
         made: Tables by name.
-        provenance: Of the run.
+        provenance: Provenance of the run.
         code: Files of the selected model as code, by name; empty where there is none.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters["percent"] = format_percent
     model = data.model
     loops = model is not None and model.mechanism.loops is not None
-    context = {"s": summary, "loops": loops, "answer": answer(data, provenance.asked)}
-    items = _items(images, made)
+    context = {"s": summary, "loops": loops, "answer": gather_answer(data, provenance.asked)}
+    items = _group_items(images, made)
     sections = [
         {
             "title": section.title,
@@ -74,26 +74,26 @@ def render_page(
         for section in PageSection
         if items[section]
     ]
-    page = environment.from_string(_text("page.html"))
-    told, bibtex = methods(data)
+    page = environment.from_string(_read_text("page.html"))
+    told, bibtex = write_methods(data)
     return page.render(
         title=data.title,
-        style=_text("uplot/uPlot.min.css") + _text("page.css"),
-        script=_text("uplot/uPlot.iife.min.js") + _text("explorer.js"),
+        style=_read_text("uplot/uPlot.min.css") + _read_text("page.css"),
+        script=_read_text("uplot/uPlot.iife.min.js") + _read_text("explorer.js"),
         # Inside a script nothing may look like the end of it.
-        explored=json.dumps(explorer(data), separators=(",", ":")).replace("<", "\\u003c"),
+        explored=json.dumps(pack_explorer(data), separators=(",", ":")).replace("<", "\\u003c"),
         sections=sections,
         warnings=[(stage, text) for stage, texts in provenance.warnings.items() for text in texts],
         settings=json.dumps(provenance.settings, indent=2, ensure_ascii=False),
         methods=told,
         bibtex=bibtex,
-        code=_archive(code) if code else "",
+        code=_make_archive(code) if code else "",
         **context,
     )
 
 
-def _archive(files: Mapping[str, bytes]) -> str:
-    """Files as a ZIP archive in base64, the same whenever it is made."""
+def _make_archive(files: Mapping[str, bytes]) -> str:
+    """Return files as a ZIP archive in base64; equal files give equal archives."""
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in files.items():
@@ -104,42 +104,42 @@ def _archive(files: Mapping[str, bytes]) -> str:
 def render_sweep(
     title: str, records: Sequence[Mapping[str, Any]], tables: Sequence[Table], figure: bytes
 ) -> str:
-    """Many runs as one HTML page.
+    """Return many runs as one HTML page.
 
     Args:
-        title: Its heading.
-        records: Of the runs.
-        tables: What is shown of them.
+        title: Heading of the page.
+        records: Rows of the runs.
+        tables: Tables to show.
         figure: SVG of all runs.
     """
     environment = jinja2.Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     robots = list(dict.fromkeys(record["robot"] for record in records))
-    return environment.from_string(_text("sweep.html")).render(
-        title=title, style=_text("page.css"), count=len(records), robots=robots, tables=tables,
-        figure=_source(figure),
+    return environment.from_string(_read_text("sweep.html")).render(
+        title=title, style=_read_text("page.css"), count=len(records), robots=robots, tables=tables,
+        figure=_encode_source(figure),
     )  # fmt: skip
 
 
-def _text(name: str) -> str:
+def _read_text(name: str) -> str:
     return resources.files("paramreduce_cli.report").joinpath(name).read_text("utf-8")
 
 
-def _source(svg: bytes) -> str:
+def _encode_source(svg: bytes) -> str:
     return f"data:{_FIGURE_MIME};base64,{base64.b64encode(svg).decode()}"
 
 
-def _items(
+def _group_items(
     images: Mapping[str, bytes], made: Mapping[str, Table]
 ) -> dict[PageSection, list[_Item]]:
-    """Figures and tables by section, in their order."""
+    """Return figures and tables by section, in their order."""
     found = []
     for name, svg in images.items():
         draw = figures[name]
-        source = _source(svg)
-        found.append((place_of(draw), _Item(name, (draw.__doc__ or name).strip(), source)))
+        source = _encode_source(svg)
+        found.append((get_place(draw), _Item(name, (draw.__doc__ or name).strip(), source)))
     for name, table in made.items():
         make = tables[name]
-        place = place_of(make)
+        place = get_place(make)
         caption = (make.__doc__ or name).strip()
         symbols = explain_symbols(name, table.header)
         item = _Item(name, caption, table=table, tall=place.tall, symbols=symbols)

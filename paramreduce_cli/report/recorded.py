@@ -8,7 +8,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.records import FloatArray, ShownSignals
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.style import joint_style, new_figure
+from paramreduce_cli.report.style import choose_joint_style, make_figure
 
 _RAW = "#b4bac2"
 _HELD_OUT = "#d8e6f5"
@@ -20,13 +20,13 @@ Column = tuple[str, FloatArray | None, FloatArray, int | None]
 """Symbol and units, as recorded if it was, as it is used, and the number of its outliers' signal if it can have any."""
 
 
-def signals_figure(data: ReportData, shown: ShownSignals, columns: Sequence[Column]) -> Figure:
-    """A row for each joint, a column for each signal."""
+def draw_signals(data: ReportData, shown: ShownSignals, columns: Sequence[Column]) -> Figure:
+    """Return a figure with a row for each joint and a column for each signal."""
     n_dof = shown.z.shape[1]
-    drawn = new_figure(0.2 + 0.3 * n_dof)
+    drawn = make_figure(0.2 + 0.3 * n_dof)
     grid = drawn.subplots(n_dof, len(columns), sharex=True, squeeze=False)
     for j in range(n_dof):
-        colour, _ = joint_style(j)
+        colour, _ = choose_joint_style(j)
         for axes, (_, raw, used, outlying) in zip(grid[j], columns, strict=True):
             _shade(axes, shown)
             if raw is not None:
@@ -41,7 +41,7 @@ def signals_figure(data: ReportData, shown: ShownSignals, columns: Sequence[Colu
                 times, np.full(times.size, high + room / 2), "|", color="#c2384f", markersize=4
             )
             axes.tick_params(labelsize="x-small")
-        grid[j, 0].set_ylabel(data.joint_label(j), fontsize="x-small")
+        grid[j, 0].set_ylabel(data.name_joint(j), fontsize="x-small")
     for axes, (title, *_) in zip(grid[0], columns, strict=True):
         axes.set_title(title, fontsize="small")
     for axes in grid[-1]:
@@ -51,7 +51,7 @@ def signals_figure(data: ReportData, shown: ShownSignals, columns: Sequence[Colu
 
 
 def _shade(axes: Axes, shown: ShownSignals) -> None:
-    """What is held out, and what is cut off at the ends."""
+    """Shade what is held out, and what is cut off at the ends."""
     bounds = np.concatenate([shown.learned, shown.held_out])
     bounds = bounds[np.isfinite(bounds)]
     ends = (

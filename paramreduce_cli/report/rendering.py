@@ -16,7 +16,7 @@ _AT_LEAST = 4
 """Figures for which the start of a process pays."""
 
 
-def rendered(
+def render_figures(
     names: Sequence[str],
     data: ReportData,
     formats: list[str],
@@ -24,14 +24,14 @@ def rendered(
     jobs: int = 1,
     told: Callable[[int, str], None] = lambda *_: None,
 ) -> dict[str, Encoded]:
-    """Figures by name, in the order that is asked for, without those that have nothing to draw.
+    """Return figures by name, in the given order, without those that have nothing to draw.
 
     Args:
-        names: Of :data:`paramreduce_cli.report.figures.figures`.
-        data: What they show.
-        formats: In which they are encoded.
+        names: Names from :data:`paramreduce_cli.report.figures.figures`.
+        data: Records that the figures show.
+        formats: Formats in which the figures are encoded.
         jobs: Processes at most; a few figures are drawn in this one.
-        told: How many figures are done, and the name of the last one.
+        told: Progress callback with the number of finished figures and the name of the last one.
 
     Raises:
         DataError: A process died.
@@ -39,19 +39,19 @@ def rendered(
     found: dict[str, Encoded] = {}
     jobs = min(jobs, len(names) // _AT_LEAST)
     shown = replace(data, animation=None)  # the page's alone, and large
-    with start_workers(jobs, partial(_Drawn, shown, formats)) as pool:
+    with start_workers(jobs, partial(_DrawingTask, shown, formats)) as pool:
         for name, encoded in pool.map_unordered(_draw, names):
             found[name] = encoded
             told(len(found), name)
     return {name: found[name] for name in names if found[name]}
 
 
-class _Drawn(NamedTuple):
-    """What figures show, and the formats in which they are encoded."""
+class _DrawingTask(NamedTuple):
+    """The data of figures and the formats in which they are encoded."""
 
     data: ReportData
     formats: list[str]
 
 
-def _draw(drawn: _Drawn, name: str) -> Encoded:
+def _draw(drawn: _DrawingTask, name: str) -> Encoded:
     return render(figures[name], drawn.data, drawn.formats)

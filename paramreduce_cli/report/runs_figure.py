@@ -8,16 +8,16 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator, PercentFormatter
 
 from paramreduce_cli.report.curves import COLOURS, MARKERS
-from paramreduce_cli.report.spread import grouped
-from paramreduce_cli.report.style import legend_beside, pair_of_plots
+from paramreduce_cli.report.spread import group_runs
+from paramreduce_cli.report.style import make_two_plots, place_legend_beside
 
 Record = Mapping[str, Any]
 
 
-def runs_figure(records: Sequence[Record]) -> Figure:
-    """Torque error on the validation set against operations, and condition numbers, a mark for every run."""
-    drawn, errors, kappas = pair_of_plots(shared=False)
-    for k, (label, own) in enumerate(grouped(records).items()):
+def draw_runs(records: Sequence[Record]) -> Figure:
+    """Return torque error on the validation set against operations, and condition numbers, with a mark for every run."""
+    drawn, errors, kappas = make_two_plots(shared=False)
+    for k, (label, own) in enumerate(group_runs(records).items()):
         look = {
             "color": COLOURS[k % len(COLOURS)], "marker": MARKERS[k % len(MARKERS)],
             "linestyle": "none", "markersize": 5, "alpha": 0.75,
@@ -34,5 +34,5 @@ def runs_figure(records: Sequence[Record]) -> Figure:
     kappas.yaxis.set_major_formatter("{x:g}")
     kappas.yaxis.set_minor_formatter("{x:g}")
     kappas.set(ylabel=r"$\kappa$, best trajectory", xticks=[])
-    legend_beside(kappas)
+    place_legend_beside(kappas)
     return drawn

@@ -81,7 +81,7 @@ class PageSection(Enum):
 
 @dataclass(frozen=True)
 class PagePlace:
-    """Where on the page something stands."""
+    """A position on the page: section, order and height."""
 
     section: PageSection
     order: int
@@ -100,8 +100,8 @@ def placed(section: PageSection, order: int, *, tall: bool = False) -> Callable[
     return declare
 
 
-def place_of(function: Callable[..., Any]) -> PagePlace:
-    """Where a figure or a table stands.
+def get_place(function: Callable[..., Any]) -> PagePlace:
+    """Return where a figure or a table stands on the page.
 
     Raises:
         TypeError: It does not say so.

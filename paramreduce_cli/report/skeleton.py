@@ -31,22 +31,22 @@ class Skeleton:
     """Of which body each line along that is; :data:`BASE` for what is between two bodies."""
 
 
-def skeleton(model: Model, q: FloatArray) -> Skeleton:
-    """The pose at generalised coordinates q, (n_q,)."""
+def make_skeleton(model: Model, q: FloatArray) -> Skeleton:
+    """Return the mechanism's pose at generalised coordinates q, (n_q,)."""
     mechanism = model.mechanism
     poses = compute_body_poses(mechanism, q)
     joints = [
         body.parent_to_joint if body.parent == BASE else poses[body.parent] @ body.parent_to_joint
         for body in mechanism.bodies
     ]
-    paths = list(_closure_paths(mechanism, poses))
+    paths = list(_iterate_closure_paths(mechanism, poses))
     return Skeleton(
         z=q[list(mechanism.independent)],
         poses=poses,
         masses=np.array([_centre(model, k, pose) for k, pose in enumerate(poses)]),
         joints=np.array(joints),
         parents=tuple(body.parent for body in mechanism.bodies),
-        kinds=tuple(_drawn_as(body) for body in mechanism.bodies),
+        kinds=tuple(_choose_symbol(body) for body in mechanism.bodies),
         closures=tuple(points for points, _ in paths),
         closure_bodies=tuple(bodies for _, bodies in paths),
     )
@@ -67,9 +67,9 @@ class Animation:
     """Names of the bodies."""
 
 
-def animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
-    """The mechanism along motions, each of generalised coordinates (n_frames, n_q)."""
-    frames = [skeleton(model, row) for q in motions.values() for row in q]
+def make_animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
+    """Return the mechanism along motions, each of generalised coordinates (n_frames, n_q)."""
+    frames = [make_skeleton(model, row) for q in motions.values() for row in q]
     places = np.array([one.poses[:, :3, 3] for one in frames])
     half = _AXIS * float(np.ptp(places.reshape(-1, 3), axis=0).max()) or _AXIS
     points = [
@@ -79,11 +79,11 @@ def animation(model: Model, motions: Mapping[str, FloatArray]) -> Animation:
     ]  # fmt: skip
     names = tuple(body.name for body in model.mechanism.bodies)
     lengths = tuple((name, len(q)) for name, q in motions.items())
-    return Animation(np.array(points), lengths, tuple(_lines(frames[0])), names)
+    return Animation(np.array(points), lengths, tuple(_iterate_lines(frames[0])), names)
 
 
-def _lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
-    """Base first, then frames of joints, of bodies, centres of mass, points of closures, and ends of axes.
+def _iterate_lines(shown: Skeleton) -> Iterator[tuple[int, int, int, str]]:
+    """Yield the lines of a pose: points by number, base first, and the body that each line belongs to.
 
     What leads from a body's frame to the next joint is part of that body, not of the next one.
     """
@@ -118,15 +118,15 @@ def _centre(model: Model, body: int, pose: FloatArray) -> FloatArray:
     return pose[:3, 3] + pose[:3, :3] @ (whole[:3] / whole[3])
 
 
-def _drawn_as(body: Body) -> str:
-    """How a joint is drawn; slides inside a free joint are no parts of the mechanism."""
+def _choose_symbol(body: Body) -> str:
+    """Return the symbol of a joint; slides inside a free joint are hidden."""
     return "hidden" if body.intermediate and body.joint == "prismatic" else body.joint
 
 
-def _closure_paths(
+def _iterate_closure_paths(
     mechanism: Mechanism, poses: FloatArray
 ) -> Iterator[tuple[FloatArray, tuple[int, ...]]]:
-    """From body to body by way of each closure, and whose each line is; ends on the base are left out."""
+    """Yield the points from body to body through each closure, and the body that each line belongs to."""
     for closure in mechanism.loops.closures if mechanism.loops is not None else ():
         if closure.kind == "coupling":
             continue

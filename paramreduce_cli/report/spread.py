@@ -13,16 +13,16 @@ _LISTED = 40
 """Parameters in a cell, at most."""
 
 
-def run_record(
+def make_run_record(
     name: str, summary: Summary, variant: str = "", seed: int | None = None
 ) -> dict[str, Any]:
-    """One run as one row of numbers, for analysis elsewhere; None where something is not known.
+    """Return one run as one row of numbers; None where a number is not known.
 
     Args:
-        name: Of the run.
+        name: Name of the run.
         summary: Contents of its ``summary.json``.
-        variant: Of its config, in a sweep.
-        seed: Of its trajectories, in a sweep.
+        variant: Variant of the config, in a sweep.
+        seed: Seed of the trajectories, in a sweep.
 
     Raises:
         KeyError, TypeError, ValueError: It is no such summary.
@@ -57,8 +57,8 @@ def run_record(
     }
 
 
-def spread(records: Sequence[Mapping[str, Any]]) -> Table:
-    """Median, smallest and largest number over the runs of every robot, of its variants apart."""
+def tabulate_spread(records: Sequence[Mapping[str, Any]]) -> Table:
+    """Return a table of the median, smallest and largest number over the runs of every robot and variant."""
     header = (
         "robot",
         "runs",
@@ -75,9 +75,9 @@ def spread(records: Sequence[Mapping[str, Any]]) -> Table:
         "accepted",
     )
     rows = []
-    for label, own in grouped(records).items():
+    for label, own in group_runs(records).items():
         cells = [
-            _range([one[key] for one in own], text)
+            _format_range([one[key] for one in own], text)
             for key, text in (
                 ("kappa_best", _number),
                 ("n", _number),
@@ -97,21 +97,21 @@ def spread(records: Sequence[Mapping[str, Any]]) -> Table:
     return Table("Spread over runs: median (smallest to largest)", header, tuple(rows))
 
 
-def choices(records: Sequence[Mapping[str, Any]]) -> Table:
-    """Parameters that every run of a robot, or of a variant of it, selects, and those that some do."""
+def tabulate_choices(records: Sequence[Mapping[str, Any]]) -> Table:
+    """Return a table of the parameters that every run of a robot and variant selects, and those that some runs select."""
     rows = []
-    for label, own in grouped(records).items():
+    for label, own in group_runs(records).items():
         counts = Counter(name for one in own for name in one["parameters"].split())
         always = sorted(name for name, count in counts.items() if count == len(own))
         some = [
             f"{name} {count}/{len(own)}" for name, count in counts.most_common() if count < len(own)
         ]
-        rows.append((label, *map(_listed, (always, some))))
+        rows.append((label, *map(_list_names, (always, some))))
     return Table("What is selected", ("robot", "in all runs", "in some"), tuple(rows))
 
 
-def grouped(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
-    """Runs that differ by no more than their seeds, by their robot and variant."""
+def group_runs(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str, Any]]]:
+    """Group runs by robot and variant; runs of a group differ by their seeds only."""
     found: dict[str, list[Mapping[str, Any]]] = {}
     for record in records:
         label = ", ".join(filter(None, (record["robot"], record["variant"])))
@@ -119,7 +119,8 @@ def grouped(records: Sequence[Mapping[str, Any]]) -> dict[str, list[Mapping[str,
     return found
 
 
-def _range(values: Sequence[float | None], text: Callable[[float], str]) -> str:
+def _format_range(values: Sequence[float | None], text: Callable[[float], str]) -> str:
+    """Return median, smallest and largest of the known values as text."""
     known = [value for value in values if value is not None]
     if not known:
         return "-"
@@ -131,6 +132,6 @@ def _number(value: float) -> str:
     return f"{value:.4g}"
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     more = len(names) - _LISTED
     return " ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "") or "-"

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.report.curves import curves
+from paramreduce_cli.report.curves import gather_curves
 from paramreduce_cli.report.data import ReportData
 
 D = TypeVar("D")
@@ -80,14 +80,15 @@ def render(draw: Callable[[D], Figure | None], data: D, formats: list[str]) -> d
     of_papers = [name for name in formats if name == "pdf"]
     of_pages = [name for name in formats if name != "pdf"]
     return {
-        **_encoded(draw, data, of_pages, STYLE),
-        **_encoded(draw, data, of_papers, STYLE | COLUMN),
+        **_encode_figure(draw, data, of_pages, STYLE),
+        **_encode_figure(draw, data, of_papers, STYLE | COLUMN),
     }
 
 
-def _encoded(
+def _encode_figure(
     draw: Callable[[D], Figure | None], data: D, formats: list[str], style: dict[str, Any]
 ) -> dict[str, bytes]:
+    """Return a figure in each format; empty if there is nothing to draw."""
     with mpl.rc_context(style):
         drawn = draw(data) if formats else None
         if drawn is None:
@@ -103,34 +104,34 @@ def _encoded(
     return result
 
 
-def new_figure(tall: float = 1.0) -> Figure:
-    """An empty figure over the width of where it will stand.
+def make_figure(tall: float = 1.0) -> Figure:
+    """Return an empty figure over the width of the place where it stands.
 
     Args:
-        tall: Its height over the usual one.
+        tall: Height relative to the usual one.
     """
     width, height = mpl.rcParams["figure.figsize"]
     return Figure(figsize=(width, tall * height))
 
 
-def pair_of_plots(shared: bool = True) -> tuple[Figure, Axes, Axes]:
-    """A figure with two plots, beside or under each other.
+def make_two_plots(shared: bool = True) -> tuple[Figure, Axes, Axes]:
+    """Return a figure with two plots, beside each other, or one below the other where it is narrow.
 
     Args:
-        shared: Whether both have the same upright scale.
+        shared: Whether both plots share the vertical axis.
     """
     rows, columns = (2, 1) if _is_narrow() else (1, 2)
-    drawn = new_figure(1.8 if _is_narrow() else 1.0)
+    drawn = make_figure(1.8 if _is_narrow() else 1.0)
     first, second = drawn.subplots(rows, columns, sharey=shared)
     return drawn, first, second
 
 
-def broken(text: str, plots: int = 1) -> str:
-    """Text over a plot, in lines that are no longer than it is wide.
+def break_lines(text: str, plots: int = 1) -> str:
+    """Return a title of a plot in lines that are no longer than the plot is wide.
 
     Args:
-        text: Of about the size of an axis' label.
-        plots: That stand beside each other.
+        text: Text in about the size of an axis' label.
+        plots: Number of plots beside each other.
     """
     return textwrap.fill(text, _LINE // plots) if _is_narrow() else text
 
@@ -139,14 +140,14 @@ def _is_narrow() -> bool:
     return bool(mpl.rcParams["figure.figsize"][0] < _NARROW)
 
 
-def joint_style(j: int) -> tuple[str, str]:
-    """Colour and line of a joint, the same in all figures."""
+def choose_joint_style(j: int) -> tuple[str, str]:
+    """Return colour and line style of a joint, the same in all figures."""
     colours = len(_JOINT_COLOURS)
     return _JOINT_COLOURS[j % colours], _LINES[j // colours % len(_LINES)]
 
 
-def legend_beside(axes: Axes) -> None:
-    """A legend where it covers nothing: on the right, in a column below."""
+def place_legend_beside(axes: Axes) -> None:
+    """Place a legend where it covers nothing: on the right, or below in a narrow figure."""
     if not _is_narrow():
         axes.legend(fontsize="small", loc="center left", bbox_to_anchor=(1.0, 0.5))
         return
@@ -159,8 +160,8 @@ def legend_beside(axes: Axes) -> None:
     drawn.legend(handles, labels, fontsize="x-small", loc="outside lower center", ncols=columns)
 
 
-def legend_above(axes: Axes, columns: int) -> None:
-    """A legend over a plot, of so many columns at most; of half as many in a column."""
+def place_legend_above(axes: Axes, columns: int) -> None:
+    """Place a legend over a plot, with half as many columns in a narrow figure."""
     axes.legend(
         fontsize="x-small" if _is_narrow() else "small",
         ncols=-(-columns // 2) if _is_narrow() else columns,
@@ -169,34 +170,34 @@ def legend_above(axes: Axes, columns: int) -> None:
     )
 
 
-def visible(values: FloatArray) -> FloatArray:
-    """Errors as they can be drawn: infinite ones leave a gap, exact ones stand at the floor."""
+def clip_errors(values: FloatArray) -> FloatArray:
+    """Return errors as they can be drawn: infinite ones leave a gap, exact ones stand at the floor."""
     result: FloatArray = np.where(np.isfinite(values), np.maximum(values, FLOOR), np.nan)
     return result
 
 
 def mark_selected(axes: Axes, data: ReportData) -> None:
-    """A line at the number of parameters that was selected."""
+    """Draw a line at the number of parameters that is selected."""
     axes.xaxis.set_major_locator(MaxNLocator(integer=True))
     axes.axvline(data.validation.selected.n, color="#0b62c4", linewidth=0.8, alpha=0.5)
 
 
-def message(text: str) -> Figure:
-    """A figure that says why there is nothing to draw."""
-    drawn = new_figure()
+def draw_message(text: str) -> Figure:
+    """Return a figure that says why there is nothing to draw."""
+    drawn = make_figure()
     axes = drawn.subplots()
     axes.text(0.5, 0.5, text, ha="center", transform=axes.transAxes)
     axes.set_axis_off()
     return drawn
 
 
-def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
-    """An error against the number of parameters, on both sets."""
-    drawn = new_figure()
+def draw_errors(data: ReportData, quantity: str, label: str) -> Figure:
+    """Return a figure of an error against the number of parameters, on both sets."""
+    drawn = make_figure()
     axes = drawn.subplots()
-    for curve in curves(data):
+    for curve in gather_curves(data):
         for which, line in (("estimation", "-"), ("validation", "--")):
-            values = curve.drawn(visible(curve.result.get_errors(quantity)[which]))
+            values = curve.hide_shared(clip_errors(curve.result.get_errors(quantity)[which]))
             axes.semilogy(
                 curve.result.n, values, line, color=curve.colour, markersize=3,
                 label=curve.label if line == "-" else None, marker=curve.marker if line == "-" else None,
@@ -214,5 +215,5 @@ def error_figure(data: ReportData, quantity: str, label: str) -> Figure:
     axes.set_ylabel(label)
     axes.plot([], [], color="#57606a", label="estimation")
     axes.plot([], [], "--", color="#57606a", label="validation")
-    legend_beside(axes)
+    place_legend_beside(axes)
     return drawn

@@ -31,7 +31,7 @@ from paramreduce_cli.records import (
 )
 
 
-def summary_of(
+def gather_summary(
     artifacts: Artifacts, leanest: Mapping[str, Leanest], provenance: Provenance
 ) -> dict[str, Any]:
     """Gather the numbers of all artifacts as plain data; infinite ones become None, and so do those
@@ -45,17 +45,25 @@ def summary_of(
         "config_sha256": provenance.config_sha256,
         "versions": dict(provenance.versions),
         "seconds": dict(provenance.seconds),
-        "model": _brought(reduction) if model is None else _model(model),
-        "trajectories": _trajectories(artifacts.trajectories),
+        "model": _summarise_columns(reduction) if model is None else _summarise_model(model),
+        "trajectories": _summarise_trajectories(artifacts.trajectories),
         "reduction": {
-            **{name: _subsets(reduction, found) for name, found in reduction.heuristics.items()},
-            "proofs": _proofs(reduction),
-            "pareto": [_pareto(reduction, validation, choice) for choice in validation.pareto],
+            **{
+                name: _summarise_subsets(reduction, found)
+                for name, found in reduction.heuristics.items()
+            },
+            "proofs": _summarise_proofs(reduction),
+            "pareto": [
+                _summarise_model_choice(reduction, validation, choice)
+                for choice in validation.pareto
+            ],
         },
-        "validation": {name: _rows(result) for name, result in validation.heuristics.items()},
+        "validation": {
+            name: _summarise_rows(result) for name, result in validation.heuristics.items()
+        },
         "full": dict(validation.full),
-        "identification": _identification(artifacts.identification),
-        "terms": _terms(model, artifacts.terms),
+        "identification": _summarise_identification(artifacts.identification),
+        "terms": _summarise_terms(model, artifacts.terms),
         "selected": {
             "heuristic": selected.heuristic,
             "n": selected.n,
@@ -64,31 +72,33 @@ def summary_of(
             "accepted": validation.accepted,
             "verdict": validation.verdict,
             "remarks": [r.text for r in validation.warnings if r.about is About.SELECTED],
-            "leanest": _leanest(leanest),
-            **next(row for row in _rows(chosen) if row["n"] == selected.n),
+            "leanest": _summarise_leanest(leanest),
+            **next(row for row in _summarise_rows(chosen) if row["n"] == selected.n),
         },
-        "stability": _stability(reduction, validation),
+        "stability": _summarise_stability(reduction, validation),
         "remarks": [warning.text for warning in validation.warnings],
     }
-    plain: dict[str, Any] = _plain(data)
+    plain: dict[str, Any] = _convert(data)
     return plain
 
 
-def _leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
+def _summarise_leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
+    """Return the leanest models within the limits, by function."""
     return {
         name: {
             "model": one.model,
             "operations": one.operations,
             "torque_error": {
                 **vars(one.torque_error),
-                "test": _range(ErrorRange.summarise(one.torque_error.test)),
+                "test": _summarise_range(ErrorRange.summarise(one.torque_error.test)),
             },
         }
         for name, one in found.items()
     }
 
 
-def _model(model: Model) -> dict[str, Any]:
+def _summarise_model(model: Model) -> dict[str, Any]:
+    """Return the numbers of the model."""
     return {
         "n_dof": model.mechanism.n_dof,
         "n_parameters": model.values.size,
@@ -100,8 +110,8 @@ def _model(model: Model) -> dict[str, Any]:
     }
 
 
-def _brought(reduction: Reduction) -> dict[str, Any]:
-    """What an observation matrix tells of itself."""
+def _summarise_columns(reduction: Reduction) -> dict[str, Any]:
+    """Return the numbers of a user-supplied observation matrix, in place of a model's."""
     return {
         "n_dof": reduction.nominal_torque.size,
         "n_parameters": len(reduction.columns.names),
@@ -113,7 +123,9 @@ def _brought(reduction: Reduction) -> dict[str, Any]:
     }
 
 
-def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
+def _summarise_subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
+    """Return the subsets of a heuristic."""
+
     def named(columns: IntArray) -> list[str]:
         return [reduction.columns.names[k] for k in columns]
 
@@ -124,12 +136,13 @@ def _subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
         "n": found.n,
         "torque_error_1": found.torque_error_1,
         "torque_error_inf": found.torque_error_inf,
-        "minimum_norm_from": _first(found),
+        "minimum_norm_from": _find_first_beyond_rank(found),
         "seconds": found.seconds,
     }
 
 
-def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
+def _summarise_proofs(reduction: Reduction) -> list[dict[str, Any]]:
+    """Return the proofs, a row for every size."""
     proofs = reduction.proofs
     if proofs is None:
         return []
@@ -137,7 +150,10 @@ def _proofs(reduction: Reduction) -> list[dict[str, Any]]:
     return [{key: getattr(proofs, key)[k] for key in keys} for k in range(proofs.n.size)]
 
 
-def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -> dict[str, Any]:
+def _summarise_model_choice(
+    reduction: Reduction, validation: Validation, choice: ModelChoice
+) -> dict[str, Any]:
+    """Return a model of the Pareto front."""
     heuristic, n = choice.heuristic, choice.n
     result = validation.heuristics[heuristic]
     row = result.find_row(n)
@@ -149,12 +165,14 @@ def _pareto(reduction: Reduction, validation: Validation, choice: ModelChoice) -
         "torque_error": result.torque_error.estimation[row],
         "acceleration_error": result.acceleration_error.estimation[row],
         "operations": {
-            function: _whole(result.operations[function][row]) for function in ("inverse", "direct")
+            function: _convert_count(result.operations[function][row])
+            for function in ("inverse", "direct")
         },
     }
 
 
-def _stability(reduction: Reduction, validation: Validation) -> dict[str, Any] | None:
+def _summarise_stability(reduction: Reduction, validation: Validation) -> dict[str, Any] | None:
+    """Return the stability of the selection; None where it was not checked."""
     found = validation.stability
     if found is None:
         return None
@@ -166,7 +184,8 @@ def _stability(reduction: Reduction, validation: Validation) -> dict[str, Any] |
     }
 
 
-def _identification(found: Identification | None) -> dict[str, Any] | None:
+def _summarise_identification(found: Identification | None) -> dict[str, Any] | None:
+    """Return the identified values; None where there are none."""
     if found is None:
         return None
     consistency = found.consistency
@@ -197,8 +216,8 @@ def _identification(found: Identification | None) -> dict[str, Any] | None:
     }
 
 
-def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, Any]]:
-    """Functions with terms left out; empty where that was not asked for."""
+def _summarise_terms(model: Model | None, found: TermReduction | None) -> list[dict[str, Any]]:
+    """Return the pruned functions; empty where there are none."""
     if model is None or found is None:
         return []
     return [
@@ -210,7 +229,7 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
             "held_out": found.held_out,
             "operations": one.operations,
             "operations_start": one.operations_start,
-            **_errors(one),
+            **_summarise_errors(one),
             "random_torque_error": one.random_torque_error,
             "random_acceleration_error": one.random_acceleration_error,
             "random_states": one.random_states,
@@ -224,7 +243,7 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
             "parameters": dict(zip(one.names, one.values, strict=True)),
             "units": dict(zip(one.names, one.units, strict=True)),
             "pareto": [
-                {"operations": count, **_errors(one.front, k)}
+                {"operations": count, **_summarise_errors(one.front, k)}
                 for k, count in enumerate(one.front.operations)
             ],
         }
@@ -232,11 +251,13 @@ def _terms(model: Model | None, found: TermReduction | None) -> list[dict[str, A
     ]
 
 
-def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]:
+def _summarise_errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]:
+    """Return torque and acceleration errors on all sets."""
+
     def errors_on(part: str, what: str) -> Any:
         value = getattr(of, f"{what}_error")[part]
         own = value if row is None else value[row]
-        return _range(ErrorRange.summarise(own)) if part == "test" else own
+        return _summarise_range(ErrorRange.summarise(own)) if part == "test" else own
 
     return {
         f"{what}_error": {part: errors_on(part, what) for part in SETS}
@@ -244,12 +265,13 @@ def _errors(of: TermModel | TermFront, row: int | None = None) -> dict[str, Any]
     }
 
 
-def _range(errors: ErrorRange) -> dict[str, float] | None:
+def _summarise_range(errors: ErrorRange) -> dict[str, float] | None:
     """Return errors over the motions of the test set; None where it holds none, or where they are not known."""
     return None if np.isnan(errors.median) else errors._asdict()
 
 
-def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
+def _summarise_trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
+    """Return the trajectories of all sets; None where there are none."""
     if trajectories is None:
         return None
     return {
@@ -257,35 +279,34 @@ def _trajectories(trajectories: Trajectories | None) -> dict[str, Any] | None:
         "scaling": trajectories.scaling,
         "constraints": [c.name for c in trajectories.constraints],
         "period": trajectories.period,
-        **{name: [_trajectory(t) for t in getattr(trajectories, name)] for name in SETS},
+        **{name: [_summarise_trajectory(t) for t in getattr(trajectories, name)] for name in SETS},
         "test_point_to_point": [vars(motion) for motion in trajectories.test_point_to_point],
     }
 
 
-def _trajectory(t: Trajectory) -> dict[str, Any]:
+def _summarise_trajectory(t: Trajectory) -> dict[str, Any]:
     return {**vars(t), "kappa_variants": dict(t.kappa_variants)}
 
 
-def _first(found: Subsets) -> int | None:
-    """The smallest size that is fitted with minimum norm."""
+def _find_first_beyond_rank(found: Subsets) -> int | None:
+    """Return the smallest size that is fitted with minimum norm."""
     beyond = found.n[found.minimum_norm]
     return int(beyond[0]) if beyond.size else None
 
 
-def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
+def _summarise_rows(found: HeuristicValidation) -> list[dict[str, Any]]:
+    """Return errors and costs of all models of a heuristic, a row for every size."""
     parts = {
-        "torque_error": _with_joints(found.torque_error, found.joint_torque_error),
-        "acceleration_error": _with_joints(
-            found.acceleration_error, found.joint_acceleration_error
-        ),
+        "torque_error": _add_joints(found.torque_error, found.joint_torque_error),
+        "acceleration_error": _add_joints(found.acceleration_error, found.joint_acceleration_error),
         "operations": vars(found.operations),
         "mass_matrix": vars(found.mass_matrix),
     }
 
     def entry(part: str, key: str, own: Any) -> Any:
         if part == "operations":
-            return _whole(own)
-        return _range(ErrorRange.summarise(own)) if key == "test" else own
+            return _convert_count(own)
+        return _summarise_range(ErrorRange.summarise(own)) if key == "test" else own
 
     return [
         {"n": n}
@@ -297,23 +318,23 @@ def _rows(found: HeuristicValidation) -> list[dict[str, Any]]:
     ]
 
 
-def _with_joints(errors: SetErrors, joints: JointErrors) -> dict[str, FloatArray]:
+def _add_joints(errors: SetErrors, joints: JointErrors) -> dict[str, FloatArray]:
     return vars(errors) | {f"joints_{name}": values for name, values in vars(joints).items()}
 
 
-def _whole(operations: float) -> int | None:
+def _convert_count(operations: float) -> int | None:
     """Return a number of operations; None where it is not known."""
     return int(operations) if np.isfinite(operations) else None
 
 
-def _plain(value: Any) -> Any:
-    """Data that JSON can hold."""
+def _convert(value: Any) -> Any:
+    """Return data that JSON can hold."""
     if isinstance(value, dict):
-        return {key: _plain(entry) for key, entry in value.items()}
+        return {key: _convert(entry) for key, entry in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(entry) for entry in value]
+        return [_convert(entry) for entry in value]
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return _convert(value.tolist())
     if isinstance(value, np.bool_ | bool):
         return bool(value)
     if isinstance(value, np.integer):

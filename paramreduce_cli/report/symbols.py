@@ -77,11 +77,11 @@ _OF_TABLES: Mapping[str, Mapping[str, str]] = {
 
 
 def explain_symbols(table: str, header: tuple[str, ...]) -> list[tuple[str, str]]:
-    """Headings of a table that need it, each once, with what they mean.
+    """Return the headings of a table that need an explanation, each once, with their meanings.
 
     Args:
-        table: Its name.
-        header: Its headings.
+        table: Name of the table.
+        header: Headings of the table.
     """
     meanings = {**_EVERYWHERE, **_OF_TABLES.get(table, {})}
     return [(cell, meanings[cell]) for cell in dict.fromkeys(header) if cell in meanings]

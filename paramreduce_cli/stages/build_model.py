@@ -8,7 +8,7 @@ import numpy as np
 from paramreduce_cli.config.schema import ModelSection
 from paramreduce_cli.errors import ConfigError, DataError, NumericalError, ParamreduceWarning
 from paramreduce_cli.lean.checking import check_formulations
-from paramreduce_cli.lean.formulations import formulations
+from paramreduce_cli.lean.formulations import find_formulations
 from paramreduce_cli.multibody.base_parameters import (
     choose_base,
     compute_regrouping,
@@ -68,7 +68,7 @@ def build_model(robot: Robot, model: ModelSection, run: Run) -> Model:
     _check_named(model, mechanism, base)
     _say_other_modes(robot, model, mechanism, base)
     texts = _format_expressions(robot, mechanism, base, affects, states, rng)
-    lean = formulations(mechanism, affects, base.columns, run)
+    lean = find_formulations(mechanism, affects, base.columns, run)
     check_formulations(mechanism, lean, np.flatnonzero(affects), states, rng)
     return Model(
         mechanism=mechanism,

@@ -10,7 +10,7 @@ import numpy as np
 from paramreduce_cli.config.schema import SamplingSection, TrajectoriesSection
 from paramreduce_cli.config.terms import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.lean.formulations import formulations_for
+from paramreduce_cli.lean.formulations import add_formulations
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import (
     CountedDynamics,
@@ -115,7 +115,7 @@ def _search(task: _Task, name: str) -> TermModel | None:
     starts = list_starts(budget.torque, lean, model, reduction, direct=direct)
     smallest = [start.model.kept for start in starts[:_SMALLEST]]
     suited = replace(
-        model, formulations=formulations_for(model, smallest, direct=direct, jobs=run.jobs)
+        model, formulations=add_formulations(model, smallest, direct=direct, jobs=run.jobs)
     )
     lean = LeanModels(suited, independent=projected)
     mechanism = model.mechanism
@@ -256,7 +256,7 @@ def _make_record(
         return None
     model, program = one.drop_unused()
     strayed, test = judge.measure_deviation(one), judge.compute_test_errors(one)
-    whole = (lean.direct if judge.direct else lean.inverse)(one.start.model)
+    whole = (lean.build_direct if judge.direct else lean.build_inverse)(one.start.model)
     return TermModel(
         heuristic=one.start.heuristic,
         n_start=one.start.model.n,

@@ -13,10 +13,10 @@ from paramreduce_cli.config.schema import (
     SelectedSection,
 )
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import find_chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.running import RunningModel, speed
-from paramreduce_cli.export.writing import Exported, exported_model
+from paramreduce_cli.export.running import RunningModel, measure_speeds
+from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -38,13 +38,18 @@ from paramreduce_cli.records import (
 )
 from paramreduce_cli.reduction.models import make_full_model
 from paramreduce_cli.registry import Registry
-from paramreduce_cli.report.data import ReportData, ShownMotion, first_motion, motions
+from paramreduce_cli.report.data import (
+    ReportData,
+    ShownMotion,
+    downsample_motions,
+    find_first_motion,
+)
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.sections import place_of
-from paramreduce_cli.report.skeleton import Animation, Skeleton, animation, skeleton
-from paramreduce_cli.report.summary import summary_of
+from paramreduce_cli.report.sections import get_place
+from paramreduce_cli.report.skeleton import Animation, Skeleton, make_animation, make_skeleton
+from paramreduce_cli.report.summary import gather_summary
 from paramreduce_cli.report.tables import tables
-from paramreduce_cli.report.tracking.demonstration import tracked
+from paramreduce_cli.report.tracking.demonstration import simulate_tracking
 from paramreduce_cli.texts.latex_table import format_latex_table
 
 _POSES = 3
@@ -72,12 +77,12 @@ def report(
     """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
     from paramreduce_cli.report.page import render_page
-    from paramreduce_cli.report.rendering import rendered
+    from paramreduce_cli.report.rendering import render_figures
 
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected
     shown = samples.validation if samples.validation is not None else samples.estimation
-    motion = first_motion(shown.iterate_blocks(), selected.model)
+    motion = find_first_motion(shown.iterate_blocks(), selected.model)
     running = _compile_models(model, selected, Exported.IDM)
     direct = _compile_models(model, selected, Exported.DDM) if running else {}
     states = {} if model is None else _compute_states(model, motion)
@@ -92,8 +97,8 @@ def report(
         motion=motion,
         skeletons=() if model is None else _draw_skeletons(section, model, motion),
         animation=None if model is None else _make_animation(model, samples),
-        speed=speed(running, states) if running else None,
-        speed_direct=speed(direct, states) if direct else None,
+        speed=measure_speeds(running, states) if running else None,
+        speed_direct=measure_speeds(direct, states) if direct else None,
         tracking=_simulate_tracking(section, model, running, motion),
     )
     lean = {
@@ -101,7 +106,7 @@ def report(
         for name in (("inverse", "direct") if model is not None else ())
         if (found := find_leanest(name, wanted, validation.heuristics, artifacts.terms)) is not None
     }
-    summary = summary_of(artifacts, lean, provenance)
+    summary = gather_summary(artifacts, lean, provenance)
     formats = [str(name) for name in section.formats]
     drawn = [name for name, _ in _list_shown(figures, model)]
 
@@ -109,7 +114,7 @@ def report(
         run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
 
     tell(0)
-    encoded = rendered(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=tell)
+    encoded = render_figures(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=tell)
     images = {name: one["svg"] for name, one in encoded.items()}
     files = {
         f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats
@@ -137,7 +142,7 @@ def _list_shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]
     return [
         (name, draw)
         for name, draw in offered.items()
-        if model is not None or not place_of(draw).section.of_mechanism
+        if model is not None or not get_place(draw).section.of_mechanism
     ]
 
 
@@ -177,7 +182,7 @@ def _simulate_tracking(
     """Return the tracking of a controller with the full and with the selected model, or None if it is not asked for."""
     if section.tracking is None or model is None or not running:
         return None
-    return tracked(section.tracking, model, running, motion.z, motion.dz)
+    return simulate_tracking(section.tracking, model, running, motion.z, motion.dz)
 
 
 def _export_code(
@@ -186,12 +191,12 @@ def _export_code(
     """Return the checked C code of the selected model; nothing without a mechanism."""
     if model is None:
         return {}
-    chosen, title = chosen_model(None, model, reduction, validation)
+    chosen, title = find_chosen_model(None, model, reduction, validation)
     origin = f"report of config {provenance.config_sha256[:12]}"
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ParamreduceWarning)  # the header says it too
-            exported = exported_model(
+            exported = make_exported_model(
                 model, chosen, title=title, validation=validation, origin=origin
             )
     except FormulationError as error:
@@ -220,13 +225,13 @@ def _make_animation(model: Model, samples: Samples) -> Animation:
     """Return the animation of the motions of both sets."""
     sets = [part for part in (samples.validation, samples.estimation) if part is not None]
     short = all(part.n_samples <= _ANIMATED for part in sets)
-    return animation(model, motions(samples, _MOTIONS if short else 1, _FRAMES))
+    return make_animation(model, downsample_motions(samples, _MOTIONS if short else 1, _FRAMES))
 
 
 def _draw_skeletons(
     section: ReportSection, model: Model, motion: ShownMotion
 ) -> tuple[Skeleton, ...]:
-    return tuple(skeleton(model, q) for q in _choose_poses(section, model, motion))
+    return tuple(make_skeleton(model, q) for q in _choose_poses(section, model, motion))
 
 
 def _choose_poses(section: ReportSection, model: Model, motion: ShownMotion) -> list[FloatArray]:

@@ -371,7 +371,9 @@ def _measure_full_model(
 def _count_operations(counts: Counts, prefix: str, chosen: ReducedModel) -> dict[str, float]:
     """Count operations of a model: lean, and by textbook recursion."""
     names = [prefix + name for name in (*COUNTS, *TEXTBOOK_COUNTS)]
-    return dict(zip(names, [*counts.lean(chosen), *counts.textbook(chosen)], strict=True))
+    return dict(
+        zip(names, [*counts.count_lean(chosen), *counts.count_textbook(chosen)], strict=True)
+    )
 
 
 def _list_cross_validated(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:

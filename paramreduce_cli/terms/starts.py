@@ -8,7 +8,7 @@ from itertools import chain, zip_longest
 import numpy as np
 
 from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean.formulations import varied
+from paramreduce_cli.lean.formulations import vary_formulation
 from paramreduce_cli.lean.model import LeanModels
 from paramreduce_cli.records import Formulation, Model, ReducedModel, Reduction
 
@@ -39,8 +39,8 @@ class Start:
         It is not rewritten yet, as its terms are not those that are left in the end.
         """
         if self.formulation is not None:
-            lean = lean.alone(self.formulation, direct=direct)
-        program = (lean.direct if direct else lean.inverse)(self.model, rewritten=False)
+            lean = lean.restrict_to(self.formulation, direct=direct)
+        program = (lean.build_direct if direct else lean.build_inverse)(self.model, rewritten=False)
         n, n_standard, place = self.model.n, lean.n_parameters, self.model.position
         return program.renumber(lambda k: k - n_standard + n if k >= n_standard else int(place[k]))
 
@@ -64,7 +64,7 @@ def list_starts(
             chosen = reduction.make_model(name, row).drop_unaffecting(model.affecting)
             key = frozenset(chosen.names)
             if found.n[row] <= reduction.rank and key not in entries:
-                cost = lean.estimate(chosen.kept, direct=direct)
+                cost = lean.estimate_operations(chosen.kept, direct=direct)
                 entries[key] = Start(name, chosen, float(found.torque_error[row]), cost)
     return sorted(
         entries.values(), key=lambda start: (start.model.n, start.cost, start.torque_error)
@@ -111,8 +111,11 @@ def near(
         rng: Where chance comes from.
         direct: Whether [M | delta] is meant, not torques.
     """
-    formulation = start.formulation or lean.formulation(start.model, direct=direct)
-    known = [*lean.formulations(direct=direct), *(o.formulation for o in others if o.formulation)]
-    found = varied(formulation, known, lean.mechanism, rng)
+    formulation = start.formulation or lean.choose_formulation(start.model, direct=direct)
+    known = [
+        *lean.get_formulations(direct=direct),
+        *(o.formulation for o in others if o.formulation),
+    ]
+    found = vary_formulation(formulation, known, lean.mechanism, rng)
     subset = others[int(rng.integers(len(others)))] if rng.random() < _OTHER else start
     return replace(subset, formulation=found)

@@ -18,7 +18,7 @@ import rich.table
 import yaml
 
 from paramreduce_cli.artifacts.store import load_file
-from paramreduce_cli.lean.formulations import formulations
+from paramreduce_cli.lean.formulations import find_formulations
 from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import ProofStatus, Reduction
@@ -171,7 +171,7 @@ def of_searches():
         W = K.reshape(-1, K.shape[2])
         base = choose_base(W, mechanism.preference_order, 1e-8)
         started = time.process_time()
-        formulations(mechanism, find_affecting_columns(W), base.columns)
+        find_formulations(mechanism, find_affecting_columns(W), base.columns)
         yield f"search for formulations, {n} joints", time.process_time() - started, limit, "CPU s"
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from paramreduce_cli.lean.formulations import formulations
+from paramreduce_cli.lean.formulations import find_formulations
 from paramreduce_cli.multibody.base_parameters import choose_base, find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
 from tests.conftest import dh, mechanism_of, random_states
@@ -46,7 +46,7 @@ def of_joints(n):
     W = K.reshape(-1, K.shape[2])
     base, ranks = seconds(lambda: choose_base(W, mechanism.preference_order, 1e-8))
     affecting = find_affecting_columns(W)
-    _, searched = seconds(lambda: formulations(mechanism, affecting, base.columns))
+    _, searched = seconds(lambda: find_formulations(mechanism, affecting, base.columns))
     return {
         f"regressor of {STATES} states": regressor,
         "base parameters": ranks,

@@ -17,9 +17,9 @@ import numpy as np
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.choice import chosen_model, simplified_model
+from paramreduce_cli.export.choice import find_chosen_model, find_pruned_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import Exported, exported_model
+from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.records import Kind, TermReduction
 from tests.conftest import ROOT, model_of, whole
 
@@ -57,23 +57,23 @@ def sources():
         model = model_of("puma560")
     names = model.mechanism.parameter_names
     kept = [names.index(name) for name in FS_18.split()]
-    chosen = {name: chosen_model(name, model, None, None)[0] for name in ("full", "base")}
+    chosen = {name: find_chosen_model(name, model, None, None)[0] for name in ("full", "base")}
     chosen["fs18"] = whole(model.mechanism, kept, model.values[kept])
     files = {"lean_code.cpp": DRIVER.read_bytes(), "arm.h": arm(model).encode()}
     for name, one in chosen.items():
         for what, robot in ((Exported.BOTH, name), (Exported.REGRESSOR, f"{name}_K")):
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
-            made = languages["c"](exported_model(named, one, title=name, what=what))
+            made = languages["c"](make_exported_model(named, one, title=name, what=what))
             files |= {f"{robot}.{end}": made[f"{robot}.{end}"] for end in ("c", "h")}
     found = without_small_terms()
     for function, what, ending in (("inverse", Exported.IDM, "d"), ("direct", Exported.DDM, "M")):
-        one, term, title = simplified_model(found, function)
+        one, term, title = find_pruned_model(found, function)
         for kind in ("terms", "single"):
             robot = f"{kind}_{ending}"
             mechanism = dataclasses.replace(model.mechanism, robot=robot)
             named = dataclasses.replace(model, mechanism=mechanism)
-            made = languages["c"](exported_model(
+            made = languages["c"](make_exported_model(
                 named, one, title=title, what=what, single=kind == "single",
                 simplified=term,
             ))  # fmt: skip

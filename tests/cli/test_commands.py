@@ -308,7 +308,7 @@ def test_run_says_what_settings_replace_in_the_default_folder(
 
 
 def test_the_first_trajectory_with_a_way_is_exported():
-    from paramreduce_cli.cli.commands.export_trajectory import _first
+    from paramreduce_cli.cli.commands.export_trajectory import _find_first
 
     trajectories = types.SimpleNamespace(estimation=(1, 2, 3))
 
@@ -317,9 +317,9 @@ def test_the_first_trajectory_with_a_way_is_exported():
             raise DataError("no way to the first")
         return which
 
-    assert _first(trajectories, timed) == ("estimation:2", "estimation:2")
+    assert _find_first(trajectories, timed) == ("estimation:2", "estimation:2")
     with pytest.raises(DataError, match="no way to the first"):
-        _first(types.SimpleNamespace(estimation=(1,)), timed)
+        _find_first(types.SimpleNamespace(estimation=(1,)), timed)
 
 
 def test_init_asks_for_the_motion_of_a_base_that_floats(invoke, tmp_path):

@@ -101,14 +101,14 @@ def test_after_a_kill_ctrl_c_is_no_wish_to_go_on():
         with pytest.raises(KeyboardInterrupt):
             interruption._note(number, None)
     with pytest.raises(KeyboardInterrupt):
-        interruption.heeded()
+        interruption.clear()
 
 
 def test_after_ctrl_c_work_can_go_on():
     interruption = terminal.Interruption()
     with pytest.raises(KeyboardInterrupt):
         interruption._note(signal.SIGINT, None)
-    interruption.heeded()
+    interruption.clear()
     interruption.check()
 
 

@@ -10,14 +10,14 @@ from loop_texts import PARALLELOGRAM, TURNTABLE, load_text
 
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.export.check import check
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import find_chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.term_sizes import entry_sizes, estimate_term_sizes
+from paramreduce_cli.export.term_sizes import estimate_term_sizes, find_entry_sizes
 from paramreduce_cli.export.writing import (
     Exported,
-    exported_functions,
-    exported_model,
-    random_cases,
+    make_exported_model,
+    make_functions,
+    make_random_cases,
 )
 from paramreduce_cli.records import Run
 from paramreduce_cli.stages.build_model import build_model
@@ -54,8 +54,8 @@ def test_self_tests_pass(name, kind, tmp_path):
     if shutil.which(program) is None:
         pytest.skip(f"there is no {program}")
     model = CASES[name](tmp_path)
-    chosen, title = chosen_model("full", model, None, None)
-    files = languages[kind](exported_model(model, chosen, title=title, what=Exported.BOTH))
+    chosen, title = find_chosen_model("full", model, None, None)
+    files = languages[kind](make_exported_model(model, chosen, title=title, what=Exported.BOTH))
     for file, content in files.items():
         (tmp_path / file).write_bytes(content)
     stem = model.mechanism.robot
@@ -70,9 +70,9 @@ def test_self_tests_pass(name, kind, tmp_path):
 
 def test_a_wrong_torque_is_found_beside_results_that_cancel(tmp_path):
     model = turntable(tmp_path)
-    chosen, _ = chosen_model("full", model, None, None)
-    functions = exported_functions(model, chosen, Exported.IDM)
-    stored = random_cases(model.mechanism, chosen, 20, np.random.default_rng(0))
+    chosen, _ = find_chosen_model("full", model, None, None)
+    functions = make_functions(model, chosen, Exported.IDM)
+    stored = make_random_cases(model.mechanism, chosen, 20, np.random.default_rng(0))
     least = estimate_term_sizes(model.mechanism, chosen, stored)
     check(functions, stored, least)
     stored["tau"][3] += 1e-9 * np.abs(stored["tau"]).max()
@@ -82,5 +82,5 @@ def test_a_wrong_torque_is_found_beside_results_that_cancel(tmp_path):
 
 def test_joints_have_sizes_of_their_own():
     tau = np.array([[1e8, 1.0], [-2e8, 3.0]])
-    np.testing.assert_array_equal(entry_sizes("tau", tau, 1e-3), [2e8, 3.0])
-    np.testing.assert_array_equal(entry_sizes("tau", 0 * tau, 1e-3), [1e-3, 1e-3])
+    np.testing.assert_array_equal(find_entry_sizes("tau", tau, 1e-3), [2e8, 3.0])
+    np.testing.assert_array_equal(find_entry_sizes("tau", 0 * tau, 1e-3), [1e-3, 1e-3])

@@ -14,12 +14,12 @@ import pytest
 from conftest import TWO_LINK, model_of
 
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.check import check, random_cases
-from paramreduce_cli.export.choice import chosen_model
-from paramreduce_cli.export.exported import identifier, plain, wrapped
+from paramreduce_cli.export.check import check, make_random_cases
+from paramreduce_cli.export.choice import find_chosen_model
+from paramreduce_cli.export.exported import make_harmless, make_identifier, wrap_line
 from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.term_sizes import estimate_term_sizes
-from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
+from paramreduce_cli.export.writing import Exported, make_exported_model, make_functions
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.records import ModelErrors, TermModel
@@ -35,9 +35,9 @@ def model(request):
 
 
 def files_of(model, kind, what="both", text="full", **options):
-    chosen, title = chosen_model(text, model, None, None)
+    chosen, title = find_chosen_model(text, model, None, None)
     return languages[kind](
-        exported_model(model, chosen, title=title, what=Exported(what), **options)
+        make_exported_model(model, chosen, title=title, what=Exported(what), **options)
     )
 
 
@@ -104,10 +104,12 @@ def test_the_face_for_cpp_gives_what_the_self_test_expects(model, tmp_path, comp
     sources = [f"{name}_example.cpp", f"{name}.o"]
     run([compiler, *CPP, "-isystem", EIGEN, "-o", "t", *sources, "-lm"], tmp_path)
     found = printed(run(["./t"], tmp_path))
-    chosen, _ = chosen_model("full", model, None, None)
+    chosen, _ = find_chosen_model("full", model, None, None)
     rng = np.random.default_rng(0)
-    random_cases(model.mechanism, chosen, 200, rng)  # those that are checked before it is written
-    cases = random_cases(model.mechanism, chosen, 16, rng)
+    make_random_cases(
+        model.mechanism, chosen, 200, rng
+    )  # those that are checked before it is written
+    cases = make_random_cases(model.mechanism, chosen, 16, rng)
     assert set(found) == ({"K"} if what == "regressor" else {"tau", "M", "delta"})
     for key, values in found.items():
         assert values == pytest.approx(np.ravel(cases[key][0]), rel=1e-9, abs=1e-9)
@@ -177,11 +179,11 @@ def test_the_header_says_what_depends_on_parameters_alone(puma, tmp_path):
 
 def test_lines_of_headers_fit_a_window_and_terms_are_whole():
     terms = " + ".join(f"{k / 7:.6g} Izz_{k}" for k in range(2, 40))
-    first, *others = wrapped(f"  0: Izz_1 = 1 kg m^2, Izz_1 - {terms} and 3 smaller terms")
+    first, *others = wrap_line(f"  0: Izz_1 = 1 kg m^2, Izz_1 - {terms} and 3 smaller terms")
     assert len(others) > 4
     assert max(map(len, [first, *others])) <= 100
     assert all(re.match(r" {6}[+] [0-9.]+ Izz_\d+", line) for line in others[:-1])
-    assert wrapped("short - as it is") == ["short - as it is"]
+    assert wrap_line("short - as it is") == ["short - as it is"]
 
 
 def test_the_header_says_what_single_precision_costs(model, tmp_path):
@@ -201,9 +203,9 @@ def test_c_of_closed_loops_solves_them(hexaglide, tmp_path):
 @pytest.mark.parametrize("name", ["puma", "hexaglide"])
 def test_functions_are_the_reference_on_a_thousand_states(name, request):
     model = request.getfixturevalue(name)
-    chosen, _ = chosen_model("full", model, None, None)
-    functions = exported_functions(model, chosen, Exported.BOTH)
-    stored = random_cases(model.mechanism, chosen, 1000, np.random.default_rng(11))
+    chosen, _ = find_chosen_model("full", model, None, None)
+    functions = make_functions(model, chosen, Exported.BOTH)
+    stored = make_random_cases(model.mechanism, chosen, 1000, np.random.default_rng(11))
     check(functions, stored, estimate_term_sizes(model.mechanism, chosen, stored), 1e-12)
 
 
@@ -239,7 +241,7 @@ def test_any_name_of_a_robot_is_one_in_cpp(tmp_path, name):
     named = dataclasses.replace(model.mechanism, robot=name)
     write(dataclasses.replace(model, mechanism=named), tmp_path, "c", "idm")
     command = ["g++", "-std=gnu++17", "-fsyntax-only", "-isystem", EIGEN]
-    run([*command, f"{identifier(name)}_example.cpp"], tmp_path)
+    run([*command, f"{make_identifier(name)}_example.cpp"], tmp_path)
 
 
 def function_without_terms(chosen, graph, outputs, n, **more):
@@ -263,14 +265,14 @@ def function_without_terms(chosen, graph, outputs, n, **more):
 def test_an_angle_that_results_use_too(tmp_path):
     """A sum of coordinates in a sine and in a spring, whose parts only the angle is made of."""
     model = model_of("two_link")
-    chosen, title = chosen_model("full", model, None, None)
+    chosen, title = find_chosen_model("full", model, None, None)
     g = Graph()
     phi, q1, q2, dq1 = (g.input(chosen.n * (k > 0) + max(k - 1, 0)) for k in range(4))
     angle = g.add(g.add(q1, q2), dq1)
     outputs = [g.add(g.call("sin", angle), g.multiply(phi, angle)), g.call("cos", angle)]
     function = function_without_terms(chosen, g, outputs, model.mechanism.n_dof)
     files = languages["c"](
-        exported_model(model, chosen, title=title, what=Exported.IDM, simplified=function)
+        make_exported_model(model, chosen, title=title, what=Exported.IDM, simplified=function)
     )
     for name, content in files.items():
         (tmp_path / name).write_bytes(content)
@@ -326,8 +328,8 @@ def test_matlab_passes_its_self_test_in_octave(model, tmp_path):
 
 def test_casadi_functions_load_and_agree(model, tmp_path):
     write(model, tmp_path, "casadi")
-    chosen, _ = chosen_model("full", model, None, None)
-    stored = random_cases(model.mechanism, chosen, 3, np.random.default_rng(5))
+    chosen, _ = find_chosen_model("full", model, None, None)
+    stored = make_random_cases(model.mechanism, chosen, 3, np.random.default_rng(5))
 
     def loaded(name):
         return ca.Function.load(str(tmp_path / f"{model.mechanism.robot}_{name}.casadi"))
@@ -351,7 +353,7 @@ def test_casadi_functions_load_and_agree(model, tmp_path):
 
 def test_latex_is_a_table_of_all_parameters(model):
     (content,) = files_of(model, "latex", text="base").values()
-    text, names = content.decode(), chosen_model("base", model, None, None)[0].names
+    text, names = content.decode(), find_chosen_model("base", model, None, None)[0].names
     assert text.count(r" \\") == 1 + len(names)
     assert "{lS[table-format=" in text  # values stand under each other by their points
     for name in names:
@@ -360,10 +362,10 @@ def test_latex_is_a_table_of_all_parameters(model):
 
 
 def test_names_cannot_reach_the_code():
-    assert identifier("m") == "robot_m"  # a library that exported code links
-    assert identifier("6-axis.arm") == "robot_6_axis_arm"
-    assert identifier("puma560") == "puma560"
-    assert plain('a */ int x; /* "\\" \n') == "a * / int x; / * '/'  "
+    assert make_identifier("m") == "robot_m"  # a library that exported code links
+    assert make_identifier("6-axis.arm") == "robot_6_axis_arm"
+    assert make_identifier("puma560") == "puma560"
+    assert make_harmless('a */ int x; /* "\\" \n') == "a * / int x; / * '/'  "
 
 
 @pytest.mark.parametrize("kind", list(languages))
@@ -410,31 +412,31 @@ def test_a_later_export_leaves_nothing_of_the_former(invoke, two_link_results, t
 
 def test_models_that_are_unsafe_for_direct_dynamics_say_so(tmp_path):
     model = model_of("two_link")
-    chosen, title = chosen_model("base", model, None, None)
+    chosen, title = find_chosen_model("base", model, None, None)
     wrong = dataclasses.replace(chosen, values=-np.asarray(chosen.values))
     with pytest.warns(ParamreduceWarning, match="not positive definite on 200 of 200"):
-        files = languages["c"](exported_model(model, wrong, title=title, what=Exported.DDM))
+        files = languages["c"](make_exported_model(model, wrong, title=title, what=Exported.DDM))
     assert b"NOT SAFE FOR DIRECT DYNAMICS" in files["two_link.h"]
-    files = languages["c"](exported_model(model, wrong, title=title, what=Exported.IDM))
+    files = languages["c"](make_exported_model(model, wrong, title=title, what=Exported.IDM))
     assert b"NOT SAFE" not in files["two_link.h"]
 
 
 def test_a_mass_matrix_without_terms_need_not_be_positive_where_it_does_not_hold():
     """States of loops are reached from the assembly, wherever that leads."""
     model = model_of("four_bar")
-    chosen, title = chosen_model("full", model, None, None)
+    chosen, title = find_chosen_model("full", model, None, None)
     (crank,) = model.mechanism.independent
     g = Graph()
     outputs = [g.call("cos", g.input(chosen.n + crank)), g.input(0)]
     function = function_without_terms(
         chosen, g, outputs, 1, projected=True, smallest_eigenvalue=np.cos(1), mass_states=100
     )
-    cases = random_cases(model.mechanism, chosen, 200, np.random.default_rng(0), function)
+    cases = make_random_cases(model.mechanism, chosen, 200, np.random.default_rng(0), function)
     assert cases["M"].min() < 0
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         files = languages["c"](
-            exported_model(model, chosen, title=title, what=Exported.DDM, simplified=function)
+            make_exported_model(model, chosen, title=title, what=Exported.DDM, simplified=function)
         )
     header = files["four_bar.h"]
     assert b"NOT SAFE" not in header

@@ -5,7 +5,7 @@ import pytest
 from conftest import config_and_model
 
 from paramreduce_cli.export import running
-from paramreduce_cli.export.running import RunningModel, speed
+from paramreduce_cli.export.running import RunningModel, measure_speeds
 from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -29,7 +29,9 @@ def test_torques_are_those_of_plain_recursion(robot, compiled, monkeypatch):
     assert found.language == ("C" if compiled else "Python")
     assert found(*states) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
     assert found(*states, rounds=3) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    timed = speed({"full": found, "again": found}, dict(zip(found.takes, states, strict=True)))
+    timed = measure_speeds(
+        {"full": found, "again": found}, dict(zip(found.takes, states, strict=True))
+    )
     assert list(timed.seconds) == ["full", "again"]
     assert min(timed.seconds.values()) > 0
 
@@ -56,4 +58,4 @@ def test_mass_matrix_and_remainder_give_the_same_torques(robot, compiled, monkey
     assert tau == pytest.approx(
         Dynamics(mechanism).compute_torques(q, dq, ddq, chosen.standard), abs=1e-9
     )
-    assert speed({"full": found}, states).seconds["full"] > 0
+    assert measure_speeds({"full": found}, states).seconds["full"] > 0

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from conftest import model_of
 
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import find_chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import exported_model
+from paramreduce_cli.export.writing import make_exported_model
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 _MANY = 200_000
@@ -19,8 +19,8 @@ _MANY = 200_000
 def compiled(folder, single):
     """The routine of an exported file, as a function of angles."""
     model = model_of("two_link")
-    chosen, _ = chosen_model("full", model, None, None)
-    made = languages["c"](exported_model(model, chosen, title="", single=single))
+    chosen, _ = find_chosen_model("full", model, None, None)
+    made = languages["c"](make_exported_model(model, chosen, title="", single=single))
     (folder / "two_link.h").write_bytes(made["two_link.h"])
     source = made["two_link.c"].decode()
     source += (

@@ -11,9 +11,9 @@ from hypothesis import strategies as st
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.expressions.scaling import rescale
-from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
+from paramreduce_cli.lean.building import build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.lean.choices import JointFormulation
-from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.lean.tree import choose_frames
 
 FREE, N = 3, 6
 NUMBERS = (0.0825, 0.088, 0.5, 2.0, -0.316, 9.81)
@@ -104,11 +104,11 @@ def test_what_vanishes_in_more_places_goes_first():
     assert numbers == pytest.approx([0.4 / 0.3])
 
 
-@pytest.mark.parametrize("outputs", [inverse_outputs, direct_outputs])
+@pytest.mark.parametrize("outputs", [build_inverse_outputs, build_direct_outputs])
 def test_an_arm_takes_what_it_would_take_if_its_length_were_one(outputs):
     """Oracle: the same arm described anew, in the unit of its first link's length."""
     mechanism = model_of("two_link").mechanism
-    tree = lean_tree(mechanism)
+    tree = choose_frames(mechanism)
     length = float(np.abs(tree.joints[1].place).max())
     joints = tuple(replace(joint, place=joint.place / length) for joint in tree.joints)
     in_lengths = replace(tree, joints=joints, gravity=tree.gravity / length)
@@ -127,11 +127,11 @@ def test_an_arm_takes_what_it_would_take_if_its_length_were_one(outputs):
         assert sizes[name] == pytest.approx(length**-power)
 
 
-@pytest.mark.parametrize("outputs", [inverse_outputs, direct_outputs])
+@pytest.mark.parametrize("outputs", [build_inverse_outputs, build_direct_outputs])
 def test_numbers_that_differ_by_rounding_are_one(outputs):
     mechanism = model_of("puma560").mechanism
     graph = Graph()
-    values = outputs(lean_tree(mechanism), [JointFormulation()] * 6, graph)
+    values = outputs(choose_frames(mechanism), [JointFormulation()] * 6, graph)
     scaled, _ = rescale(Program.from_graph(graph, values), mechanism.n_parameters)
     numbers = np.sort([node.number for node in scaled.nodes if node.operation == "constant"])
     assert numbers.size > 3

@@ -32,7 +32,7 @@ def test_counts_are_those_of_each_model_by_itself(validated):
     counted = 0
     for name, result in validation.heuristics.items():
         for row in np.flatnonzero(np.isfinite(result.operations.inverse)):
-            expected = counts.lean(reduction.make_model(name, int(row)))
+            expected = counts.count_lean(reduction.make_model(name, int(row)))
             assert [result.operations.inverse[row], result.operations.direct[row]] == expected
             counted += 1
     assert counted > 10

@@ -40,4 +40,4 @@ def test_models_are_counted_one_by_one(models):
     model, chosen = models
     counts = counting.Counts(model, CountedDynamics.GENERALISED)
     together = counting.count_all(model, CountedDynamics.GENERALISED, chosen, Run(1))
-    assert together.tolist() == [counts.lean(one) for one in chosen]
+    assert together.tolist() == [counts.count_lean(one) for one in chosen]

@@ -14,11 +14,17 @@ from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.lean import checking, search
 from paramreduce_cli.lean import formulations as module
-from paramreduce_cli.lean.building import direct_outputs, inverse_outputs
-from paramreduce_cli.lean.choices import OPTIONS, JointFormulation, alternatives, from_data, to_data
-from paramreduce_cli.lean.formulations import formulations, formulations_for, varied
+from paramreduce_cli.lean.building import build_direct_outputs, build_inverse_outputs
+from paramreduce_cli.lean.choices import (
+    OPTIONS,
+    JointFormulation,
+    from_data,
+    list_alternatives,
+    to_data,
+)
+from paramreduce_cli.lean.formulations import add_formulations, find_formulations, vary_formulation
 from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.lean.tree import lean_tree
+from paramreduce_cli.lean.tree import choose_frames
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import Formulations, Run
@@ -43,7 +49,7 @@ def compared(mechanism, choices, rng, samples=30):
     plain = Dynamics(mechanism, once=True)
     M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
     inputs = [*np.tile(phi, (samples, 1)).T, *q.T, *dq.T, *ddq.T]
-    tree = lean_tree(mechanism)
+    tree = choose_frames(mechanism)
 
     def evaluated(build):
         graph = Graph()
@@ -52,8 +58,8 @@ def compared(mechanism, choices, rng, samples=30):
     rows, columns = np.tril_indices(mechanism.n_q)
     direct = np.hstack([M[:, rows, columns], delta])
     return (
-        relative(evaluated(inverse_outputs), plain.compute_torques(q, dq, ddq, phi)),
-        relative(evaluated(direct_outputs), direct),
+        relative(evaluated(build_inverse_outputs), plain.compute_torques(q, dq, ddq, phi)),
+        relative(evaluated(build_direct_outputs), direct),
     )
 
 
@@ -74,15 +80,15 @@ def test_choices_survive_being_written_down():
 
 
 def test_alternatives_differ_and_come_once():
-    joint = lean_tree(MECHANISMS["puma"]()).joints[2]
-    found = alternatives(JointFormulation(), joint)
+    joint = choose_frames(MECHANISMS["puma"]()).joints[2]
+    found = list_alternatives(JointFormulation(), joint)
     assert JointFormulation() not in found
     assert len(set(found)) == len(found)
     assert JointFormulation(aligned=True) in found
 
 
 def test_parallel_and_opposite_axes_are_found(puma):
-    joints = lean_tree(puma.mechanism).joints
+    joints = choose_frames(puma.mechanism).joints
     assert [joint.parallel for joint in joints] == [False, False, True, False, False, False]
 
 
@@ -107,8 +113,8 @@ def test_operations_of_the_leanest_formulations(name, kept, inverse, direct, req
     columns = {"full": np.flatnonzero(model.affecting), "base": np.sort(model.base.columns)}
     kept = columns[kept] if kept in columns else np.sort([names.index(k) for k in kept.split()])
     lean, reduced = LeanModels(model), whole(model.mechanism, kept)
-    assert lean.inverse(reduced).n_operations == inverse
-    assert lean.direct(reduced).n_operations == direct
+    assert lean.build_inverse(reduced).n_operations == inverse
+    assert lean.build_direct(reduced).n_operations == direct
 
 
 def test_any_subset_of_a_formulation_is_the_reduced_model(puma):
@@ -136,12 +142,12 @@ def test_tied_and_known_parameters_take_less(puma):
     kept = np.flatnonzero(puma.affecting)
     lean = LeanModels(puma)
     reduced = whole(puma.mechanism, kept, kept / 7)
-    count = lean.inverse(reduced).n_operations
+    count = lean.build_inverse(reduced).n_operations
     position = reduced.position.copy()
     position[kept[20:30]] = position[kept[5]]
     tied = dataclasses.replace(reduced, position=position)
-    assert lean.inverse(tied).n_operations <= count
-    assert lean.inverse(reduced, constant=True).n_operations < count
+    assert lean.build_inverse(tied).n_operations <= count
+    assert lean.build_inverse(reduced, constant=True).n_operations < count
 
 
 def test_estimates_are_near_the_counts(puma):
@@ -149,8 +155,8 @@ def test_estimates_are_near_the_counts(puma):
     lean = LeanModels(puma)
     for n in (6, 12, 18, 30, 45):
         kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
-        count = lean.inverse(whole(puma.mechanism, kept)).n_operations
-        assert count <= lean.estimate(kept) <= 1.1 * count + 10
+        count = lean.build_inverse(whole(puma.mechanism, kept)).n_operations
+        assert count <= lean.estimate_operations(kept) <= 1.1 * count + 10
 
 
 @pytest.mark.parametrize("seed", [1, 3, 5])
@@ -171,9 +177,9 @@ def test_lean_models_never_take_more_than_plain_recursion(seed, puma):
         kept = np.sort(rng.choice(mechanism.n_parameters, n, replace=False))
         reduced = whole(mechanism, kept)
         inverse, direct = plain.count_operations(reduced)
-        assert lean.inverse(reduced).n_operations <= inverse
-        assert lean.direct(reduced).n_operations <= direct
-    assert lean.inverse(reduced).n_operations > 0  # of all parameters
+        assert lean.build_inverse(reduced).n_operations <= inverse
+        assert lean.build_direct(reduced).n_operations <= direct
+    assert lean.build_inverse(reduced).n_operations > 0  # of all parameters
 
 
 @pytest.mark.parametrize("name", ["standard", "tree"])
@@ -183,13 +189,13 @@ def test_lean_models_take_less_than_textbooks(name, puma):
     K = Dynamics(mechanism, once=True).compute_regressor(*rng.normal(size=(3, 50, mechanism.n_q)))
     affecting = np.abs(K).max(axis=(0, 1)) > 1e-9
     kept = np.flatnonzero(affecting)
-    found = formulations(mechanism, affecting, kept)
+    found = find_formulations(mechanism, affecting, kept)
     lean = LeanModels(
         dataclasses.replace(puma, mechanism=mechanism, affecting=affecting, formulations=found)
     )
     inverse, direct = textbook.count(mechanism, kept)
-    assert lean.inverse(whole(mechanism, kept)).n_operations <= 0.85 * inverse
-    assert lean.direct(whole(mechanism, kept)).n_operations <= 0.6 * direct
+    assert lean.build_inverse(whole(mechanism, kept)).n_operations <= 0.85 * inverse
+    assert lean.build_direct(whole(mechanism, kept)).n_operations <= 0.6 * direct
 
 
 def test_equal_branches_get_equal_choices(hexaglide):
@@ -201,7 +207,7 @@ def test_equal_branches_get_equal_choices(hexaglide):
 
 def test_the_search_repeats_itself(hexaglide, monkeypatch):
     monkeypatch.setattr(search, "_found", {})
-    again = formulations(hexaglide.mechanism, hexaglide.affecting, hexaglide.base.columns)
+    again = find_formulations(hexaglide.mechanism, hexaglide.affecting, hexaglide.base.columns)
     assert again == hexaglide.formulations
 
 
@@ -209,13 +215,13 @@ def test_processes_find_what_one_finds(puma, monkeypatch):
     monkeypatch.setattr(module, "_MANY", 0)
     told = []
     run = Run(jobs=2, progress=told.append)
-    found = formulations(puma.mechanism, puma.affecting, puma.base.columns, run)
+    found = find_formulations(puma.mechanism, puma.affecting, puma.base.columns, run)
     assert found == puma.formulations
     assert (told[-1].done, told[-1].total) == (6, 6)
 
 
 def test_no_subsets_ask_for_no_formulations(puma):
-    assert formulations_for(puma, [], direct=False, jobs=2) == puma.formulations
+    assert add_formulations(puma, [], direct=False, jobs=2) == puma.formulations
 
 
 def test_unknown_choices_are_refused():
@@ -241,17 +247,17 @@ def test_formulations_for_some_parameters_are_the_same_dynamics_and_take_no_more
     """Three parameters of the wrist and two before it, for which none of the model's own was searched."""
     names, kind = puma.mechanism.parameter_names, "direct" if direct else "inverse"
     kept = np.sort([names.index(k) for k in ("Iyy_2", "mx_3", "my_5", "Izz_5", "Ixz_6")])
-    found = formulations_for(puma, [kept], direct=direct)
+    found = add_formulations(puma, [kept], direct=direct)
     known = getattr(puma.formulations, kind)
     new = [one for one in getattr(found, kind) if one not in known]
     assert getattr(found, kind)[: len(known)] == known
     assert new
-    assert formulations_for(puma, [kept], direct=direct, jobs=2) == found
+    assert add_formulations(puma, [kept], direct=direct, jobs=2) == found
     for choices in new:
         errors = compared(puma.mechanism, list(map(from_data, choices)), np.random.default_rng(0))
         assert max(errors) < 1e-12
-    tree = lean_tree(puma.mechanism)
-    build = direct_outputs if direct else inverse_outputs
+    tree = choose_frames(puma.mechanism)
+    build = build_direct_outputs if direct else build_inverse_outputs
     dropped = set(range(len(names))) - set(kept.tolist())
 
     def count(choices):
@@ -265,8 +271,8 @@ def test_varied_formulations_have_one_or_two_other_choices_or_joints_of_another_
     one, *others = puma.formulations.inverse
     kinds = {"choices": 0, "joints": 0}
     for seed in range(60):
-        found = varied(one, others, puma.mechanism, np.random.default_rng(seed))
-        assert found == varied(one, others, puma.mechanism, np.random.default_rng(seed))
+        found = vary_formulation(one, others, puma.mechanism, np.random.default_rng(seed))
+        assert found == vary_formulation(one, others, puma.mechanism, np.random.default_rng(seed))
         assert tuple(to_data(from_data(choices)) for choices in found) == found
         changed = [k for k in range(6) if found[k] != one[k]]
         taken = any(
@@ -287,8 +293,8 @@ def test_the_leanest_formulation_alone_takes_what_the_leanest_of_all_does(puma, 
         return function(reduced, rewritten=False).n_operations
 
     lean, reduced = LeanModels(puma), whole(puma.mechanism, np.sort(puma.base.columns))
-    known = lean.formulations(direct=direct)
-    found = lean.formulation(reduced, direct=direct)
+    known = lean.get_formulations(direct=direct)
+    found = lean.choose_formulation(reduced, direct=direct)
     assert found in known
-    each = [operations(lean.alone(one, direct=direct)) for one in known]
+    each = [operations(lean.restrict_to(one, direct=direct)) for one in known]
     assert each[known.index(found)] == min(each) == operations(lean)

@@ -11,9 +11,9 @@ from oracles import pinocchio_model
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import problem, subsets
 
-from paramreduce_cli.export.choice import chosen_model
+from paramreduce_cli.export.choice import find_chosen_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import exported_model
+from paramreduce_cli.export.writing import make_exported_model
 from paramreduce_cli.multibody.dynamics import Dynamics
 
 
@@ -76,8 +76,8 @@ def test_best_subsets(data):
 @pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")
 def test_c_code(puma, tmp_path):
     _, model = puma
-    chosen, _ = chosen_model("full", model, None, None)
-    for name, content in languages["c"](exported_model(model, chosen, title="full")).items():
+    chosen, _ = find_chosen_model("full", model, None, None)
+    for name, content in languages["c"](make_exported_model(model, chosen, title="full")).items():
         (tmp_path / name).write_bytes(content)
     z, dz, ddz = states_of(model.mechanism, 20)
     rows = np.hstack([z, dz, ddz])

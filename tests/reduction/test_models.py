@@ -18,7 +18,7 @@ from paramreduce_cli.reduction.models import (
     make_full_model,
     make_reduced_model,
 )
-from paramreduce_cli.report.summary import _first
+from paramreduce_cli.report.summary import _find_first_beyond_rank
 
 
 def grouped_reduction():
@@ -66,7 +66,7 @@ def test_sizes_that_groups_leave_out_are_not_offered():
 
 
 def test_the_first_size_beyond_the_rank_is_a_size_not_a_place():
-    assert _first(grouped_reduction().heuristics["swap"]) == 3
+    assert _find_first_beyond_rank(grouped_reduction().heuristics["swap"]) == 3
 
 
 @pytest.mark.parametrize("text", ["swap", "swap@operations"])

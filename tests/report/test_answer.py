@@ -14,7 +14,7 @@ from conftest import CONFIGS
 
 from paramreduce_cli.cli.commands.run import run
 from paramreduce_cli.records import Block, Estimate
-from paramreduce_cli.report.data import first_motion
+from paramreduce_cli.report.data import find_first_motion
 from paramreduce_cli.texts import format_percent
 
 
@@ -121,7 +121,7 @@ def test_a_motion_is_shown_from_its_beginning_to_its_end(sizes):
         for a, b in itertools.pairwise(edges)
     ]
     later = dataclasses.replace(blocks[0], trajectory=1)
-    shown = first_motion([*blocks, later], types.SimpleNamespace(standard=phi), most=100)
+    shown = find_first_motion([*blocks, later], types.SimpleNamespace(standard=phi), most=100)
     every = round(shown.time[1] / 0.1) if total > 1 else 1
     np.testing.assert_allclose(shown.time, np.arange(0, total, every) * 0.1, atol=1e-9)
     assert shown.time.size <= 200

@@ -8,7 +8,7 @@ import pytest
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.records import Reduction, Validation
-from paramreduce_cli.report.curves import curves
+from paramreduce_cli.report.curves import gather_curves
 
 
 @pytest.fixture
@@ -27,7 +27,7 @@ def found(two_link_results):
 
 
 def test_the_same_models_are_one_curve(found):
-    (curve,) = curves(found)
+    (curve,) = gather_curves(found)
     assert curve.names == ("one", "two")
     assert curve.label == "one, two"
 
@@ -37,10 +37,10 @@ def test_of_curves_that_meet_only_what_is_new_is_drawn(found):
     values = [np.array(v) for v in two.parameters]
     values[3] = values[3] * 1.01
     found.reduction.heuristics["two"] = replace(two, parameters=tuple(values))
-    one, other = curves(found)
+    one, other = gather_curves(found)
     assert one.own.all()
     assert np.flatnonzero(other.own).tolist() == [2, 3, 4]  # and where it leaves and comes back
-    drawn = other.drawn(np.arange(float(one.own.size)))
+    drawn = other.hide_shared(np.arange(float(one.own.size)))
     assert np.flatnonzero(np.isfinite(drawn)).tolist() == [2, 3, 4]
 
 
@@ -49,5 +49,5 @@ def test_one_other_value_is_another_curve(found):
     values = [np.array(v) for v in two.parameters]
     values[-1] = values[-1] * 1.01
     found.reduction.heuristics["two"] = replace(two, parameters=tuple(values))
-    assert [curve.names for curve in curves(found)] == [("one",), ("two",)]
-    assert len({curve.colour for curve in curves(found)}) == 2
+    assert [curve.names for curve in gather_curves(found)] == [("one",), ("two",)]
+    assert len({curve.colour for curve in gather_curves(found)}) == 2

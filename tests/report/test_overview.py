@@ -1,13 +1,13 @@
 import csv
 import io
 
-from paramreduce_cli.report.overview import overview, overview_row
+from paramreduce_cli.report.overview import make_overview, make_overview_row
 from paramreduce_cli.texts.latex_table import format_latex_table
 
 
 def test_one_row_per_robot_with_the_selected_model(summary):
     other = {**summary, "robot": "other"}
-    table = overview([overview_row(summary), overview_row(other)])
+    table = make_overview([make_overview_row(summary), make_overview_row(other)])
     assert [row[0] for row in table.rows] == ["two_link", "other"]
     row = dict(zip(table.header[:7], table.rows[0][:7], strict=True))
     selected = summary["selected"]

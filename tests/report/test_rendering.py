@@ -46,14 +46,14 @@ def test_figures_do_not_depend_on_processes(data, monkeypatch):
         told.append(name)
         assert done == len(told)
 
-    here = rendering.rendered(NAMES, data, ["png", "svg"], jobs=1, told=note)
+    here = rendering.render_figures(NAMES, data, ["png", "svg"], jobs=1, told=note)
     assert told == NAMES
     assert list(here) == ["torques", "poses"]
     assert all(set(one) == {"png", "svg"} for one in here.values())
     told.clear()
-    elsewhere = rendering.rendered(NAMES, data, ["png", "svg"], jobs=2, told=note)
+    elsewhere = rendering.render_figures(NAMES, data, ["png", "svg"], jobs=2, told=note)
     assert sorted(told) == sorted(NAMES)
     assert list(elsewhere) == list(here)
     assert elsewhere == here
     monkeypatch.setattr(processes, "ProcessPoolExecutor", None)  # one format does not pay
-    assert set(rendering.rendered(["poses"], data, ["svg"], jobs=2)["poses"]) == {"svg"}
+    assert set(rendering.render_figures(["poses"], data, ["svg"], jobs=2)["poses"]) == {"svg"}

@@ -5,18 +5,18 @@ import pytest
 from conftest import config_and_model
 
 from paramreduce_cli.records import BASE
-from paramreduce_cli.report.skeleton import animation, skeleton
+from paramreduce_cli.report.skeleton import make_animation, make_skeleton
 
 
 def test_what_leads_from_a_body_to_the_next_joint_is_part_of_that_body(puma):
     """Its length does not change, and it turns with the body."""
     rng = np.random.default_rng(0)
-    moving = animation(puma, {"one": rng.normal(size=(5, 6))})
+    moving = make_animation(puma, {"one": rng.normal(size=(5, 6))})
     owners = {body for _, _, body, _ in moving.lines}
     assert owners == {BASE, *range(6)}
     q = np.zeros((2, 6))
     q[1, 2] = 1.0  # the third joint turns: what is on the first two bodies stays
-    both = animation(puma, {"one": q[:1], "two": q[1:]})
+    both = make_animation(puma, {"one": q[:1], "two": q[1:]})
     assert both.motions == (("one", 1), ("two", 1))
     for start, end, body, _ in both.lines:
         moved = np.ptp(both.points[:, [start, end]], axis=0).max() > 1e-9
@@ -32,7 +32,7 @@ def test_lines_along_closures_are_of_the_bodies_that_they_hold_together(robot):
     _, model = config_and_model(robot)
     mechanism = model.mechanism
     q = mechanism.loops.assembly
-    shown = skeleton(model, q)
+    shown = make_skeleton(model, q)
     for closure, path, bodies in zip(
         mechanism.loops.closures, shown.closures, shown.closure_bodies, strict=True
     ):
@@ -42,7 +42,7 @@ def test_lines_along_closures_are_of_the_bodies_that_they_hold_together(robot):
         ends += [path[-1]] if closure.bodies[1] != BASE else []
         origins = [shown.poses[b][:3, 3] for b in closure.bodies if b != BASE]
         assert np.allclose(ends, origins)
-    moving = animation(model, {"one": q[None]})
+    moving = make_animation(model, {"one": q[None]})
     drawn = [body for _, _, body, kind in moving.lines if kind == "loop"]
     assert drawn == [body for bodies in shown.closure_bodies for body in bodies]
     assert max(max(line[:2]) for line in moving.lines) < moving.points.shape[1]

@@ -7,7 +7,7 @@ import shutil
 import pytest
 from conftest import TWO_LINK
 
-from paramreduce_cli.report.spread import choices, run_record, spread
+from paramreduce_cli.report.spread import make_run_record, tabulate_choices, tabulate_spread
 
 
 def changed(summary, **selected):
@@ -19,11 +19,13 @@ def changed(summary, **selected):
 
 def test_medians_and_extremes_over_the_runs_of_a_robot(summary):
     records = [
-        run_record(str(n), changed(summary, n=n, operations={"inverse": 10 * n, "direct": None}))
+        make_run_record(
+            str(n), changed(summary, n=n, operations={"inverse": 10 * n, "direct": None})
+        )
         for n in (3, 5, 4)
     ]
-    records.append(run_record("x", {**summary, "robot": "other"}))
-    table = spread(records)
+    records.append(make_run_record("x", {**summary, "robot": "other"}))
+    table = tabulate_spread(records)
     assert [row[:2] for row in table.rows] == [("two_link", "3"), ("other", "1")]
     row = dict(zip(table.header, table.rows[0], strict=True))
     assert row["n"] == "4 (3 to 5)"
@@ -34,19 +36,19 @@ def test_medians_and_extremes_over_the_runs_of_a_robot(summary):
 
 def test_what_is_always_selected(summary):
     records = [
-        run_record(str(k), changed(summary, parameters=dict.fromkeys(names, 1.0)))
+        make_run_record(str(k), changed(summary, parameters=dict.fromkeys(names, 1.0)))
         for k, names in enumerate([("a", "b"), ("a", "c"), ("a", "b")])
     ]
-    (row,) = choices(records).rows
+    (row,) = tabulate_choices(records).rows
     assert row == ("two_link", "a", "b 2/3 c 1/3")
 
 
 def test_variants_of_a_robot_are_apart(summary):
     records = [
-        run_record(str(n), changed(summary, n=n), variant, seed=n)
+        make_run_record(str(n), changed(summary, n=n), variant, seed=n)
         for n, variant in ((3, "plain"), (5, "plain"), (9, "fine"))
     ]
-    table = spread(records)
+    table = tabulate_spread(records)
     assert [row[0] for row in table.rows] == ["two_link, plain", "two_link, fine"]
     assert [row[table.header.index("n")] for row in table.rows] == ["4 (3 to 5)", "9"]
 

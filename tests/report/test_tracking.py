@@ -10,8 +10,8 @@ from conftest import CONFIGS, TWO_LINK
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.export import running
 from paramreduce_cli.records import Paths, Tracking
-from paramreduce_cli.report.tracking.control import advanced, simulate
-from paramreduce_cli.report.tracking.paths import point_to_point
+from paramreduce_cli.report.tracking.control import advance_state, simulate
+from paramreduce_cli.report.tracking.paths import plan_paths
 from paramreduce_cli.stages import report
 
 INERTIA, WEIGHT = 0.4, 3.0
@@ -26,12 +26,12 @@ def followed(paths, share=1.0):
         return share * INERTIA * ddz + share * WEIGHT * np.cos(z)
 
     period = paths.time[1] - paths.time[0]
-    return simulate(paths, model, partial(advanced, arm, period), 20.0)
+    return simulate(paths, model, partial(advance_state, arm, period), 20.0)
 
 
 def path(period=1e-3, moves=3, seeds=range(1, 2)):
     one = np.ones(1)
-    return point_to_point(-one, one, 2 * one, moves, period, seeds)
+    return plan_paths(-one, one, 2 * one, moves, period, seeds)
 
 
 def test_paths_start_and_end_at_rest_and_keep_to_speeds():

@@ -14,10 +14,10 @@ from conftest import ONE_FORMAT, config_of
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.export.choice import simplified_model
+from paramreduce_cli.export.choice import find_pruned_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.values import values_file
-from paramreduce_cli.export.writing import Exported, exported_functions, exported_model
+from paramreduce_cli.export.values import write_values
+from paramreduce_cli.export.writing import Exported, make_exported_model, make_functions
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.operations import Program
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -241,11 +241,11 @@ def test_loops(four_bar, name):
 def test_exported_functions_compute_the_same(four_bar, name):
     """The export checks itself against the stored program, projected by matrices."""
     model, found = loaded(four_bar, Model), loaded(four_bar, TermReduction)
-    chosen, term, title = simplified_model(found, name)
+    chosen, term, title = find_pruned_model(found, name)
     what = {"inverse": Exported.IDM, "direct": Exported.DDM}[name]
     for constant in (False, True):
         files = languages["python"](
-            exported_model(
+            make_exported_model(
                 model, chosen, title=title, what=what, constant=constant, simplified=term
             )
         )
@@ -254,12 +254,12 @@ def test_exported_functions_compute_the_same(four_bar, name):
 
 def test_units_of_parameters_are_said(two_link):
     model = loaded(two_link, Model)
-    chosen, term, title = simplified_model(loaded(two_link, TermReduction), "inverse")
+    chosen, term, title = find_pruned_model(loaded(two_link, TermReduction), "inverse")
     files = languages["c"](
-        exported_model(model, chosen, title=title, what=Exported.IDM, simplified=term)
+        make_exported_model(model, chosen, title=title, what=Exported.IDM, simplified=term)
     )
     header = files["two_link.h"].decode()
-    values = json.loads(values_file(chosen, title, "", model.mechanism)["parameters.json"])
+    values = json.loads(write_values(chosen, title, "", model.mechanism)["parameters.json"])
     for k, (name, value, size) in enumerate(zip(term.names, term.values, term.units, strict=True)):
         si = model.mechanism.parameters[model.mechanism.parameter_names.index(name)].unit
         unit = si if size == 1.0 else f"({size:.9g} {si})"
@@ -346,13 +346,15 @@ def recomputed_in_c(runner, name):
     """Errors of torques and accelerations on the validation set, by the exported C code, state by state."""
     model, samples = loaded(runner, Model), loaded(runner, Samples)
     mechanism, robot = model.mechanism, model.mechanism.robot
-    chosen, term, title = simplified_model(loaded(runner, TermReduction), name)
+    chosen, term, title = find_pruned_model(loaded(runner, TermReduction), name)
     what = Exported.IDM if name == "inverse" else Exported.DDM
-    files = languages["c"](exported_model(model, chosen, title=title, what=what, simplified=term))
+    files = languages["c"](
+        make_exported_model(model, chosen, title=title, what=what, simplified=term)
+    )
     header, source = files[f"{robot}.h"].decode(), files[f"{robot}.c"].decode()
     library = load(header + source.replace(f'#include "{robot}.h"', ""))
     function = getattr(library, f"{robot}_{name}_dynamics")
-    (declared,) = exported_functions(model, chosen, what, simplified=term)
+    (declared,) = make_functions(model, chosen, what, simplified=term)
     n, dependent = mechanism.n_dof, list(mechanism.dependent)
     results = {"inverse": [np.empty(n)], "direct": [np.empty((n, n)), np.empty(n)]}[name]
     off, total = np.zeros(2), np.zeros(2)
@@ -410,9 +412,11 @@ def test_friction_and_floating_bases(robot, run_of):
 @pytest.mark.parametrize("name", ["inverse", "direct"])
 def test_the_exported_header_says_where_a_function_holds(two_link, name):
     model = loaded(two_link, Model)
-    chosen, term, title = simplified_model(loaded(two_link, TermReduction), name)
+    chosen, term, title = find_pruned_model(loaded(two_link, TermReduction), name)
     what = Exported.IDM if name == "inverse" else Exported.DDM
-    files = languages["c"](exported_model(model, chosen, title=title, what=what, simplified=term))
+    files = languages["c"](
+        make_exported_model(model, chosen, title=title, what=what, simplified=term)
+    )
     header = " ".join(files["two_link.h"].decode().replace("*", " ").split())
     assert "TERMS WERE LEFT OUT" in header
     names = model.mechanism.coordinate_names
@@ -439,7 +443,7 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
     error = f"accelerations on these: {format_percent(term.random_acceleration_error)}."
     assert (eigenvalue in header) == (error in header) == (name == "direct")
     assert "allowed 5 %" in header
-    values = values_file(chosen, title, "", model.mechanism, term)["parameters.json"].decode()
+    values = write_values(chosen, title, "", model.mechanism, term)["parameters.json"].decode()
     for line in json.loads(values)["holds"]:
         assert " ".join(line.split()) in header
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)

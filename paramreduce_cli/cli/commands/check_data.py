@@ -50,7 +50,7 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
     raw = load_log(file)
     names = list(raw.columns)
     mechanism = None if loaded is None else loaded.build_mechanism()
-    joints = _joints(names) if mechanism is None else list(mechanism.coordinate_names)
+    joints = _format_joints(names) if mechanism is None else list(mechanism.coordinate_names)
     section = None if loaded is None else loaded.sampling.log
     if section is None:
         columns = ColumnsSection(**guess_columns(names, joints))  # type: ignore[arg-type]
@@ -96,8 +96,8 @@ def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> N
         warn_user(text.rstrip("."))
 
 
-def _joints(names: list[str]) -> list[str]:
-    """Joints by number, as many as the columns speak of."""
+def _format_joints(names: list[str]) -> list[str]:
+    """Return the joints by number, as many as the columns speak of."""
     for n in range(_MOST_JOINTS, 0, -1):
         joints = [f"q{k + 1}" for k in range(n)]
         try:

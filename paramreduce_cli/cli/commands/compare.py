@@ -40,7 +40,7 @@ def compare(
             raise ConfigError(
                 f"{path}: is a summary of an older version.", rejected=str(path), command="run"
             )
-    tolerances = {**TOLERANCES, **dict(map(_tolerance, given))}
+    tolerances = {**TOLERANCES, **dict(map(_parse_tolerance, given))}
     try:
         differences = compared(summaries[0], summaries[1], tolerances, only)
     except (KeyError, TypeError, IndexError) as error:
@@ -61,7 +61,8 @@ def compare(
     return 0
 
 
-def _tolerance(text: str) -> tuple[str, Tolerance]:
+def _parse_tolerance(text: str) -> tuple[str, Tolerance]:
+    """Return the quantity and the tolerance that NAME=RELATIVE gives."""
     name, _, value = text.partition("=")
     try:
         relative, absolute = float(value), TOLERANCES[name].absolute

@@ -43,7 +43,7 @@ def doctor(as_json: bool) -> int:
     Exit code 1 if something is missing that everything needs.
     """
     findings = []
-    for what, state, found in _findings():
+    for what, state, found in _check_machine():
         findings.append((what, state, found))
         if not as_json:  # row by row, as some take seconds
             table = rich.table.Table(box=None, pad_edge=False, show_header=False)
@@ -56,24 +56,24 @@ def doctor(as_json: bool) -> int:
     return WRONG if any(state == "wrong" for _, state, _ in findings) else 0
 
 
-def _findings() -> Iterator[tuple[str, str, str]]:
-    """What was looked at, how it is, and what was found."""
+def _check_machine() -> Iterator[tuple[str, str, str]]:
+    """Yield what was checked, whether it is all right, and what was found."""
     yield "paramreduce", "ok", f"{__version__} in {Path(__file__).parents[2]}"
     yield "Python", "ok", f"{platform.python_version()}, {sys.executable}, {platform.machine()}"
-    yield _compiler()
-    yield from _caches()
-    yield _loops()
+    yield _check_compiler()
+    yield from _check_caches()
+    yield _check_loops()
     yield "cores", "ok", f"{count_cores()} that this process may use"
     threads = {name: os.environ.get(name) for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS")}
     yield "threads", "ok", ", ".join(f"{k}={v}" for k, v in threads.items() if v)
-    yield _algebra()
+    yield _check_algebra()
     for extra, names in _EXTRAS.items():
-        yield _extra(extra, names)
+        yield _check_extra(extra, names)
 
 
-def _extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
-    """Look whether the packages of an extra are there and can be imported."""
-    versions = [_version(name) for name in names]
+def _check_extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
+    """Check that the packages of an extra are there and can be imported."""
+    versions = [_find_version(name) for name in names]
     if None in versions:
         text = f"pip install 'paramreduce[{extra}]' brings {' and '.join(names)}"
         return f"extra {extra}", "none", text
@@ -87,7 +87,8 @@ def _extra(extra: str, names: tuple[str, ...]) -> tuple[str, str, str]:
     return f"extra {extra}", "ok", ", ".join(listed)
 
 
-def _compiler() -> tuple[str, str, str]:
+def _check_compiler() -> tuple[str, str, str]:
+    """Check the C compiler."""
     from paramreduce_cli.expressions.compiled import find_compiler
 
     try:
@@ -112,8 +113,9 @@ def _compiler() -> tuple[str, str, str]:
     return "C compiler", "ok", f"{' '.join(command)}: {said.stdout.partition(chr(10))[0]}"
 
 
-def _caches() -> Iterator[tuple[str, str, str]]:
-    yield _model_cache()
+def _check_caches() -> Iterator[tuple[str, str, str]]:
+    """Check the folders of compiled code."""
+    yield _check_model_cache()
     package = Path(__file__).parents[2]
     place = os.environ.get("NUMBA_CACHE_DIR")
     writable = place is not None or os.access(package, os.W_OK)
@@ -124,7 +126,7 @@ def _caches() -> Iterator[tuple[str, str, str]]:
     yield "cache of Numba", "ok" if writable else "slow", text
 
 
-def _model_cache() -> tuple[str, str, str]:
+def _check_model_cache() -> tuple[str, str, str]:
     """Compile a small library, keep it in the cache and load it from there."""
     from paramreduce_cli.expressions.cache import find_cache_folder
     from paramreduce_cli.expressions.compiled import load
@@ -145,7 +147,8 @@ def _model_cache() -> tuple[str, str, str]:
     return what, "ok", f"{folder}: {len(files)} models, {size:.1f} MB; {free:.1f} GB are free"
 
 
-def _loops() -> tuple[str, str, str]:
+def _check_loops() -> tuple[str, str, str]:
+    """Compile the loops of all searches."""
     from paramreduce_cli.cli.precompilation import compile_loops
 
     started = time.perf_counter()
@@ -156,7 +159,8 @@ def _loops() -> tuple[str, str, str]:
     return "compiled loops", "ok", f"ready after {time.perf_counter() - started:.0f} s"
 
 
-def _algebra() -> tuple[str, str, str]:
+def _check_algebra() -> tuple[str, str, str]:
+    """Return the library of linear algebra that NumPy uses."""
     import numpy as np
 
     found = np.show_config(mode="dicts")["Build Dependencies"]["blas"]
@@ -164,7 +168,8 @@ def _algebra() -> tuple[str, str, str]:
     return "linear algebra", "ok", f"NumPy {np.__version__}, {found.get('name')} {version}"
 
 
-def _version(name: str) -> str | None:
+def _find_version(name: str) -> str | None:
+    """Return the version of a package; None if it is not installed."""
     try:
         return importlib.metadata.version(name)
     except importlib.metadata.PackageNotFoundError:

@@ -19,13 +19,13 @@ from paramreduce_cli.export.choice import (
     CONSISTENT,
     FULL,
     IDENTIFIED,
-    chosen_model,
-    simplified_model,
+    find_chosen_model,
+    find_pruned_model,
 )
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.robot_file import robot_file
-from paramreduce_cli.export.values import VALUES, values_file
-from paramreduce_cli.export.writing import Exported, exported_model
+from paramreduce_cli.export.robot_file import write_robot_file
+from paramreduce_cli.export.values import VALUES, write_values
+from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.importing.formats import formats
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.records import (
@@ -115,7 +115,7 @@ def export(
         )
     if text == LEANEST:
         assert loaded is not None
-        text = _leanest(loaded, store, _FUNCTIONS[what])
+        text = _find_leanest(loaded, store, _FUNCTIONS[what])
     records: list[type] = [] if loaded is None else [Model]
     if text == TERMS:
         records.append(TermReduction)
@@ -129,9 +129,9 @@ def export(
             loading[Validation] = load_current(loaded, store, Validation)
     simplified = None
     if text == TERMS:
-        chosen, simplified, title = simplified_model(loading[TermReduction], _FUNCTIONS[what])
+        chosen, simplified, title = find_pruned_model(loading[TermReduction], _FUNCTIONS[what])
     else:
-        chosen, title = chosen_model(
+        chosen, title = find_chosen_model(
             text,
             loading.get(Model),
             loading.get(Reduction),
@@ -143,13 +143,15 @@ def export(
     origin = f"{store.get_path(records[-1]).name} {stamp.digest[:12] if stamp else ''}"
     if kind == VALUES:
         known = loading[Model].mechanism if Model in loading else None
-        files = values_file(chosen, title, origin, known, simplified)
+        files = write_values(chosen, title, origin, known, simplified)
     elif kind in formats:
         assert loaded is not None
-        files = robot_file(loaded, loading[Model], _standard(loading, text, chosen), kind)
+        files = write_robot_file(
+            loaded, loading[Model], _find_standard(loading, text, chosen), kind
+        )
     else:
         with show_progress("export") as tell:
-            checked = exported_model(
+            checked = make_exported_model(
                 loading[Model],
                 chosen,
                 title=title,
@@ -166,8 +168,8 @@ def export(
     say(f"{title}: {', '.join(files)} in {folder}")
 
 
-def _leanest(config: Config, store: Store, function: str) -> str:
-    """Name of the model whose function has the fewest operations within what is asked for.
+def _find_leanest(config: Config, store: Store, function: str) -> str:
+    """Return the name of the model whose function has the fewest operations within the config's limits.
 
     Raises:
         ConfigError: There is none within it.
@@ -182,8 +184,8 @@ def _leanest(config: Config, store: Store, function: str) -> str:
     return found.model
 
 
-def _standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) -> FloatArray:
-    """Standard parameters for a robot's file.
+def _find_standard(loading: dict[type, Any], text: str | None, chosen: ReducedModel) -> FloatArray:
+    """Return standard parameters for a robot's file.
 
     A model is torques for base parameters, which many standard ones share: those closest to the
     robot's own, but for consistent ones, which are what they are.

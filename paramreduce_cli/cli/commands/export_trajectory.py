@@ -73,12 +73,12 @@ def export_trajectory(
     ways = PathPlanner(model, trajectories)
 
     def timed(which: str) -> TimedMotion:
-        chosen, title = _chosen(trajectories, which), f"{loaded.robot} {which}"
+        chosen, title = _find_chosen(trajectories, which), f"{loaded.robot} {which}"
         return sample_motion(
             model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, ways=ways
         )  # fmt: skip
 
-    which, motion = (which, timed(which)) if which else _first(trajectories, timed)
+    which, motion = (which, timed(which)) if which else _find_first(trajectories, timed)
     speed = float(np.abs(motion.dz[0]).max())
     at_rest = trajectories.rest_to_rest or pose is not None
     if not at_rest and kind in _RUN and not moving:
@@ -93,10 +93,10 @@ def export_trajectory(
     say(f"{which}{rests}, {motion.time[-1]:.4g} s: {', '.join(files)} in {folder}")
 
 
-def _first(
+def _find_first(
     trajectories: Trajectories, timed: Callable[[str], TimedMotion]
 ) -> tuple[str, TimedMotion]:
-    """The first trajectory of the estimation set that there is a way to and back from.
+    """Return the first trajectory of the estimation set with a move to its start and back.
 
     Raises:
         DataError: There is none; of the first one it is said why.
@@ -110,7 +110,8 @@ def _first(
     raise refused[0]
 
 
-def _chosen(trajectories: Trajectories, which: str) -> Trajectory:
+def _find_chosen(trajectories: Trajectories, which: str) -> Trajectory:
+    """Return the trajectory that SET:NUMBER names."""
     name, _, number = which.partition(":")
     sets = {name: getattr(trajectories, name) for name in SETS}
     found = sets.get(name, ())

@@ -95,7 +95,7 @@ def init(
         say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {quote(str(copied[0]))}")
         return
     choice = SourceSection(
-        file=(find_described_robot(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_lock, locked)),
+        file=(find_described_robot(source) if kind is None else None) or Path(source), root=root, tip=tip, locked=dict(map(_parse_lock, locked)),
         ignored=list(ignored), floating=floating, uncoupled=uncouple, closed=list(map(_check_closure, closed)),
         independent=list(independent),
     )  # fmt: skip
@@ -103,7 +103,7 @@ def init(
         if logs or choice != SourceSection(file=choice.file):
             raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
         path = output or Path("configs") / f"{source}.yaml"
-        text = _described(source, kind, joints)
+        text = _make_template(source, kind, joints)
     else:
         robot = read_robot(choice)
         path = output or Path("configs") / f"{robot.name}.yaml"
@@ -114,17 +114,17 @@ def init(
                 "--independent: belongs to loops, such as those of --close; without any all joints are independent."
             )
         if robot.closures:
-            robot = _closed(robot, choice)
+            robot = _close_loops(robot, choice)
         base = robot.independent[:_BASE] if floating else ()
-        log = _log(path, logs, robot.independent, base) if logs else ""
+        log = _make_log_section(path, logs, robot.independent, base) if logs else ""
         text = format_config(
-            robot, choice.model_copy(update={"file": _from(path, choice.file)}), log
+            robot, choice.model_copy(update={"file": _make_path(path, choice.file)}), log
         )
         for warning in robot.warnings:
             say(f"- {warning}.")
     if path.exists():
         raise make_exists_error(path)
-    _check(text)
+    _check_config(text)
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")
@@ -134,8 +134,10 @@ def init(
     say(f"Wrote {path}. {todo}paramreduce run {quote(str(path))}")
 
 
-def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequence[str]) -> str:
-    """The section for logs, with columns by their usual names.
+def _make_log_section(
+    config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequence[str]
+) -> str:
+    """Return the section for logs, with columns by their usual names.
 
     Raises:
         ConfigError: Positions or torques have none, of the joints or of a base that floats.
@@ -169,17 +171,18 @@ def _log(config: Path, logs: Sequence[Path], joints: Sequence[str], base: Sequen
     for key, value in columns.items():
         shown = value if isinstance(value, str) else ", ".join(value)
         say(f"- {key}: {shown}.")
-    return format_log_section([_from(config, path) for path in logs], columns)
+    return format_log_section([_make_path(config, path) for path in logs], columns)
 
 
-def _from(config: Path, file: Path) -> Path:
-    """A robot's file as a config names it: relative to that, unless it is somewhere else."""
+def _make_path(config: Path, file: Path) -> Path:
+    """Return the path of a robot's file for a config: relative to the config if both are in the working folder."""
     own, folder = file.resolve(), config.resolve().parent
     near = own.is_relative_to(Path.cwd()) and folder.is_relative_to(Path.cwd())
     return Path(os.path.relpath(own, folder)) if near else own
 
 
-def _described(name: str, kind: str, joints: int) -> str:
+def _make_template(name: str, kind: str, joints: int) -> str:
+    """Return a config to fill in, of the kind that is asked for."""
     if not re.fullmatch(NAME, name, re.ASCII):
         raise ConfigError(
             f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
@@ -191,7 +194,8 @@ def _described(name: str, kind: str, joints: int) -> str:
     return format_tree_template(name) if kind == "tree" else format_loop_template(name)
 
 
-def _lock(text: str) -> tuple[str, float]:
+def _parse_lock(text: str) -> tuple[str, float]:
+    """Return joint and value from JOINT=VALUE."""
     joint, _, value = text.rpartition("=")
     try:
         number = parse_number(value)
@@ -203,6 +207,7 @@ def _lock(text: str) -> tuple[str, float]:
 
 
 def _check_closure(text: str) -> str:
+    """Return A=B:KIND without spaces; raise ConfigError if the text is something else."""
     text = re.sub(r"\s*([=:])\s*", r"\1", text.strip())
     if not re.fullmatch(CLOSED, text):
         raise ConfigError(
@@ -211,8 +216,8 @@ def _check_closure(text: str) -> str:
     return text
 
 
-def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
-    """The robot with a guess from which its loops close, and with independent coordinates."""
+def _close_loops(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
+    """Return the robot with a guess from which its loops close, and with independent coordinates."""
     # Late: CasADi.
     from paramreduce_cli.multibody.loops.imported import close_loops
 
@@ -220,12 +225,12 @@ def _closed(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
     text = format_config(replace(robot, independent=robot.independent or every), choice)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)  # they come with the final text
-        mechanism = _check(text).build_mechanism()
+        mechanism = _check_config(text).build_mechanism()
     return close_loops(robot, mechanism, asked=bool(choice.independent))
 
 
-def _check(text: str) -> Config:
-    """See that the config can be loaded, before anything is written."""
+def _check_config(text: str) -> Config:
+    """Load a config before anything is written, and return it."""
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "config.yaml"
         path.write_text(text, encoding="utf-8")

@@ -19,7 +19,7 @@ from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import list_results_below, make_no_results_error
-from paramreduce_cli.cli.terminal import JSON, LOG, emit, harmless, say, say_table
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, escape_controls, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
 from paramreduce_cli.texts.measured import format_measured
@@ -45,19 +45,19 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
     `inspect selected` is that of the only results here.
     """
     if str(file) == "selected" and not file.exists():
-        file = _only_results()
+        file = _find_results()
     folder = file if file.is_dir() else file.parent
     if file.is_dir() and chosen is None:
         if not (file / "validation.h5").exists() and list_results_below(file):
             raise make_no_results_error(file, "inspect")
         chosen = "selected"
     if chosen == "selected":
-        title, model = _selected(folder / "validation.h5")
-        _say_model(title, _parameters(model, folder), relations, as_json)
+        title, model = _load_selected(folder / "validation.h5")
+        _say_model(title, _list_parameters(model, folder), relations, as_json)
     elif chosen is not None:
         path = file / "reduction.h5" if file.is_dir() else file
-        title, model = _chosen(path, chosen)
-        _say_model(title, _parameters(model, folder), relations, as_json)
+        title, model = _load_chosen(path, chosen)
+        _say_model(title, _list_parameters(model, folder), relations, as_json)
     elif file.suffix == ".json":
         loaded = load_summary(file)
         if file.name == Path(SUMMARY).name:  # a reference stands alone
@@ -67,8 +67,8 @@ def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> N
         _say_contents(file, as_json)
 
 
-def _only_results() -> Path:
-    """The results folder that is meant where there is one.
+def _find_results() -> Path:
+    """Return the results folder if there is only one.
 
     Raises:
         ConfigError: There is none, or more than one.
@@ -84,6 +84,7 @@ def _only_results() -> Path:
 
 
 def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
+    """Print values by name."""
     if as_json:
         emit(**found)
         return
@@ -92,6 +93,7 @@ def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
 
 
 def _say_contents(file: Path, as_json: bool) -> None:
+    """Print attributes and datasets of a file."""
     attributes, datasets = list_contents(file)
     if as_json:
         keys = ("name", "shape", "content")
@@ -99,26 +101,26 @@ def _say_contents(file: Path, as_json: bool) -> None:
             attributes=attributes, datasets=[dict(zip(keys, row, strict=True)) for row in datasets]
         )
         return
-    _say_all({key: _briefly(value) for key, value in attributes.items()}, False)
+    _say_all({key: _shorten_attribute(value) for key, value in attributes.items()}, False)
     table = rich.table.Table(box=None, pad_edge=False)
     table.add_column("dataset", no_wrap=True, overflow="ignore")
     table.add_column("shape", no_wrap=True)
     table.add_column("content", overflow="fold")
-    for row in _folded(datasets):
-        table.add_row(*(rich.markup.escape(harmless(cell)) for cell in row))
+    for row in _fold_datasets(datasets):
+        table.add_row(*(rich.markup.escape(escape_controls(cell)) for cell in row))
     say_table(table, max(len(name) + len(shape) + 20 for name, shape, _ in datasets))
 
 
-def _briefly(text: str) -> str:
-    """An attribute; of digests by name the names."""
+def _shorten_attribute(text: str) -> str:
+    """Return an attribute as text; of digests by name only the names."""
     if not text.startswith("{"):
         return text
     return ", ".join(json.loads(text)) or "none"
 
 
-def _folded(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[str, str, str]]:
-    """Datasets, those of every size or number in one line."""
-    for (place, numbered), members in itertools.groupby(datasets, _family):
+def _fold_datasets(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[str, str, str]]:
+    """Yield datasets; those that differ by a number alone share a line."""
+    for (place, numbered), members in itertools.groupby(datasets, _make_family):
         rows = list(members)
         if not numbered or len(rows) == 1:
             yield from rows
@@ -131,7 +133,7 @@ def _folded(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[str, str
             )
 
 
-def _family(row: tuple[str, str, str]) -> tuple[str, bool]:
+def _make_family(row: tuple[str, str, str]) -> tuple[str, bool]:
     place, _, last = row[0].rpartition("/")
     return (place, True) if last.isdecimal() else (row[0], False)
 
@@ -139,6 +141,7 @@ def _family(row: tuple[str, str, str]) -> tuple[str, bool]:
 def _say_model(
     title: str, parameters: Sequence[_Parameter], relations: bool, as_json: bool
 ) -> None:
+    """Print the parameters of a model."""
     if as_json:
         emit(model=title, parameters=[dataclasses.asdict(p) for p in parameters])
         return
@@ -169,10 +172,10 @@ class _Parameter:
     stands_for: str
 
 
-def _parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
-    """Of a model, with what the files beside it know of them."""
-    model = _beside(folder / "model.h5", Model)
-    found = _beside(folder / "identification.h5", Identification)
+def _list_parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
+    """Return the parameters of a model, with what the files beside it know of them."""
+    model = _load_neighbour(folder / "model.h5", Model)
+    found = _load_neighbour(folder / "identification.h5", Identification)
     deviations = {} if found is None else found.reduced.find_deviations(chosen)
     units = [] if model is None else [p.unit for p in model.mechanism.parameters]
     return [
@@ -183,8 +186,8 @@ def _parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
     ]
 
 
-def _selected(file: Path) -> tuple[str, ReducedModel]:
-    """The selected model, and what it is worth."""
+def _load_selected(file: Path) -> tuple[str, ReducedModel]:
+    """Return the selected model and its verdict."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
 
     validation, _ = load_file(file, Validation, None, "validate")
@@ -192,8 +195,8 @@ def _selected(file: Path) -> tuple[str, ReducedModel]:
     return f"{selected.reason} {validation.verdict}", selected.model
 
 
-def _beside(file: Path, record: type) -> Any:
-    """What a file beside the one that is looked at holds; None if there is none.
+def _load_neighbour(file: Path, record: type) -> Any:
+    """Load the record in a file beside the inspected one; return None, with a warning, if it cannot be read.
 
     It only tells more, so one that cannot be read is said, and no more.
     """
@@ -208,8 +211,8 @@ def _beside(file: Path, record: type) -> Any:
         return None
 
 
-def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
-    """A model of a reduction, and what it is worth."""
+def _load_chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
+    """Return a model of a reduction and its errors."""
     from paramreduce_cli.artifacts.store import load_file  # these load all numerics
     from paramreduce_cli.reduction.models import list_choices, make_reduced_model
 
@@ -222,7 +225,7 @@ def _chosen(file: Path, chosen: str) -> tuple[str, ReducedModel]:
             f"--model {chosen}: there is {', '.join(choices)}.", rejected=chosen, choices=choices
         )
     found = reduction.heuristics[choice.heuristic]
-    known = _beside(file.parent / "model.h5", Model)
+    known = _load_neighbour(file.parent / "model.h5", Model)
     model = make_reduced_model(
         reduction, choice.heuristic, row, None if known is None else known.values
     )

@@ -8,7 +8,7 @@ import click
 from paramreduce_cli.artifacts.report_files import list_newer_artifacts, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import make_no_results_error
-from paramreduce_cli.cli.terminal import complain, say
+from paramreduce_cli.cli.terminal import print_error, say
 
 
 @click.command(cls=ExampleCommand, example="open {results}")
@@ -24,10 +24,10 @@ def open(results: Path) -> None:  # the file's name is the command's
     verify_report(folder / "summary.json")
     newer = list_newer_artifacts(folder.parent)
     if newer:
-        complain(
+        print_error(
             f"Warning: {' and '.join(newer)} changed since this report was made; `paramreduce run` renews it."
         )
     address = (folder / "index.html").resolve().as_uri()
     say(address)
     if not webbrowser.open(address):
-        complain("Warning: no browser was found; open this address yourself.")
+        print_error("Warning: no browser was found; open this address yourself.")

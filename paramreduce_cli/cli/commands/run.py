@@ -148,6 +148,7 @@ def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
 
 
 def _say_summary(summary: dict[str, Any]) -> None:
+    """Print the table at the end of a run."""
     model, n = summary["model"], summary["selected"]["n"]
     say(
         f"\n{summary['robot']}: {model['n_parameters']} parameters, {model['n_affecting']} act on the "
@@ -173,7 +174,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
     for name, rows in summary["validation"].items():
         for row in rows:
             if row["n"] == n:
-                table.add_row(name, *_summary_cells(row, tested=tested))
+                table.add_row(name, *_list_cells(row, tested=tested))
     full = summary["full"]
     operations = (f"{full['operations_inverse']:.0f}", f"{full['operations_direct']:.0f}")
     found = summary["identification"]
@@ -188,7 +189,7 @@ def _say_summary(summary: dict[str, Any]) -> None:
         said = "".join(
             f", {what} error {known}"
             for what in ("torque", "acceleration")
-            if (known := _said(one[f"{what}_error"]))
+            if (known := _format_errors(one[f"{what}_error"]))
         )
         say(
             f"Negligible terms removed, {one['function']} dynamics: {one['operations']} operations{said}"
@@ -201,8 +202,8 @@ def _say_summary(summary: dict[str, Any]) -> None:
             )
 
 
-def _summary_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
-    """Errors and operations of a model; on the test set, if there is one, else on both others."""
+def _list_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
+    """Return errors and operations of a model: on the test set, if there is one, else on both other sets."""
     cells = []
     for what in ("torque_error", "acceleration_error"):
         error = row[what]
@@ -214,7 +215,7 @@ def _summary_cells(row: dict[str, Any], *, tested: bool) -> list[str]:
     return [*cells, str(row["operations"]["inverse"]), str(row["operations"]["direct"])]
 
 
-def _said(error: dict[str, Any]) -> str:
+def _format_errors(error: dict[str, Any]) -> str:
     """Return the errors of a function on the test set, or on the sets that there are; empty where none are known."""
     if error["test"] is not None:
         return format_percent_range(**error["test"])

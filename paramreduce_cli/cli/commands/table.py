@@ -14,8 +14,8 @@ from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say, warn_user
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.report.overview import overview, overview_row
-from paramreduce_cli.report.spread import choices, run_record, spread
+from paramreduce_cli.report.overview import make_overview, make_overview_row
+from paramreduce_cli.report.spread import make_run_record, tabulate_choices, tabulate_spread
 from paramreduce_cli.running.sweep import Sweep, load_sweep
 from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
@@ -53,22 +53,22 @@ def table(
         raise click.UsageError("Give RESULTS, or --sweep FILE.")
     if listed is not None:
         sweep = load_sweep(listed)
-        labels, folder = _ended(listed, sweep), sweep.folder
+        labels, folder = _list_finished(listed, sweep), sweep.folder
     else:
         labels, folder = {path: {} for path in results}, results[0].resolve().parent
-    summaries = {path: _summary(path) for path in labels}
+    summaries = {path: _load_summary(path) for path in labels}
     robots = Counter(summary.get("robot") for summary in summaries.values())
     rows, records = [], []
     for path, summary in summaries.items():
-        name = _name(path)
+        name = _name_run(path)
         try:
-            rows.append(overview_row(summary, name if robots[summary["robot"]] > 1 else ""))
-            records.append(run_record(name, summary, **labels[path]))
+            rows.append(make_overview_row(summary, name if robots[summary["robot"]] > 1 else ""))
+            records.append(make_run_record(name, summary, **labels[path]))
         except (KeyError, TypeError, ValueError) as error:
             raise ConfigError(f"{path}: is no summary of this version ({error}).") from error
-    made = {"": overview(rows)}
+    made = {"": make_overview(rows)}
     if len(robots) < len(records):
-        made |= {"-spread": spread(records), "-choices": choices(records)}
+        made |= {"-spread": tabulate_spread(records), "-choices": tabulate_choices(records)}
     prefix = output or folder / "table"
     _write(prefix, made, records)
     if parquet:
@@ -83,8 +83,8 @@ def table(
     say(f"Written to {prefix}.txt, .tex and .html, and {tables}")
 
 
-def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
-    """Folders of the runs that have ended, with their variants and seeds; the others are named.
+def _list_finished(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
+    """Return the folders of the finished runs, with their variants and seeds; report the others.
 
     Raises:
         ArtifactError: None has.
@@ -103,30 +103,34 @@ def _ended(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
     return ended
 
 
-def _summary(path: Path) -> dict[str, Any]:
+def _load_summary(path: Path) -> dict[str, Any]:
+    """Return the summary in a results folder or in a file."""
     if path.is_dir() and not (path / SUMMARY).exists():
         raise make_no_results_error(path, "table")
     return load_summary(path)
 
 
-def _name(path: Path) -> str:
-    """Of a run: its folder's."""
+def _name_run(path: Path) -> str:
+    """Return the name of a run, which is the name of its folder."""
     folder = path.resolve()
     return folder.stem if folder.suffix == ".json" else folder.name
 
 
 def _write(prefix: Path, made: Mapping[str, Table], records: list[dict[str, Any]]) -> None:
     # Jinja and matplotlib are slow to load.
+    """Write tables, rows and the page with a prefix."""
     from paramreduce_cli.report.page import render_sweep
-    from paramreduce_cli.report.runs_figure import runs_figure
+    from paramreduce_cli.report.runs_figure import draw_runs
     from paramreduce_cli.report.style import render
 
     keys = list(dict.fromkeys(key for record in records for key in record))
     runs = Table(
-        "Runs", tuple(keys), tuple(tuple(_cell(one.get(key)) for key in keys) for one in records)
+        "Runs",
+        tuple(keys),
+        tuple(tuple(_format_cell(one.get(key)) for key in keys) for one in records),
     )
     tables = list(made.values())
-    figure = render(runs_figure, records, ["svg"])["svg"]
+    figure = render(draw_runs, records, ["svg"])["svg"]
     for ending, text in {
         ".txt": "\n".join(one.to_text() for one in tables),
         ".tex": "\n".join(map(format_latex_table, tables)),
@@ -138,11 +142,12 @@ def _write(prefix: Path, made: Mapping[str, Table], records: list[dict[str, Any]
             path.write_text(text, encoding="utf-8")
 
 
-def _cell(value: Any) -> str:
+def _format_cell(value: Any) -> str:
     return "" if value is None else str(value)
 
 
 def _write_parquet(path: Path, records: list[dict[str, Any]]) -> None:
+    """Write the rows of all runs as Parquet."""
     try:
         import pyarrow
         import pyarrow.parquet

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about
-from paramreduce_cli.export.expressions import FUNCTIONS, Language, signed
-from paramreduce_cli.export.rendering import rendered
-from paramreduce_cli.export.sines import DOUBLE, SINGLE, polynomial
+from paramreduce_cli.export.exported import ExportedModel, write_header
+from paramreduce_cli.export.expressions import FUNCTIONS, Language, write_signed
+from paramreduce_cli.export.rendering import render_template
+from paramreduce_cli.export.sines import DOUBLE, SINGLE, write_polynomial
 from paramreduce_cli.expressions.functions import Argument, Function
 
 BLOCK = 64
@@ -17,9 +17,9 @@ BLOCK = 64
 
 
 def c(model: ExportedModel) -> dict[str, bytes]:
-    """C99 without allocation and without globals; single states and batches of them."""
+    """Write C99 without allocation and without globals, for single states and batches of states."""
     writer = _Writer(model)
-    context = writer.context()
+    context = writer.make_context()
     result = {}
     for template, name in (
         ("model.h", f"{model.name}.h"),
@@ -30,86 +30,86 @@ def c(model: ExportedModel) -> dict[str, bytes]:
         ("Makefile", "Makefile"),
         ("CMakeLists.txt", "CMakeLists.txt"),
     ):
-        text = rendered(template, **context)
+        text = render_template(template, **context)
         result[name] = text.encode("ascii", "replace")
     return result
 
 
-def cpp_type(array: Argument) -> str:
-    """Of an array in C++."""
+def name_cpp_type(array: Argument) -> str:
+    """Return the C++ type of an array."""
     kind = "Vector" if len(array.shape) == 1 else "Matrix"
     return f"{kind}<{', '.join(map(str, array.shape))}>"
 
 
-def cpp_argument(array: Argument) -> str:
-    """Of an array that is handed in."""
-    return f"In<{array.size}>" if len(array.shape) == 1 else f"const {cpp_type(array)} &"
+def name_cpp_argument(array: Argument) -> str:
+    """Return the C++ type of an array that is an argument."""
+    return f"In<{array.size}>" if len(array.shape) == 1 else f"const {name_cpp_type(array)} &"
 
 
-def class_name(function: Mapping[str, Any]) -> str:
-    """What a function of several results returns."""
+def name_result_class(function: Mapping[str, Any]) -> str:
+    """Return the name of the class that holds the results of a function."""
     return str(function["name"]).title().replace("_", "")
 
 
 class _Writer:
-    """Texts of a model in C.
+    """A writer of a model as C.
 
     Args:
-        model: The model.
+        model: Model to write.
     """
 
     def __init__(self, model: ExportedModel) -> None:
         self._model = model
         self._suffix = "f" if model.single else ""
 
-    def context(self) -> dict[str, object]:
-        """What the templates use."""
+    def make_context(self) -> dict[str, object]:
+        """Return what the templates use."""
         model = self._model
         return {
             "name": model.name,
             "guard": f"{model.name.upper()}_H",
-            "about": about(model),
+            "about": write_header(model),
             "real": "float" if model.single else "double",
             "f": self._suffix,
             "bits": 32 if model.single else 64,
             "block": BLOCK,
-            **model.sides(),
+            **model.list_coordinates(),
             "n_phi": 0 if model.constant else len(model.parameters),
             "loops": bool(model.closures),
-            "values": [self.number(p.value) for p in model.parameters],
-            "signature": self.signature,
-            "batch_signature": self.batch_signature,
-            "batch_arguments": self.batch_arguments,
-            "shifted": self.shifted,
-            "body": self.body,
-            "type": cpp_type,
-            "argument": cpp_argument,
-            "class_name": class_name,
+            "values": [self.write_number(p.value) for p in model.parameters],
+            "signature": self.write_signature,
+            "batch_signature": self.write_batch_signature,
+            "batch_arguments": self.write_block_signature,
+            "shifted": self.write_block_arguments,
+            "body": self.write_body,
+            "type": name_cpp_type,
+            "argument": name_cpp_argument,
+            "class_name": name_result_class,
             "test_arguments": self.test_arguments,
             "test_batch_arguments": self.test_batch_arguments,
-            "functions": [self.function(f) for f in model.functions],
-            "closures": [self.function(f) for f in model.closures],
-            "stack": self.stack(),
+            "functions": [self.write_function(f) for f in model.functions],
+            "closures": [self.write_function(f) for f in model.closures],
+            "stack": self.estimate_stack(),
             "signs": any("sign" in f.program.operations for f in model.functions),
-            "angles": any(_dependence(f).angles for f in (*model.functions, *model.closures)),
-            "sines": self.sines(),
-            "cases": self.cases(),
-            "least": {name: self.number(size) for name, size in self._model.least.items()},
+            "angles": any(_find_dependence(f).angles for f in (*model.functions, *model.closures)),
+            "sines": self.write_sine_constants(),
+            "cases": self.list_cases(),
+            "least": {name: self.write_number(size) for name, size in self._model.least.items()},
             "n_cases": (n_cases := len(next(iter(model.cases.values())))),
             "n_states": n_cases * (BLOCK // n_cases + 1),
             "tolerance": "1e-3f" if model.single else "1e-12",
         }
 
-    def number(self, value: float) -> str:
-        """How a number is written, in the precision of the code."""
+    def write_number(self, value: float) -> str:
+        """Return a number as text, in the precision of the code."""
         if self._model.single and np.float32(value) == 0:
             value = 0.0  # compilers warn of numbers that single precision is too coarse for
         text = repr(float(value))
         text = text if any(mark in text for mark in ".en") else f"{text}.0"
         return f"{text}{self._suffix}"
 
-    def function(self, function: Function) -> dict[str, object]:
-        """Texts of a function for one state and for many."""
+    def write_function(self, function: Function) -> dict[str, object]:
+        """Return the texts of a function for one state and for many."""
         return {
             "name": function.name,
             "text": function.text,
@@ -119,25 +119,25 @@ class _Writer:
             "unused": [
                 a.name for a in function.arguments if a.name not in function.find_used_arguments()
             ],
-            "statements": self.statements(function),
-            "batched": self.batched(function),
+            "statements": self.write_statements(function),
+            "batched": self.write_batched(function),
         }
 
-    def signature(self, f: Mapping[str, Any]) -> str:
-        """Arguments and results of a function of one state."""
+    def write_signature(self, f: Mapping[str, Any]) -> str:
+        """Return arguments and results of a function of one state."""
         type_ = f"{self._model.name}_real"
         given = [f"const {type_} {a.name}[{a.size}]" for a in f["arguments"]]
         return ", ".join([*given, *(f"{type_} {a.name}[{a.size}]" for a in f["results"])])
 
-    def batch_signature(self, f: Mapping[str, Any]) -> str:
-        """Of a function of many states."""
-        return f"size_t n, {self._pointers(f, '')}"
+    def write_batch_signature(self, f: Mapping[str, Any]) -> str:
+        """Return arguments and results of a function of many states."""
+        return f"size_t n, {self._write_pointers(f, '')}"
 
-    def batch_arguments(self, f: Mapping[str, Any]) -> str:
-        """Of a function of one block of them."""
-        return self._pointers(f, "RESTRICT ")
+    def write_block_signature(self, f: Mapping[str, Any]) -> str:
+        """Return arguments and results of a function of one block of states."""
+        return self._write_pointers(f, "RESTRICT ")
 
-    def _pointers(self, f: Mapping[str, Any], mark: str) -> str:
+    def _write_pointers(self, f: Mapping[str, Any], mark: str) -> str:
         type_ = f"{self._model.name}_real"
         given = [
             f"const {type_} phi[{a.size}]" if a.name == "phi" else f"const {type_} *{mark}{a.name}"
@@ -145,45 +145,45 @@ class _Writer:
         ]
         return ", ".join([*given, *(f"{type_} *{mark}{a.name}" for a in f["results"])])
 
-    def shifted(self, f: Mapping[str, Any]) -> str:
-        """Arguments of the function of a block that begins at ``start``."""
+    def write_block_arguments(self, f: Mapping[str, Any]) -> str:
+        """Return the arguments in a call with the block that begins at ``start``."""
         names = [a.name for a in (*f["arguments"], *f["results"])]
         return ", ".join(name if name == "phi" else f"{name} + start" for name in names)
 
-    def body(self, f: Mapping[str, Any]) -> str:
-        """Of a function of one state."""
+    def write_body(self, f: Mapping[str, Any]) -> str:
+        """Return the body of a function of one state."""
         unused = [f"(void){name};" for name in f["unused"]]
         return "\n".join(f"  {line}" for line in [*unused, *f["statements"]])
 
     def test_arguments(self, f: Mapping[str, Any]) -> str:
-        """For state k of the self-test."""
+        """Return the arguments in a call with state k of the self-test."""
         given = [f"case_{a.name}[k]" for a in f["arguments"]]
         return ", ".join([*given, *(f"{a.name}[k]" for a in f["results"])])
 
     def test_batch_arguments(self, f: Mapping[str, Any]) -> str:
-        """For all states of the self-test."""
+        """Return the arguments in a call with all states of the self-test."""
         given = ["case_phi[0]" if a.name == "phi" else f"all_{a.name}" for a in f["arguments"]]
         return ", ".join([*given, *(f"all_{a.name}" for a in f["results"])])
 
-    def sines(self) -> dict[str, object]:
-        """Constants of sines and cosines, as they are written."""
+    def write_sine_constants(self) -> dict[str, object]:
+        """Return the constants of sines and cosines as text."""
         known = SINGLE if self._model.single else DOUBLE
         return {
-            "one": self.number(1),
-            "half": self.number(0.5),
-            "magic": self.number(known.magic),
-            "limit": self.number(known.limit),
-            "inverse": self.number(2 / np.pi),
-            "parts": [self.number(part) for part in known.parts],
-            "sine": polynomial([self.number(value) for value in known.sine]),
-            "cosine": polynomial([self.number(value) for value in known.cosine]),
+            "one": self.write_number(1),
+            "half": self.write_number(0.5),
+            "magic": self.write_number(known.magic),
+            "limit": self.write_number(known.limit),
+            "inverse": self.write_number(2 / np.pi),
+            "parts": [self.write_number(part) for part in known.parts],
+            "sine": write_polynomial([self.write_number(value) for value in known.sine]),
+            "cosine": write_polynomial([self.write_number(value) for value in known.cosine]),
         }
 
-    def statements(self, function: Function) -> list[str]:
-        """The body, one operation a line; sines and cosines of all angles at once."""
-        language = self._language(batched=False)
-        names = language.leaves(function)
-        found = _dependence(function)
+    def write_statements(self, function: Function) -> list[str]:
+        """Return the body, one operation a line; sines and cosines of all angles at once."""
+        language = self._make_language(batched=False)
+        names = language.write_leaves(function)
+        found = _find_dependence(function)
         rows = {angle: row for row, angle in enumerate(found.angles)}
         before: list[str] = []
         rest: list[str] = []
@@ -192,7 +192,7 @@ class _Writer:
                 row = rows[node.operands[0] >> 1]
                 names[number] = f"{'sine' if node.operation == 'sin' else 'cosine'}[{row}]"
                 continue
-            text = f"const {self._real} t{number} = {language.expression(names, node)};"
+            text = f"const {self._real} t{number} = {language.write_expression(names, node)};"
             names[number] = f"t{number}"
             (before if number in found.before else rest).append(text)
         if rows:
@@ -202,29 +202,31 @@ class _Writer:
             before.append(f"{self._real} sine[{count}], cosine[{count}];")
             before.append(f"sines({count}, angles, sine, cosine);")
         places = zip(function.list_places(function.results), function.program.outputs, strict=True)
-        outputs = [f"{array.name}[{k}] = {signed(names, value)};" for (array, k), value in places]
+        outputs = [
+            f"{array.name}[{k}] = {write_signed(names, value)};" for (array, k), value in places
+        ]
         return [*before, *rest, *outputs]
 
     @property
     def _real(self) -> str:
         return "float" if self._model.single else "double"
 
-    def _language(self, *, batched: bool) -> Language:
-        """In batches, states are stored coordinate by coordinate."""
+    def _make_language(self, *, batched: bool) -> Language:
+        """Return C as a language; in batches, states are stored coordinate by coordinate."""
 
         def element(array: Argument, k: int) -> str:
             column = batched and array.name != "phi"
             return f"{array.name}[{k} * n + k]" if column else f"{array.name}[{k}]"
 
         calls = {name: f"{name}{self._suffix}" for name in FUNCTIONS} | {"sign": "sign"}
-        return Language(calls, self.number, element)
+        return Language(calls, self.write_number, element)
 
-    def batched(self, function: Function) -> dict[str, Any]:
-        """The body in parts: what depends on parameters alone, angles, and all the rest."""
+    def write_batched(self, function: Function) -> dict[str, Any]:
+        """Return the body of a batched function in parts: what depends on parameters alone, angles, and the rest."""
         program = function.program
-        language = self._language(batched=True)
-        names = language.leaves(function)
-        found = _dependence(function)
+        language = self._make_language(batched=True)
+        names = language.write_leaves(function)
+        found = _find_dependence(function)
         rows = {angle: row for row, angle in enumerate(found.angles)}
         once: list[str] = []
         before: list[str] = []
@@ -235,18 +237,20 @@ class _Writer:
                 continue
             if number not in found.rest:
                 continue
-            text = f"const {self._real} t{number} = {language.expression(names, node)};"
+            text = f"const {self._real} t{number} = {language.write_expression(names, node)};"
             names[number] = f"t{number}"
             (rest if found.states[number] else once).append(text)
-        again = language.leaves(function)
+        again = language.write_leaves(function)
         for number, node in function.iterate_steps():
             if number in found.before:
-                text = f"const {self._real} a{number} = {language.expression(again, node)};"
+                text = f"const {self._real} a{number} = {language.write_expression(again, node)};"
                 again[number] = f"a{number}"
                 before.append(text)
         filled = [(row, again[angle]) for angle, row in rows.items()]
         outputs = list(dict.fromkeys(program.outputs))
-        rest += [f"out[{row}][k] = {signed(names, value)};" for row, value in enumerate(outputs)]
+        rest += [
+            f"out[{row}][k] = {write_signed(names, value)};" for row, value in enumerate(outputs)
+        ]
         places = zip(function.list_places(function.results), program.outputs, strict=True)
         return {
             "once": once,
@@ -257,21 +261,21 @@ class _Writer:
             "copies": [(outputs.index(value), array.name, k) for (array, k), value in places],
         }
 
-    def stack(self) -> int:
-        """Of the batched functions, kB: block arrays, and twice as much for temporaries, of which wide vectors take most."""
+    def estimate_stack(self) -> int:
+        """Return the stack that batched functions need, kB: block arrays, and twice as much for wide temporaries."""
         arrays = max(
             3 * len(body["angles"]) + len(body["outputs"])
-            for body in map(self.batched, self._model.functions)
+            for body in map(self.write_batched, self._model.functions)
         )
         width = 4 if self._model.single else 8
         return int(np.ceil(3 * arrays * BLOCK * width / 1024))
 
-    def cases(self) -> dict[str, dict[str, object]]:
-        """Stored vectors of the self-test."""
+    def list_cases(self) -> dict[str, dict[str, object]]:
+        """Return the stored vectors of the self-test."""
         return {
             name: {
                 "size": int(np.prod(values.shape[1:])),
-                "rows": [", ".join(self.number(x) for x in np.ravel(row)) for row in values],
+                "rows": [", ".join(self.write_number(x) for x in np.ravel(row)) for row in values],
             }
             for name, values in self._model.cases.items()
         }
@@ -279,7 +283,7 @@ class _Writer:
 
 @dataclass(frozen=True)
 class _Dependence:
-    """What of a function's nodes depends on what."""
+    """The dependence of a function's nodes on parameters and states."""
 
     states: list[bool]
     """Which ones depend on the state, and not on parameters alone."""
@@ -293,7 +297,8 @@ class _Dependence:
     """What the results are made of."""
 
 
-def _dependence(function: Function) -> _Dependence:
+def _find_dependence(function: Function) -> _Dependence:
+    """Find which nodes the sines need, and which nodes depend on parameters alone."""
     nodes, states = function.program.nodes, function.find_state_dependent()
     waves: set[int] = set()
     before: set[int] = set()

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.exported import ExportedModel, write_header
 from paramreduce_cli.expressions.functions import Argument, Function
 
 _CALLS = {
@@ -28,32 +28,33 @@ _CALLS = {
 
 
 def casadi(model: ExportedModel) -> dict[str, bytes]:
-    """One file a function, for casadi.Function.load in Python, MATLAB and C++, and a text about them.
+    """Write one file a function, for casadi.Function.load in Python, MATLAB and C++, and a text about them.
 
     The function ``parameters`` gives the values, where they are no constants of the code.
     """
-    functions = {f.name: _function(f) for f in (*model.functions, *model.closures)}
+    functions = {f.name: _make_function(f) for f in (*model.functions, *model.closures)}
     if model.closures:
-        functions |= _loops(model, functions)
+        functions |= _make_loop_functions(model, functions)
     if not model.constant:
         values = ca.DM([p.value for p in model.parameters])
         functions["parameters"] = ca.Function("parameters", [], [values], [], ["phi"])
-    files = {f"{model.name}_{name}.casadi": _saved(f) for name, f in functions.items()}
-    lines = [*about(model), "", *(str(function) for function in functions.values())]
+    files = {f"{model.name}_{name}.casadi": _serialise(f) for name, f in functions.items()}
+    lines = [*write_header(model), "", *(str(function) for function in functions.values())]
     return files | {f"{model.name}.txt": ("\n".join(lines) + "\n").encode()}
 
 
-def _saved(function: ca.Function) -> bytes:
-    """What Function.load reads; CasADi writes it to files only."""
+def _serialise(function: ca.Function) -> bytes:
+    """Return the bytes that Function.load reads; CasADi writes them to files only."""
     with TemporaryDirectory() as folder:
         path = Path(folder) / "function.casadi"
         function.save(str(path))
         return path.read_bytes()
 
 
-def _function(function: Function) -> ca.Function:
+def _make_function(function: Function) -> ca.Function:
+    """Return a function as a CasADi function of its arguments."""
     symbols = [ca.SX.sym(a.name, *a.shape) for a in function.arguments]
-    flat = [_elements(symbol) for symbol in symbols]
+    flat = [_list_elements(symbol) for symbol in symbols]
     inputs = [element for elements in flat for element in elements]
     values: list[ca.SX] = []
     for node in function.program.nodes:
@@ -62,32 +63,36 @@ def _function(function: Function) -> ca.Function:
         elif node.operation == "input":
             values.append(inputs[int(node.number)])
         else:
-            operands = [_signed(values, value) for value in node.operands]
+            operands = [_resolve_signed(values, value) for value in node.operands]
             values.append(_CALLS[node.operation](*operands))
-    outputs = [_signed(values, value) for value in function.program.outputs]
+    outputs = [_resolve_signed(values, value) for value in function.program.outputs]
     results = []
     for array in function.results:
         own, outputs = outputs[: array.size], outputs[array.size :]
-        results.append(_shaped(own, array))
+        results.append(_shape_matrix(own, array))
     names = [a.name for a in function.arguments], [r.name for r in function.results]
     return ca.Function(function.name, symbols, results, *names)
 
 
-def _elements(symbol: ca.SX) -> list[ca.SX]:
-    """Row by row."""
+def _list_elements(symbol: ca.SX) -> list[ca.SX]:
+    """Return the elements of a matrix row by row."""
     return [symbol[i, j] for i in range(symbol.shape[0]) for j in range(symbol.shape[1])]
 
 
-def _signed(values: list[ca.SX], value: int) -> ca.SX:
+def _resolve_signed(values: list[ca.SX], value: int) -> ca.SX:
     return -values[value >> 1] if value & 1 else values[value >> 1]
 
 
-def _shaped(elements: list[ca.SX], array: Argument) -> ca.SX:
+def _shape_matrix(elements: list[ca.SX], array: Argument) -> ca.SX:
+    """Return elements as a dense matrix of the shape of an array."""
     rows, columns = (*array.shape, 1)[:2]
     return ca.densify(ca.reshape(ca.vertcat(*elements), columns, rows).T)
 
 
-def _loops(model: ExportedModel, functions: dict[str, ca.Function]) -> dict[str, ca.Function]:
+def _make_loop_functions(
+    model: ExportedModel, functions: dict[str, ca.Function]
+) -> dict[str, ca.Function]:
+    """Return the functions that solve the position, velocity and acceleration problems of loops."""
     d, z = list(model.dependent), model.independent.tolist()
     order = np.argsort([*d, *z]).tolist()
     n, n_z = len(order), len(z)

@@ -1,13 +1,13 @@
 """The approximate base parameters as equations for a paper."""
 
-from paramreduce_cli.export.exported import ExportedModel, plain
+from paramreduce_cli.export.exported import ExportedModel, make_harmless
 from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
 
 
 def latex(model: ExportedModel) -> dict[str, bytes]:
-    """A table of the parameters: symbol, value, unit and what it is made of."""
-    heading = "".join(f"% {plain(line)}".rstrip() + "\n" for line in model.heading)
+    """Write a table of the parameters: symbol, value, unit and the standard parameters it consists of."""
+    heading = "".join(f"% {make_harmless(line)}".rstrip() + "\n" for line in model.heading)
     columns: tuple[str, ...] = ("parameter", "value", "unit", "made of")
     if not any(p.expression for p in model.parameters):
         columns = columns[:-1]

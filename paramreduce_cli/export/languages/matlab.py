@@ -2,32 +2,33 @@
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.exported import ExportedModel, write_header
 from paramreduce_cli.export.expressions import FUNCTIONS, Language
-from paramreduce_cli.export.rendering import rendered
+from paramreduce_cli.export.rendering import render_template
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.records import FloatArray
 
 
 def matlab(model: ExportedModel) -> dict[str, bytes]:
-    """Function files for MATLAB and Octave; vectors are columns."""
+    """Write function files for MATLAB and Octave; vectors are columns."""
     name = model.name
     files = {
-        f"{name}_{function.name}": _function(model, function)
+        f"{name}_{function.name}": _write_function(model, function)
         for function in (*model.functions, *model.closures)
     }
-    files[f"{name}_parameters"] = _parameters(model)
+    files[f"{name}_parameters"] = _write_parameters(model)
     if model.closures:
-        files |= _loops(model)
+        files |= _write_loop_functions(model)
     files[f"{name}_test"] = _test(model)
     return {f"{file}.m": (text + "\n").encode("ascii", "replace") for file, text in files.items()}
 
 
-def _comment(lines: list[str]) -> list[str]:
+def _write_comment(lines: list[str]) -> list[str]:
     return [f"% {line}".rstrip() for line in lines]
 
 
-def _function(model: ExportedModel, function: Function) -> str:
+def _write_function(model: ExportedModel, function: Function) -> str:
+    """Return the file of a function."""
     results = ", ".join(r.name for r in function.results)
     arguments = ", ".join(a.name for a in function.arguments)
     lines = [f"function [{results}] = {model.name}_{function.name}({arguments})"]
@@ -36,42 +37,48 @@ def _function(model: ExportedModel, function: Function) -> str:
         f"{array.name}: {array.text}, {' x '.join(map(str, array.shape))}"
         for array in (*function.arguments, *function.results)
     ]
-    lines += _comment([*documented, "", *about(model, 1)])
-    steps, outputs = _LANGUAGE.body(function)
+    lines += _write_comment([*documented, "", *write_header(model, 1)])
+    steps, outputs = _LANGUAGE.write_body(function)
     lines += [f"{name} = {text};" for name, text in steps]
     for result in function.results:
         rows, columns = (*result.shape, 1)[:2]
         lines.append(f"{result.name} = zeros({rows}, {columns});")
     for (array, k), text in zip(function.list_places(function.results), outputs, strict=True):
-        lines.append(f"{_element(array, k)} = {text};")
+        lines.append(f"{_write_element(array, k)} = {text};")
     return "\n".join([*lines, "end"])
 
 
-def _element(array: Argument, k: int) -> str:
+def _write_element(array: Argument, k: int) -> str:
+    """Return the text of element k of an array, counted row by row."""
     indices = ", ".join(str(int(i) + 1) for i in np.unravel_index(k, array.shape))
     return f"{array.name}({indices})"
 
 
-_LANGUAGE = Language({name: name for name in FUNCTIONS}, repr, _element)
+_LANGUAGE = Language({name: name for name in FUNCTIONS}, repr, _write_element)
 
 
-def _parameters(model: ExportedModel) -> str:
+def _write_parameters(model: ExportedModel) -> str:
+    """Return the function that gives the values of the parameters."""
     lines = [f"function phi = {model.name}_parameters()", "% The values of the parameters."]
-    lines += _comment(about(model, 1))
+    lines += _write_comment(write_header(model, 1))
     values = "; ".join(repr(p.value) for p in model.parameters)
     return "\n".join([*lines, f"phi = [{values}];", "end"])
 
 
-def _loops(model: ExportedModel) -> dict[str, str]:
-    sides = model.sides(first=1)
+def _write_loop_functions(model: ExportedModel) -> dict[str, str]:
+    """Return the functions that solve the position, velocity and acceleration problems of loops."""
+    sides = model.list_coordinates(first=1)
     return {
-        f"{model.name}_{problem}": rendered(f"{problem}.m", name=model.name, **sides).rstrip("\n")
+        f"{model.name}_{problem}": render_template(f"{problem}.m", name=model.name, **sides).rstrip(
+            "\n"
+        )
         for problem in ("positions", "velocities", "accelerations")
     }
 
 
 def _test(model: ExportedModel) -> str:
-    sizes = model.sizes()
+    """Return the script that compares all functions with stored results."""
+    sizes = model.collect_arrays()
     count = len(next(iter(model.cases.values())))
 
     def literal(values: FloatArray) -> str:
@@ -91,7 +98,7 @@ def _test(model: ExportedModel) -> str:
 
     cases = {key: literal(values) for key, values in model.cases.items()}
     arguments = {f.name: ", ".join(one(a.name) for a in f.arguments) for f in model.functions}
-    text = rendered(
+    text = render_template(
         "test.m", model=model, cases=cases, count=count, one=one, arguments=arguments, checks=checks
     )
     return text.rstrip("\n")

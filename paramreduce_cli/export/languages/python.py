@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, about
+from paramreduce_cli.export.exported import ExportedModel, write_header
 from paramreduce_cli.export.expressions import FUNCTIONS, Language
-from paramreduce_cli.export.rendering import rendered
+from paramreduce_cli.export.rendering import render_template
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.records import FloatArray
 
@@ -25,8 +25,8 @@ def _array(name, values, shape):
 
 
 def python(model: ExportedModel) -> dict[str, bytes]:
-    """A module that needs NumPy alone; functions take one state or arrays of states."""
-    lines = ['"""', *about(model), ""]
+    """Write a module that needs NumPy alone; its functions take one state or arrays of states."""
+    lines = ['"""', *write_header(model), ""]
     lines += [
         "Arrays may have leading axes for many states; the last axis, or the last two of a matrix,",
         "are those of one state.",
@@ -39,21 +39,24 @@ def python(model: ExportedModel) -> dict[str, bytes]:
     ]
     lines += ["", "", *_CHECKED]
     for function in (*model.functions, *model.closures):
-        lines += ["", "", *_function(function, private=function in model.closures)]
+        lines += ["", "", *_write_function(function, private=function in model.closures)]
     text = "\n".join(lines) + "\n"
     if model.closures:
-        text += "\n\n" + rendered("closures.py", **model.sides())
+        text += "\n\n" + render_template("closures.py", **model.list_coordinates())
     return {f"{model.name}.py": text.encode(), f"{model.name}_test.py": _test(model).encode()}
 
 
-def _function(function: Function, *, private: bool) -> list[str]:
+def _write_function(function: Function, *, private: bool) -> list[str]:
+    """Return the lines of a function."""
     arguments = ", ".join(a.name for a in function.arguments)
     lines = [f"def {'_' * private}{function.name}({arguments}):"]
     lines += [f'    """{function.text} {function.describe_cost()}', ""]
-    lines += _documented("Args", function.arguments) + _documented("Returns", function.results)
+    lines += _write_section("Args", function.arguments) + _write_section(
+        "Returns", function.results
+    )
     lines += ['    """']
     lines += [f"    {a.name} = _array({a.name!r}, {a.name}, {a.shape})" for a in function.arguments]
-    steps, outputs = _LANGUAGE.body(function)
+    steps, outputs = _LANGUAGE.write_body(function)
     lines += [f"    {name} = {text}" for name, text in steps]
     shapes = ", ".join(f"{a.name}.shape[:-{len(a.shape)}]" for a in function.arguments)
     lines.append(f"    many = np.broadcast_shapes({shapes})")
@@ -70,7 +73,8 @@ def _function(function: Function, *, private: bool) -> list[str]:
     return [*lines, f"    return {returned}"]
 
 
-def _documented(title: str, arrays: Sequence[Argument]) -> list[str]:
+def _write_section(title: str, arrays: Sequence[Argument]) -> list[str]:
+    """Return the lines of a docstring's section about arrays."""
     shapes = (", ".join(map(str, a.shape)) for a in arrays)
     listed = [f"        {a.name}: {a.text}, ({s})" for a, s in zip(arrays, shapes, strict=True)]
     return [f"    {title}:", *listed]
@@ -84,7 +88,8 @@ _LANGUAGE = Language(_CALLS, repr, lambda array, k: f"{array.name}[..., {_index(
 
 
 def _test(model: ExportedModel) -> str:
-    sizes = model.sizes()
+    """Return the self-test of the module."""
+    sizes = model.collect_arrays()
 
     def literal(name: str, values: FloatArray) -> str:
         shape = sizes[name].shape if name in sizes else values.shape[1:]
@@ -92,4 +97,4 @@ def _test(model: ExportedModel) -> str:
         return f"{name} = np.array({rows.tolist()!r})"
 
     cases = [literal(name, values) for name, values in model.cases.items()]
-    return rendered("test.py", model=model, cases=cases)
+    return render_template("test.py", model=model, cases=cases)

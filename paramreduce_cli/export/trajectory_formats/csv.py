@@ -8,7 +8,7 @@ from paramreduce_cli.motion.timed_motion import TimedMotion
 
 
 def csv(motion: TimedMotion) -> dict[str, str]:
-    """Columns t, q1 ... qn, dq1 ..., ddq1 ..., in s, rad (m) and their rates."""
+    """Write columns t, q1 ... qn, dq1 ..., ddq1 ..., in s, rad (m) and their rates."""
     n = len(motion.names)
     header = ["t", *(f"{key}{j + 1}" for key in ("q", "dq", "ddq") for j in range(n))]
     table = np.column_stack([motion.time, motion.z, motion.dz, motion.ddz])

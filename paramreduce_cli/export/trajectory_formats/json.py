@@ -6,7 +6,7 @@ from paramreduce_cli.motion.timed_motion import TimedMotion
 
 
 def json(motion: TimedMotion) -> dict[str, str]:
-    """One object: names of the joints, rate, times, positions, velocities and accelerations by sample."""
+    """Write one object: names of the joints, rate, times, positions, velocities and accelerations by sample."""
     data = {
         "title": motion.title,
         "joints": list(motion.names),

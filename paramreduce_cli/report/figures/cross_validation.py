@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 from paramreduce_cli.identification.quality import estimate_noise_floor
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import legend_beside, mark_selected, new_figure
+from paramreduce_cli.report.style import make_figure, mark_selected, place_legend_beside
 
 _OVER_BEST = 4.0
 """Largest error shown, times the smallest."""
@@ -13,13 +13,15 @@ _OVER_BEST = 4.0
 
 @placed(PageSection.IDENTIFICATION, 1)
 def cross_validation(data: ReportData) -> Figure | None:
-    """Torque error against the number of parameters where the selection was learned, on parts left out in turn (with one standard error), and held out; what noise alone would leave, if it is as dense within the band of the model as above."""
+    """Torque error against the number of parameters: on the training data, in cross-validation (with one standard
+    error) and held out. The dotted line is the error that noise alone would leave.
+    """
     crossed = data.validation.cross_validation
     if crossed is None:
         return None
     name = data.validation.selected.heuristic
     result, own = data.validation.heuristics[name], crossed[name]
-    drawn = new_figure()
+    drawn = make_figure()
     axes = drawn.subplots()
     axes.plot(result.n, 100 * result.torque_error.estimation, color="#7d8590", label="learned from")
     axes.errorbar(
@@ -41,5 +43,5 @@ def cross_validation(data: ReportData) -> Figure | None:
     mark_selected(axes, data)
     axes.set_xlabel(f"number of parameters n ({name})")
     axes.set_ylabel(r"$\varepsilon_\tau$, %")
-    legend_beside(axes)
+    place_legend_beside(axes)
     return drawn

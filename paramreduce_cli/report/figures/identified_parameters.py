@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import new_figure
+from paramreduce_cli.report.style import make_figure
 
 _CONFIDENCE = 1.96
 """Standard deviations of an interval that holds the truth in 95 of 100 cases."""
@@ -13,13 +13,15 @@ _CONFIDENCE = 1.96
 
 @placed(PageSection.IDENTIFICATION, 4)
 def identified_parameters(data: ReportData) -> Figure | None:
-    """Parameters of the reduced model over their own size, with 95 % confidence for noise as coloured as the residuals."""
+    """Identified parameters of the reduced model, relative to their own size, with 95 % confidence intervals for noise
+    as coloured as the residuals.
+    """
     if data.identification is None:
         return None
     found = data.identification.reduced
     relative = _CONFIDENCE * found.deviations / np.maximum(np.abs(found.values), 1e-300)
     order = np.argsort(relative)
-    drawn = new_figure(0.8)
+    drawn = make_figure(0.8)
     axes = drawn.subplots()
     places = np.arange(order.size)
     axes.errorbar(

@@ -3,14 +3,17 @@
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.recorded import signals_figure
+from paramreduce_cli.report.recorded import draw_signals
 from paramreduce_cli.report.sections import PageSection, placed
 
 
 @placed(PageSection.LOG, 3)
 def log_torques(data: ReportData) -> Figure | None:
-    """Torques of the same motion as recorded (grey) and as they are used, through the low-pass that the model passes too; ticks above where outliers were replaced."""
+    """Torques of the same motion: as recorded (grey) and after the low-pass filter, which the model passes too.
+
+    Ticks: replaced outliers.
+    """
     if data.log is None:
         return None
     shown = data.log.shown
-    return signals_figure(data, shown, (("τ  (N m, N)", shown.raw_tau, shown.tau, 1),))
+    return draw_signals(data, shown, (("τ  (N m, N)", shown.raw_tau, shown.tau, 1),))

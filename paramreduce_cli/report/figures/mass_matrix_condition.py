@@ -3,20 +3,28 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from paramreduce_cli.report.curves import curves
+from paramreduce_cli.report.curves import gather_curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import legend_beside, mark_selected, new_figure, visible
+from paramreduce_cli.report.style import (
+    clip_errors,
+    make_figure,
+    mark_selected,
+    place_legend_beside,
+)
 
 
 @placed(PageSection.ACCELERATIONS, 2)
 def mass_matrix_condition(data: ReportData) -> Figure:
-    """Largest condition number of the mass matrix over the samples; hollow where it is indefinite. What several heuristics found is drawn once, for the first of them."""
-    drawn = new_figure()
+    """Largest condition number of the mass matrix over the samples; hollow markers: the matrix is indefinite.
+
+    Heuristics that found the same models share a curve.
+    """
+    drawn = make_figure()
     axes = drawn.subplots()
-    for curve in curves(data):
+    for curve in gather_curves(data):
         result, colour = curve.result, curve.colour
-        condition = curve.drawn(visible(result.mass_matrix.condition))
+        condition = curve.hide_shared(clip_errors(result.mass_matrix.condition))
         positive = result.mass_matrix.smallest_eigenvalue > 0
         axes.semilogy(result.n, condition, color=colour, linewidth=0.8, label=curve.label)
         for chosen, fill in ((positive, colour), (~positive, "white")):
@@ -34,5 +42,5 @@ def mass_matrix_condition(data: ReportData) -> Figure:
     mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel("largest κ(M) over the samples")
-    legend_beside(axes)
+    place_legend_beside(axes)
     return drawn

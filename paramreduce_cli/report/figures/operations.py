@@ -2,20 +2,23 @@
 
 from matplotlib.figure import Figure
 
-from paramreduce_cli.report.curves import curves
+from paramreduce_cli.report.curves import gather_curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import FUNCTIONS, legend_beside, mark_selected, new_figure
+from paramreduce_cli.report.style import FUNCTIONS, make_figure, mark_selected, place_legend_beside
 
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
-    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters. Of large robots all sizes of the selected heuristic and of forward selection are counted, and of the others the models that nothing beats. What several heuristics found is drawn once, for the first of them."""
-    drawn = new_figure()
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: full model.
+
+    Heuristics that found the same models share a curve. Of large robots only some models are counted.
+    """
+    drawn = make_figure()
     axes = drawn.subplots()
-    for curve in curves(data):
+    for curve in gather_curves(data):
         for key, _, line in FUNCTIONS:
-            values = curve.drawn(curve.result.operations[key])
+            values = curve.hide_shared(curve.result.operations[key])
             axes.plot(
                 curve.result.n, values, line, color=curve.colour, marker=curve.marker, markersize=2.5,
                 label=curve.label if line == "-" else None,
@@ -31,5 +34,5 @@ def operations(data: ReportData) -> Figure:
     axes.set_ylabel("operations")
     for _, label, line in FUNCTIONS:
         axes.plot([], [], line, color="#57606a", label=label)
-    legend_beside(axes)
+    place_legend_beside(axes)
     return drawn

@@ -7,15 +7,15 @@ from matplotlib.figure import Figure
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.data import ReportData, Skeleton
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import broken, new_figure
+from paramreduce_cli.report.style import break_lines, make_figure
 
 
 @placed(PageSection.MECHANISM, 1)
 def poses(data: ReportData) -> Figure:
-    """The mechanism in a few poses of the validation set."""
+    """Mechanism in a few poses of the validation set."""
     count = len(data.skeletons)
-    drawn = new_figure(2.4 / count)
-    corners = np.array([_extent(skeleton) for skeleton in data.skeletons])
+    drawn = make_figure(2.4 / count)
+    corners = np.array([_find_extent(skeleton) for skeleton in data.skeletons])
     low, high = corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)
     half = 0.55 * float((high - low).max()) or 1.0
     for k, skeleton in enumerate(data.skeletons):
@@ -28,8 +28,8 @@ def poses(data: ReportData) -> Figure:
     return drawn
 
 
-def _extent(skeleton: Skeleton) -> FloatArray:
-    """Corners of the box around a pose and the base, (2, 3), m."""
+def _find_extent(skeleton: Skeleton) -> FloatArray:
+    """Return the corners of the box around a pose and the base, (2, 3), m."""
     points = np.vstack(
         [
             np.zeros((0 if skeleton.closures else 1, 3)),
@@ -79,6 +79,6 @@ def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float, plots: int) -> N
         axis.set_pane_color((0.97, 0.975, 0.98, 1.0))
     shown = ", ".join(f"{value:.2f}" for value in skeleton.z)
     axes.text2D(
-        0.5, 0.98, broken(f"z = ({shown})", plots), transform=axes.transAxes, ha="center",
+        0.5, 0.98, break_lines(f"z = ({shown})", plots), transform=axes.transAxes, ha="center",
         fontsize="xx-small", color="#57606a",
     ).set_in_layout(False)  # fmt: skip

@@ -4,33 +4,33 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.records import SelectionMethod
-from paramreduce_cli.report.curves import curves
+from paramreduce_cli.report.curves import gather_curves
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.report.style import (
     FLOOR,
     LEAST_MEASURED,
-    legend_beside,
+    draw_message,
+    make_figure,
     mark_selected,
-    message,
-    new_figure,
+    place_legend_beside,
 )
 
 
 @placed(PageSection.PROOFS, 1)
 def proven_bound(data: ReportData) -> Figure:
-    """Torque error of every heuristic over what is proven to be possible; no subset is below the grey."""
+    """Torque error of every heuristic and the proven lower bound; no subset lies in the grey area."""
     proofs = data.reduction.proofs
     if proofs is None:
-        return message("best-subset was not run")
-    drawn = new_figure()
+        return draw_message("best-subset was not run")
+    drawn = make_figure()
     axes = drawn.subplots()
     # Measured torques are never explained to round-off; small sizes are bounded by nothing at times.
     floor = FLOOR if data.identification is None else LEAST_MEASURED
     shown = np.maximum(proofs.lower_bound, floor)
     axes.fill_between(proofs.n, shown, floor, step="mid", color="#d5d9de", zorder=0)
     axes.step(proofs.n, shown, where="mid", color="#30363d", linewidth=0.9, label="proven bound")
-    for curve in curves(data):
+    for curve in gather_curves(data):
         names = [name for name in curve.names if SelectionMethod.parse(name).by_torque]
         proven = "best-subset" in names
         if not names:
@@ -51,5 +51,5 @@ def proven_bound(data: ReportData) -> Figure:
     mark_selected(axes, data)
     axes.set_xlabel("number of parameters n")
     axes.set_ylabel(r"$\varepsilon_\tau$, estimation")
-    legend_beside(axes)
+    place_legend_beside(axes)
     return drawn

@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 from paramreduce_cli.records import DataChange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import legend_above, message, new_figure
+from paramreduce_cli.report.style import draw_message, make_figure, place_legend_above
 
 _WIDE_SPREAD = 100.0
 """Per cent of change from which on a logarithmic scale shows more."""
@@ -14,11 +14,11 @@ _WIDE_SPREAD = 100.0
 
 @placed(PageSection.STABILITY, 1)
 def stability(data: ReportData) -> Figure:
-    """How often each parameter is chosen, the spread of its value, and the torque error, on other data."""
+    """Results on other data: how often each parameter is selected, the spread of its value, and the torque error."""
     found, names = data.validation.stability, data.reduction.columns.names
     if found is None:
-        return message("validation.stability is off")
-    drawn = new_figure(1.3)
+        return draw_message("validation.stability is off")
+    drawn = make_figure(1.3)
     often = found.chosen.mean(axis=0)
     order = np.argsort(-often, kind="stable")[: int(np.sum(often > 0))]
     upper, middle, lower = drawn.subplots(3, 1)
@@ -59,5 +59,5 @@ def stability(data: ReportData) -> Figure:
     lower.set_xticks(numbers, ["all", *map(str, numbers[1:])], fontsize="x-small")
     lower.set_xlabel("which trajectory is left out; then fewer samples")
     lower.set_ylabel(r"$\varepsilon_\tau$, %")
-    legend_above(lower, 2)
+    place_legend_above(lower, 2)
     return drawn

@@ -4,30 +4,33 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.figures.error_vs_operations import staircase
+from paramreduce_cli.report.figures.error_vs_operations import find_staircase
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import FUNCTIONS, legend_beside, pair_of_plots, visible
+from paramreduce_cli.report.style import FUNCTIONS, clip_errors, make_two_plots, place_legend_beside
 
 
 @placed(PageSection.TERMS, 0)
 def terms(data: ReportData) -> Figure | None:
-    """Torque error against operations: the best models of fewer parameters, for the direct dynamics of those whose mass matrix is positive definite, and the same with terms left out on the way to the budget. Filled: estimation set; hollow: validation set."""
+    """Torque error against operations: the best models with fewer parameters, and models whose negligible terms are
+    pruned. Filled: estimation set; hollow: validation set. Direct dynamics: only models with a positive definite mass
+    matrix.
+    """
     if data.terms is None:
         return None
-    drawn, *axes = pair_of_plots()
+    drawn, *axes = make_two_plots()
     for one, (key, label, _) in zip(axes, FUNCTIONS, strict=True):
         found = [
             (float(cost), float(error))
             for result in data.validation.heuristics.values()
             for cost, error, eigenvalue in zip(
                 result.operations[key],
-                visible(result.torque_error.estimation),
+                clip_errors(result.torque_error.estimation),
                 result.mass_matrix.smallest_eigenvalue,
                 strict=True,
             )
             if key == "inverse" or eigenvalue > 0
         ]
-        stairs = np.array(staircase(found))
+        stairs = np.array(find_staircase(found))
         if stairs.size:
             one.step(*stairs.T, where="post", color="#8b949e", label="parameters left out")
         one.set_xlabel(f"operations of {label}")
@@ -36,15 +39,15 @@ def terms(data: ReportData) -> Figure | None:
             continue
         front = term.front
         one.semilogy(
-            front.operations, visible(front.torque_error.estimation),
+            front.operations, clip_errors(front.torque_error.estimation),
             color="#0969da", marker="o", markersize=3, linewidth=1.0, label="terms left out too",
         )  # fmt: skip
         one.semilogy(
-            front.operations, visible(front.torque_error.validation),
+            front.operations, clip_errors(front.torque_error.validation),
             color="#0969da", marker="o", markersize=4, markerfacecolor="none", linestyle="none",
         )  # fmt: skip
         one.axhline(data.terms.torque_budget, color="#cf222e", linewidth=0.8, label="budget")
     axes[0].set_yscale("log")
     axes[0].set_ylabel(r"$\varepsilon_\tau$")
-    legend_beside(axes[1])
+    place_legend_beside(axes[1])
     return drawn

@@ -4,10 +4,10 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import error_figure
+from paramreduce_cli.report.style import draw_errors
 
 
 @placed(PageSection.HEURISTICS, 2)
 def torque_error(data: ReportData) -> Figure:
-    """Torque error against the number of parameters, on both sets. What several heuristics found is drawn once, for the first of them."""
-    return error_figure(data, "torque", r"$\varepsilon_\tau$")
+    """Torque error against the number of parameters. Heuristics that found the same models share a curve."""
+    return draw_errors(data, "torque", r"$\varepsilon_\tau$")

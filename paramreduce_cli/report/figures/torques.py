@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_style, new_figure
+from paramreduce_cli.report.style import choose_joint_style, make_figure
 
 _DASHES = (0, (3, 2))
 _ANY = "#7d8590"
@@ -14,24 +14,24 @@ _ANY = "#7d8590"
 
 @placed(PageSection.SELECTED, 2)
 def torques(data: ReportData) -> Figure:
-    """Torques as they were given or measured, and those of the selected model, along the validation set."""
+    """Given or measured torques and torques of the selected model, along the validation set."""
     modelled = data.identification is None
     label = ("full" if data.model is not None else "given") if modelled else "measured"
     measured = np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist()
     n_dof = len(measured)
     columns = 2 if n_dof > 1 else 1
     rows = -(-n_dof // columns)
-    drawn = new_figure(0.13 + 0.42 * rows)
+    drawn = make_figure(0.13 + 0.42 * rows)
     grid = np.atleast_1d(drawn.subplots(rows, columns, sharex=True)).ravel()
     for axes, j in zip(grid, measured, strict=False):
-        colour, _ = joint_style(j)
+        colour, _ = choose_joint_style(j)
         axes.plot(data.motion.time, data.motion.full[:, j], color=colour)
         axes.plot(
             data.motion.time, data.motion.reduced[:, j], color="#111", linestyle=_DASHES,
             linewidth=1.1,
         )  # fmt: skip
-        unit = f" ({data.force_unit(j)})" if data.force_unit(j) else ""
-        axes.set_ylabel(f"τ{unit}, {data.joint_label(j)}", fontsize="small")
+        unit = f" ({data.find_force_unit(j)})" if data.find_force_unit(j) else ""
+        axes.set_ylabel(f"τ{unit}, {data.name_joint(j)}", fontsize="small")
     for spare in grid[n_dof:]:
         spare.set_visible(False)
     for axes in grid[max(0, n_dof - columns) : n_dof]:

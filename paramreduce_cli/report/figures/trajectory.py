@@ -4,13 +4,13 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.report.style import joint_style, legend_above, new_figure
+from paramreduce_cli.report.style import choose_joint_style, make_figure, place_legend_above
 
 
 @placed(PageSection.TRAJECTORIES, 1)
 def trajectory(data: ReportData) -> Figure:
-    """A characteristic trajectory of the validation set: positions, velocities, accelerations."""
-    drawn = new_figure(1.5)
+    """Positions, velocities and accelerations along a trajectory of the validation set."""
+    drawn = make_figure(1.5)
     motion = data.motion
     rows = (
         (motion.z, "z  (rad, m)"),
@@ -20,10 +20,10 @@ def trajectory(data: ReportData) -> Figure:
     all_axes = drawn.subplots(3, 1, sharex=True)
     for axes, (values, title) in zip(all_axes, rows, strict=True):
         for j in range(values.shape[1]):
-            colour, style = joint_style(j)
-            label = data.joint_label(j)
+            colour, style = choose_joint_style(j)
+            label = data.name_joint(j)
             axes.plot(motion.time, values[:, j], color=colour, linestyle=style, label=label)
         axes.set_ylabel(title)
-    legend_above(all_axes[0], min(values.shape[1], 7))
+    place_legend_above(all_axes[0], min(values.shape[1], 7))
     all_axes[-1].set_xlabel("t (s)")
     return drawn

@@ -7,11 +7,15 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.SELECTED, 1, tall=True)
 def approximate_base_parameters(data: ReportData) -> Table:
-    """The parameters of the selected model: value, and what they take over from the others, by the values in the config."""
+    """Parameters of the selected model.
+
+    Each is lumped: it takes over the part of the removed parameters that its column can reproduce. Values follow from
+    the values in the config.
+    """
     selected = data.validation.selected
     model = selected.model
     rows = [
-        (str(k + 1), name, f"{value:.6g}", data.unit(parameter).replace("^2", "²"), expression)
+        (str(k + 1), name, f"{value:.6g}", data.find_unit(parameter).replace("^2", "²"), expression)
         for k, (parameter, name, value, expression) in enumerate(
             zip(model.first, model.names, model.values, model.expressions, strict=True)
         )

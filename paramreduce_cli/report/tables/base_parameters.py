@@ -7,7 +7,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.BASE, 1, tall=True)
 def base_parameters(data: ReportData) -> Table:
-    """The base parameters with the relations that regroup the others."""
+    """Base parameters and the standard parameters that are regrouped in each."""
     base = data.robot_model.base
     rows = [
         (str(k + 1), expression, f"{value:.6g}")

@@ -8,29 +8,32 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.MECHANISM, 4)
 def drives(data: ReportData) -> Table:
-    """Rotors, friction and springs; motions are coordinates with weights."""
+    """Rotors, friction and springs with the weights of the coordinates that they act along."""
     mechanism = data.robot_model.mechanism
     rows = []
     for drive in mechanism.drives:
         columns = mechanism.find_drive_columns(drive)
         cells = [
-            _cell(mechanism.parameters[columns[kind]], data.robot_model.values[columns[kind]])
+            _format_cell(
+                mechanism.parameters[columns[kind]], data.robot_model.values[columns[kind]]
+            )
             if kind in columns
             else ""
             for kind in DRIVE
         ]
         sign = _sign(drive) if Kind.COULOMB in columns else ""
         slack = f"{drive.rest:g}" if Kind.STIFFNESS in columns else ""
-        rows.append((drive.name, _motion(mechanism, drive), *cells, sign, slack))
+        rows.append((drive.name, _describe_motion(mechanism, drive), *cells, sign, slack))
     header = ("drive", "motion", *(kind.symbol for kind in DRIVE), "sign of speed", "slack at")
     return Table("Rotors, friction and springs", header, tuple(rows))
 
 
-def _cell(parameter: Parameter, value: float) -> str:
+def _format_cell(parameter: Parameter, value: float) -> str:
     return f"{value:g} {parameter.unit}".replace("^2", "²")
 
 
-def _motion(mechanism: Mechanism, drive: Drive) -> str:
+def _describe_motion(mechanism: Mechanism, drive: Drive) -> str:
+    """Return the weighted sum of coordinates that a drive acts along."""
     names = zip(drive.weights.tolist(), mechanism.generalised_names, strict=True)
     terms = [f"{'' if weight == 1 else f'{weight:g} '}{name}" for weight, name in names if weight]
     return " + ".join(terms).replace("+ -", "- ")

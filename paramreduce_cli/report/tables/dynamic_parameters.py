@@ -8,7 +8,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.MECHANISM, 3)
 def dynamic_parameters(data: ReportData) -> Table:
-    """The parameters of every body and payload."""
+    """Standard parameters of every body and payload."""
     values = data.robot_model.values
     rows = [
         (rigid.name, *(f"{values[rigid.columns[kind]]:g}" for kind in INERTIAL))

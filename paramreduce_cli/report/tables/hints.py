@@ -7,7 +7,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 0)
 def hints(data: ReportData) -> Table:
-    """How the reduced model stands against all base parameters, and what the residuals suggest, the strongest first."""
+    """Likely causes of the residuals, the strongest first, and the reduced model compared with all base parameters."""
     found = data.identification
     rows: list[tuple[str, str]] = []
     if found is not None:

@@ -12,7 +12,10 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 3)
 def identified_errors(data: ReportData) -> Table:
-    """Held-out errors joint by joint, root mean squares in N m (N), as shares of the torques and of the nominal torque, which may be the limit; correlation of a residual with the one before, the probability of such residuals if they were white (Ljung-Box), and white samples that would tell as much of a constant."""
+    """Held-out errors of each joint: root mean square in N m (N), relative to the torques, and relative to the nominal
+    torque (which may be the limit). Also: correlation of a residual with the previous one, probability of such
+    residuals if they were white (Ljung-Box), and the equivalent number of white samples.
+    """
     found = data.identification
     header = (
         "joint", "noise", "all, N m", "reduced, N m", "of torques", "of nominal", "lag-1", "white, p", "eff. samples",

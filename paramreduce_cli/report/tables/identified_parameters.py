@@ -11,16 +11,16 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.IDENTIFICATION, 5, tall=True)
 def identified_parameters(data: ReportData) -> Table:
-    """Values, standard deviations and relative ones of the reduced model, then of all base parameters."""
+    """Values, standard deviations and relative standard deviations: of the reduced model, then of all base parameters."""
     found = data.identification
     rows: list[tuple[str, ...]] = []
     if found is not None:
-        rows = [*_rows("reduced", found.reduced), *_rows("all", found.full)]
+        rows = [*_list_rows("reduced", found.reduced), *_list_rows("all", found.full)]
     header = ("model", "parameter", "value", "std. dev.", "relative, %")
     return Table("Identified parameters", header, tuple(rows))
 
 
-def _rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
+def _list_rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
     relative = 100 * estimate.deviations / np.maximum(np.abs(estimate.values), 1e-300)
     cells = zip(estimate.names, estimate.values, estimate.deviations, relative, strict=True)
     return [

@@ -10,16 +10,16 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.HEURISTICS, 3)
 def joint_errors(data: ReportData) -> Table:
-    """Root mean squares of what the selected model misses of each joint's torque, and as a share of that torque."""
+    """Torque error of the selected model for each joint: root mean square, and relative to that joint's torque."""
     selected = data.validation.selected
     result = data.validation.heuristics[selected.heuristic]
     row = result.find_row(selected.n)
     rows = []
     for j in np.flatnonzero(np.isfinite(data.reduction.nominal_torque)).tolist():
-        cells = [data.joint_label(j)]
+        cells = [data.name_joint(j)]
         for which, rms in data.rms_torque.items():
             relative = float(result.joint_torque_error[which][row][j])
-            unit = data.force_unit(j)
+            unit = data.find_force_unit(j)
             cells.append(f"{relative * rms[j]:.2g} {unit}" if unit else "")
             cells.append(format_percent(relative) if rms[j] > NO_TORQUE else "no torque")
         rows.append(tuple(cells))

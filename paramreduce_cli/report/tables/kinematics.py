@@ -7,6 +7,6 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.MECHANISM, 2)
 def kinematics(data: ReportData) -> Table:
-    """The geometry as the config gives it."""
+    """Geometry as the config gives it."""
     header, *rows = data.robot_model.mechanism.table
     return Table("Kinematic parameters (m, rad)", header, tuple(rows))

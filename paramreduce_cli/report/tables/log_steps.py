@@ -7,7 +7,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.LOG, 1)
 def log_steps(data: ReportData) -> Table:
-    """What was done to the log, and what looks wrong in it."""
+    """Processing steps of the log, and warnings about it."""
     log = data.log
     rows = [] if log is None else [("done", text) for text in log.steps]
     rows += [] if log is None else [("warning", text) for text in log.warnings]

@@ -7,7 +7,9 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.SAVINGS, 1)
 def operations(data: ReportData) -> Table:
-    """Operations of the full, the base and the selected model: lean, plain recursion, the paper's rule."""
+    """Operations of the full, the base and the selected model: lean code, textbook recursion, and textbook recursion by
+    the paper's rule.
+    """
     selected = data.validation.selected
     keys = tuple(
         f"operations_{function}{rule}"

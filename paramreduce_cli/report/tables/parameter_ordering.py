@@ -7,7 +7,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.ORDERING, 1, tall=True)
 def parameter_ordering(data: ReportData) -> Table:
-    """The order in which each heuristic takes the parameters."""
+    """Order in which each heuristic adds the parameters."""
     found = data.reduction.heuristics
     orders = {name: f.order for name, f in found.items() if f.order is not None}
     names = data.reduction.columns.names

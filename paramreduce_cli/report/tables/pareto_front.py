@@ -9,7 +9,9 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.SAVINGS, 4, tall=True)
 def pareto_front(data: ReportData) -> Table:
-    """Models that no other one beats in all respects: errors on the estimation (E), the validation (V) and the test set (T), there the median and the range."""
+    """Models that no other model beats in all quantities: errors on the estimation (E), the validation (V) and the test
+    set (T; median and range).
+    """
     header = ("heuristic", "n", "ε_τ E", "ε_τ V", "ε_τ T", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T", "d", "M, δ")
     rows = []
     for model in data.validation.pareto:

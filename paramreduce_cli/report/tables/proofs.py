@@ -9,7 +9,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.PROOFS, 2, tall=True)
 def proofs(data: ReportData) -> Table:
-    """How good the best subsets are proven to be, for every number of parameters."""
+    """Proven bounds on the error of the best subset, for every number of parameters."""
     found = data.reduction.proofs
     header = ("n", "ε_τ", "no subset below", "gap", "status", "nodes", "s")
     if found is None:

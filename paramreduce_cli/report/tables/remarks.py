@@ -7,6 +7,6 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.ACCELERATIONS, 3)
 def remarks(data: ReportData) -> Table:
-    """Where models should not be trusted."""
+    """Warnings: models that should not be trusted, and why."""
     rows = [(str(warning.about), warning.text) for warning in data.validation.warnings]
     return Table("Warnings", ("about", "warning"), tuple(rows))

@@ -8,7 +8,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.PROOFS, 3)
 def selected_subsets(data: ReportData) -> Table:
-    """What every heuristic takes at the selected number of parameters."""
+    """Parameters that every heuristic selects at the selected number of parameters."""
     n, names = data.validation.selected.n, data.reduction.columns.names
     rows = []
     for name, found in data.reduction.heuristics.items():

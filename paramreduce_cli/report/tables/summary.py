@@ -2,14 +2,18 @@
 
 from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.overview import HEADER, function_cells
+from paramreduce_cli.report.overview import HEADER, make_function_cells
 from paramreduce_cli.report.sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
 
 @placed(PageSection.HEURISTICS, 1)
 def summary(data: ReportData) -> Table:
-    """Every heuristic at the selected number of parameters, both functions: errors on the estimation (E), the validation (V) and the test set (T), which no search looks at, there the median of all motions and between the smallest and the largest."""
+    """All heuristics at the selected number of parameters, both functions.
+
+    Errors on the estimation (E), the validation (V) and the test set (T), which no search uses; for T the median of all
+    motions, and their range.
+    """
     n = data.validation.selected.n
     full = data.validation.full
     model = (str(data.n_affecting), str(data.reduction.rank), str(n))
@@ -18,7 +22,7 @@ def summary(data: ReportData) -> Table:
         k = r.find_row(n)
         if k is not None:
             d, M = (
-                function_cells(
+                make_function_cells(
                     key,
                     full.get(f"operations_{key}"),
                     r.operations[key][k],

@@ -11,7 +11,10 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TERMS, 3)
 def term_differences(data: ReportData) -> Table:
-    """Largest difference of each joint's torque, N m (N), and as a share of its nominal torque, on random states inside the limits, or on both sets where there are none; and the state where the worst joint, marked with a star, strays most, in units of the table above."""
+    """Largest difference of each joint's torque, N m (N), and relative to its nominal torque, on random states inside
+    the limits (on both sets where there are none). The state is that of the worst joint, marked with a star, in units
+    of the table above.
+    """
     functions = data.terms.functions if data.terms is not None else {}
     labels = {key: label for key, label, _ in FUNCTIONS}
     header = ("function", "joint", "largest", "of nominal", "position", "velocity", "acceleration")

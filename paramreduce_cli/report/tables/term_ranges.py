@@ -9,7 +9,9 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TERMS, 2)
 def term_ranges(data: ReportData) -> Table:
-    """Ranges of the estimation set, inside which functions with terms left out hold, and those of the random states that they are looked at on: the limits of the config, or what the set reaches where there is none; of loops what they come to."""
+    """Ranges of the estimation set, inside which pruned functions hold, and ranges of the random states that they are
+    also evaluated on: limits of the config, or ranges of the set where there is no limit.
+    """
     functions = data.terms.functions if data.terms is not None else {}
     kinds = ("position", "velocity", "acceleration")
     header = ("joint", "unit", *kinds, *(f"random {kind}" for kind in kinds))

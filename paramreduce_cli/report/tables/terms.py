@@ -12,7 +12,11 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TERMS, 1)
 def terms(data: ReportData) -> Table:
-    """Errors on the estimation (E), the validation (V) and the test set (T), which no search looks at, and on random states inside the limits, and the smallest eigenvalue of all mass matrices, on both sets and random states."""
+    """Functions with pruned terms.
+
+    Errors on the estimation (E), the validation (V) and the test set (T), which no search uses, and on random states
+    inside the limits; smallest eigenvalue of all mass matrices.
+    """
     header = (
         "function", "n", "operations", "before", "ε_τ E", "ε_τ V", "ε_τ T", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T", "ε_τ random",
         "ε_z̈ random", "smallest eigenvalue",
@@ -21,11 +25,11 @@ def terms(data: ReportData) -> Table:
     labels = {key: label for key, label, _ in FUNCTIONS}
     for name, one in (data.terms.functions if data.terms is not None else {}).items():
         shown = (
-            _known(one.torque_error.estimation), _known(one.torque_error.validation),
+            _format_error(one.torque_error.estimation), _format_error(one.torque_error.validation),
             format_percent_range(*ErrorRange.summarise(one.torque_error.test)),
-            _known(one.acceleration_error.estimation), _known(one.acceleration_error.validation),
+            _format_error(one.acceleration_error.estimation), _format_error(one.acceleration_error.validation),
             format_percent_range(*ErrorRange.summarise(one.acceleration_error.test)),
-            _known(one.random_torque_error), _known(one.random_acceleration_error),
+            _format_error(one.random_torque_error), _format_error(one.random_acceleration_error),
         )  # fmt: skip
         eigenvalue = one.smallest_eigenvalue
         rows.append(
@@ -41,6 +45,6 @@ def terms(data: ReportData) -> Table:
     return Table("Functions with terms left out", header, tuple(rows))
 
 
-def _known(error: float) -> str:
-    """A share; a dash where it is not known."""
+def _format_error(error: float) -> str:
+    """Return an error in per cent, a dash where it is not known."""
     return "-" if np.isnan(error) else format_percent(error)

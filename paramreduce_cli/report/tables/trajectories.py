@@ -10,7 +10,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TRAJECTORIES, 3, tall=True)
 def trajectories(data: ReportData) -> Table:
-    """What every trajectory reached."""
+    """Condition numbers and peak values of every trajectory."""
     found = data.trajectories
     if found is None:
         return Table("Trajectories: recorded states were used", ("set",), ())
@@ -21,14 +21,16 @@ def trajectories(data: ReportData) -> Table:
         *(f"{c.name}" for c in found.constraints), "CPU s", "iterations", "status",
     )  # fmt: skip
     rows = [
-        _trajectory_row(f"{name} {k + 1}", t)
+        _list_cells(f"{name} {k + 1}", t)
         for name in SETS
         for k, t in enumerate(getattr(found, name))
     ]
     return Table("Trajectories", header, tuple(rows))
 
 
-def _trajectory_row(label: str, t: Trajectory) -> tuple[str, ...]:
+def _list_cells(label: str, t: Trajectory) -> tuple[str, ...]:
+    """Return the cells of one trajectory."""
+
     def spread(values: np.ndarray) -> str:
         return " ".join(f"{value:.3g}" for value in values)
 

@@ -10,7 +10,7 @@ from paramreduce_cli.texts.table import Table
 
 @placed(PageSection.TRAJECTORIES, 2)
 def trajectory_setup(data: ReportData) -> Table:
-    """What was asked of the trajectories."""
+    """Settings and limits of the trajectories."""
     t = data.trajectories
     title, header = "Trajectory setup", ("setting", "value")
     if t is None:
@@ -24,8 +24,11 @@ def trajectory_setup(data: ReportData) -> Table:
         ("trajectory parameters", str(n_dof * columns)),
         ("grid points", str(t.points)),
         ("period, s", f"{t.period:.6g}"),
-        ("position limits, rad or m", _each(np.column_stack([limits.lower, limits.upper]))),
-        ("velocity limits, rad/s or m/s", _each(limits.velocity[:, None])),
+        (
+            "position limits, rad or m",
+            _format_limits(np.column_stack([limits.lower, limits.upper])),
+        ),
+        ("velocity limits, rad/s or m/s", _format_limits(limits.velocity[:, None])),
         ("estimation trajectories", str(len(t.estimation))),
         ("validation trajectories", str(len(t.validation))),
         ("test trajectories", str(len(t.test))),
@@ -33,13 +36,15 @@ def trajectory_setup(data: ReportData) -> Table:
         ("every joint uses its range", "yes" if t.use_full_range else "no"),
     ]
     if np.isfinite(limits.acceleration).any():
-        rows.append(("acceleration limits, rad/s² or m/s²", _each(limits.acceleration[:, None])))
+        rows.append(
+            ("acceleration limits, rad/s² or m/s²", _format_limits(limits.acceleration[:, None]))
+        )
     for limit, what in (
         (limits.torque, "torque limits, N m or N"),
         (limits.power, "power limits, W"),
     ):
         if np.isfinite(limit).any():
-            rows.append((what, _each(limit[:, None])))
+            rows.append((what, _format_limits(limit[:, None])))
     if t.rest_to_rest:
         rows.append(("begin and end at rest, without acceleration", "yes"))
     for c in t.constraints:
@@ -53,7 +58,7 @@ def trajectory_setup(data: ReportData) -> Table:
     return Table(title, header, tuple(rows))
 
 
-def _each(values: FloatArray) -> str:
-    """Limits of each joint; once where they are the same for all."""
+def _format_limits(values: FloatArray) -> str:
+    """Return the limits of each joint, once where they are the same for all."""
     different = values[:1] if (values == values[0]).all() else values
     return "; ".join(" ".join(f"{value:.4g}" for value in row) for row in different)

@@ -41,24 +41,24 @@ def simulate(paths: Paths, model: Torque, arm: Arm, bandwidth: float) -> FloatAr
     return errors
 
 
-def advanced(
+def advance_state(
     accelerations: Callable[[Any, Any, Any], Any], period: float, z: Any, dz: Any, tau: Any
 ) -> tuple[Any, Any]:
-    """Z and dz a control period later, by steps of Runge and Kutta; numbers or symbols.
+    """Return z and dz a control period later, by Runge-Kutta steps; numbers or symbols.
 
     Args:
-        accelerations: Of the arm by z, dz and tau.
-        period: s
+        accelerations: Accelerations of the arm by z, dz and tau.
+        period: Control period, s.
         z: Positions.
         dz: Velocities.
         tau: Torques, which are held.
     """
     for _ in range(_STEPS):
-        z, dz = _runge_kutta(z, dz, tau, accelerations, period / _STEPS)
+        z, dz = _take_runge_kutta_step(z, dz, tau, accelerations, period / _STEPS)
     return z, dz
 
 
-def _runge_kutta(
+def _take_runge_kutta_step(
     z: Any, dz: Any, tau: Any, arm: Callable[[Any, Any, Any], Any], h: float
 ) -> tuple[Any, Any]:
     a1 = arm(z, dz, tau)

@@ -10,8 +10,8 @@ from paramreduce_cli.config.schema import TrackingSection
 from paramreduce_cli.expressions.compiled import BatchFunction
 from paramreduce_cli.multibody.plain import PlainDynamics
 from paramreduce_cli.records import FloatArray, Model, Tracking
-from paramreduce_cli.report.tracking.control import Arm, advanced, simulate
-from paramreduce_cli.report.tracking.paths import point_to_point
+from paramreduce_cli.report.tracking.control import Arm, advance_state, simulate
+from paramreduce_cli.report.tracking.paths import plan_paths
 
 _SHARE = 0.8
 """Of the range and speed of a motion that the paths keep to."""
@@ -24,13 +24,13 @@ _PATHS = 10
 
 
 class ControllerModel(Protocol):
-    """Inverse dynamics as a controller has it."""
+    """A model of inverse dynamics as a controller has it."""
 
     def __call__(self, q: FloatArray, dq: FloatArray, ddq: FloatArray, /) -> FloatArray:
         """Torques of some states, (n_states, n_dof)."""
 
 
-def tracked(
+def simulate_tracking(
     section: TrackingSection,
     model: Model,
     controllers: Mapping[str, ControllerModel],
@@ -40,25 +40,25 @@ def tracked(
     """Simulate control with each model on the same paths.
 
     Args:
-        section: What is asked for.
-        model: The full one, which the arm follows.
+        section: Settings of the simulation.
+        model: Full model, which the arm follows.
         controllers: Models of the controller, by their titles.
-        z: Of a motion to whose range the paths keep, (n_samples, n_dof).
-        dz: Its speeds.
+        z: Positions of a motion whose range the paths keep to, (n_samples, n_dof).
+        dz: Velocities of that motion.
     """
     low, high = z.min(axis=0), z.max(axis=0)
     inset = (1 - _SHARE) / 2 * (high - low)
     speed = _SHARE * np.abs(dz).max(axis=0)
-    paths = point_to_point(
+    paths = plan_paths(
         low + inset, high - inset, speed, section.moves, _CONTROL_PERIOD, range(_PATHS)
     )
-    arm = _arm(model, _CONTROL_PERIOD)
+    arm = _compile_arm(model, _CONTROL_PERIOD)
     errors = {name: simulate(paths, c, arm, section.bandwidth) for name, c in controllers.items()}
     return Tracking(paths, errors)
 
 
-def _arm(model: Model, period: float) -> Arm:
-    """The full model by plain recursion, compiled as a control period at once."""
+def _compile_arm(model: Model, period: float) -> Arm:
+    """Return the full model by textbook recursion, compiled over a whole control period."""
     accelerations = PlainDynamics(model.mechanism).express_accelerations(model.values)
     states = [ca.MX.sym(name, model.mechanism.n_dof) for name in ("z", "dz", "tau")]
-    return BatchFunction(states, list(advanced(accelerations, period, *states)))
+    return BatchFunction(states, list(advance_state(accelerations, period, *states)))

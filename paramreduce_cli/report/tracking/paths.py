@@ -10,20 +10,20 @@ _PEAK_SPEED = 1.875
 """Of a quintic of unit length in unit time."""
 
 
-def point_to_point(
+def plan_paths(
     low: FloatArray, high: FloatArray, speed: FloatArray, moves: int, period: float, seeds: range
 ) -> Paths:
-    """Paths of several moves, quintic in time.
+    """Return paths of several moves, quintic in time.
 
     Args:
         low: Smallest coordinates, (n_dof,), rad or m.
         high: Largest coordinates.
         speed: Largest speeds, (n_dof,).
-        moves: Their number in each path.
-        period: Of the controller, s.
-        seeds: Of the poses, one for each path.
+        moves: Number of moves in each path.
+        period: Control period, s.
+        seeds: Seeds of the poses, one for each path.
     """
-    paths = [_path(low, high, speed, moves, period, seed) for seed in seeds]
+    paths = [_plan_path(low, high, speed, moves, period, seed) for seed in seeds]
     samples = np.array([z.shape[0] for z, _, _ in paths])
     padded = [
         [np.pad(x, ((0, samples.max() - x.shape[0]), (0, 0)), mode="edge") for x in path]
@@ -35,9 +35,10 @@ def point_to_point(
     return Paths(np.arange(samples.max()) * period, samples, z, dz, ddz)
 
 
-def _path(
+def _plan_path(
     low: FloatArray, high: FloatArray, speed: FloatArray, moves: int, period: float, seed: int
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return positions, velocities and accelerations of one path."""
     rng = np.random.default_rng(seed)
     poses = rng.uniform(low, high, size=(moves + 1, low.size))
     parts = []
