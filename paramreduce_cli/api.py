@@ -20,8 +20,8 @@ from paramreduce_cli.config import Config
 from paramreduce_cli.config import load_config as loaded_config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.errors import DataError, ParamreduceError
+from paramreduce_cli.export.code_generation import make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import make_exported_model
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import (
     FloatArray,

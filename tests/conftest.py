@@ -144,16 +144,16 @@ def figures_not_drawn(request, monkeypatch):
     """Drawing figures takes most of a small run; tests of the report draw them, and those marked with ``draws``."""
     if "report" in request.path.parts or request.node.get_closest_marker("draws"):
         return
-    from paramreduce_cli.report import rendering
+    from paramreduce_cli.report import figure_rendering
 
-    draw = rendering.render_figures
+    draw = figure_rendering.render_figures
 
     def rendered(names, data, formats, **how):
         if Wanted.figures:
             return draw(names, data, formats, **how)
         return {name: dict.fromkeys(formats, NO_PICTURE) for name in names}
 
-    monkeypatch.setattr(rendering, "rendered", rendered)
+    monkeypatch.setattr(figure_rendering, "render_figures", rendered)
 
 
 ROUGH_TERMS = ("terms.functions=[inverse]", "terms.torque_error=0.5", "terms.rounds=0")

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import strategies as st
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 
 INPUTS = 5
 

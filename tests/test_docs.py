@@ -20,10 +20,10 @@ from paramreduce_cli import api
 from paramreduce_cli.cli import cli
 from paramreduce_cli.config import load_config
 from paramreduce_cli.config.loading import get_schema
-from paramreduce_cli.config.terms import TermsSection
-from paramreduce_cli.export.choice import find_chosen_model
+from paramreduce_cli.config.term_settings import TermsSection
+from paramreduce_cli.export.code_generation import make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import make_exported_model
+from paramreduce_cli.export.named_models import find_chosen_model
 from paramreduce_cli.fields.section import Section
 from paramreduce_cli.running.sweep import SweepSection
 

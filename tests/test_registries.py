@@ -14,7 +14,7 @@ from paramreduce_cli.reduction.criteria import criteria
 from paramreduce_cli.reduction.heuristics import heuristics
 from paramreduce_cli.registry import Registry, list_names
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.sections import get_place
+from paramreduce_cli.report.page_sections import get_place
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.stages import stages
 

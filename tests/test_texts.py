@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from paramreduce_cli.texts import format_percent_range
-from paramreduce_cli.texts.measured import format_measured
+from paramreduce_cli.texts.measured_values import format_measured
 
 
 @pytest.mark.parametrize(

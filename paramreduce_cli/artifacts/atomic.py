@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.places import ITEMS
+from paramreduce_cli.artifacts.folder_layout import ITEMS
 from paramreduce_cli.errors import ArtifactError
 
 

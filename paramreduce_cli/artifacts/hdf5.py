@@ -25,7 +25,7 @@ from paramreduce_cli.artifacts.atomic import (
     make_missing_error,
     replace_atomically,
 )
-from paramreduce_cli.artifacts.checked import CheckedRows, RowChecks, write_checks
+from paramreduce_cli.artifacts.checksums import CheckedRows, RowChecks, write_checks
 from paramreduce_cli.errors import ArtifactError
 
 SCHEMA = 18

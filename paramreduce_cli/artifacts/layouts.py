@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.artifacts.hdf5 import Reader, StoredRows, Writer
-from paramreduce_cli.artifacts.plain import from_plain, get_dtype, to_plain
+from paramreduce_cli.artifacts.plain_data import from_plain, get_dtype, to_plain
 from paramreduce_cli.records import (
     Columns,
     HeuristicValidation,

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error, replace_atomically
+from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.hdf5 import Stamp, read_stamp
-from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import Report
 

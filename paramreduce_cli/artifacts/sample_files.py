@@ -15,10 +15,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from paramreduce_cli.artifacts import layouts
+from paramreduce_cli.artifacts.folder_layout import ITEMS
 from paramreduce_cli.artifacts.hdf5 import Reader, Writer, open_reader, read_stamp
-from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.errors import ArtifactError
-from paramreduce_cli.multibody.joined import JoinedSet
+from paramreduce_cli.multibody.joined_samples import JoinedSet
 from paramreduce_cli.multibody.observation import (
     BLOCK_SAMPLES,
     FactorAccumulator,

@@ -13,6 +13,7 @@ import filelock
 
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import check_is_file, make_missing_error, remove_leftovers
+from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.hdf5 import (
     SCHEMA,
     Reader,
@@ -23,7 +24,6 @@ from paramreduce_cli.artifacts.hdf5 import (
     read_stamp_from,
     write,
 )
-from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import (
     load_json,
     read_summary_stamp,

@@ -11,8 +11,8 @@ import numpy as np
 
 from paramreduce_cli.artifacts import layouts
 from paramreduce_cli.artifacts.atomic import remove_leftovers
+from paramreduce_cli.artifacts.folder_layout import ITEMS
 from paramreduce_cli.artifacts.hdf5 import Reader, Stamp, Writer, open_reader, read_stamp, write
-from paramreduce_cli.artifacts.places import ITEMS
 from paramreduce_cli.artifacts.sample_files import load_item_set, save_sample_set
 from paramreduce_cli.errors import ArtifactError
 from paramreduce_cli.records import ProofItem, TermModel, Trajectory

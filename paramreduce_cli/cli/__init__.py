@@ -11,7 +11,7 @@ import click
 
 from paramreduce_cli import __version__
 from paramreduce_cli.cli.commands import commands
-from paramreduce_cli.cli.next_step import describe_next_steps
+from paramreduce_cli.cli.next_steps import describe_next_steps
 from paramreduce_cli.cli.suggestions import (
     Call,
     UnknownCommandError,

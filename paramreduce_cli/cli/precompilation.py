@@ -41,7 +41,11 @@ def _compile(examples: dict[str, Callable[[], None]], name: str) -> None:
 
 def _prove_best_subsets() -> None:
     """Prove the best subset of a few columns, some of which depend on others."""
-    from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, normalise_problem
+    from paramreduce_cli.reduction.best_subset.subset_search import (
+        BEGINNING,
+        Search,
+        normalise_problem,
+    )
     from paramreduce_cli.reduction.problem import SelectionProblem
 
     rng = np.random.default_rng(0)

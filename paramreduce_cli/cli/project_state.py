@@ -5,7 +5,7 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
-from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.errors import ArtifactError
 
 _READ = 100_000

@@ -21,7 +21,7 @@ from paramreduce_cli.cli.options import (
     make_callbacks,
     make_store,
 )
-from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
+from paramreduce_cli.cli.stage_messages import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, show_progress, warn_user
 from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.config.loading import has_robot, load_settings

@@ -4,7 +4,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from paramreduce_cli.config.cutting import PER_JOINT, read_per_joint
+from paramreduce_cli.config.coordinate_lists import PER_JOINT, read_per_joint
 from paramreduce_cli.config.plausibility import (
     find_implausible_bodies,
     find_implausible_gravity,

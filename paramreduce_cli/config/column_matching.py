@@ -4,7 +4,7 @@ import itertools
 import re
 from collections.abc import Collection, Mapping, Sequence
 
-from paramreduce_cli.config.logs import NUMBER
+from paramreduce_cli.config.log_settings import NUMBER
 from paramreduce_cli.errors import ConfigError
 
 _WORDS = {

@@ -13,13 +13,13 @@ from typing import Any, TypeVar, Union, get_args, get_origin
 import yaml
 from pydantic import BaseModel, ValidationError
 
-from paramreduce_cli.config import reading
+from paramreduce_cli.config import yaml_reading
 from paramreduce_cli.config.checks import find_problems, find_warnings
-from paramreduce_cli.config.cutting import cut_to_independent
+from paramreduce_cli.config.coordinate_lists import cut_to_independent
 from paramreduce_cli.config.former_keys import FORMER_KEYS
-from paramreduce_cli.config.reading import Document
 from paramreduce_cli.config.schema import Config, Settings
 from paramreduce_cli.config.sections import find_keys
+from paramreduce_cli.config.yaml_reading import Document
 from paramreduce_cli.errors import ConfigError, Key, ParamreduceWarning, prepend_key
 from paramreduce_cli.fields.names import Problem, UnknownNameError
 from paramreduce_cli.fields.numbers import read_constants
@@ -47,7 +47,7 @@ def load_config(path: Path, overrides: Sequence[str] = ()) -> Config:
         raise _make_no_mapping_error(path)
     for text in overrides:
         try:
-            reading.apply_override(document, text)
+            yaml_reading.apply_override(document, text)
         except ValueError as error:
             raise ConfigError(str(error)) from error
     config, problems = _find_all_problems(document.data)
@@ -85,10 +85,10 @@ def load_settings(path: Path | None, overrides: Sequence[str] = ()) -> Settings:
     Raises:
         ConfigError: As for :func:`load_config`.
     """
-    document = reading.read_yaml("{}", "settings") if path is None else _read_document(path)
+    document = yaml_reading.read_yaml("{}", "settings") if path is None else _read_document(path)
     try:
         for text in overrides if isinstance(document.data, dict) else ():
-            reading.apply_override(document, text)
+            yaml_reading.apply_override(document, text)
     except ValueError as error:
         raise ConfigError(str(error)) from error
     return _validate_section(document, Settings)
@@ -147,7 +147,7 @@ def locate_errors(path: Path | None, overrides: Sequence[str] = ()) -> Iterator[
             raise
         document = _read_document(path)
         for text in overrides:
-            reading.apply_override(document, text)
+            yaml_reading.apply_override(document, text)
         error.place = document.describe_place(error.key)
         error.in_file = error.place.startswith(f"{document.source}, line ")
         raise
@@ -169,7 +169,7 @@ def _read_document(path: Path) -> Document:
             f"{path}: cannot be read as text ({error}).", rejected=str(path)
         ) from error
     try:
-        return reading.read_yaml(text, str(path))
+        return yaml_reading.read_yaml(text, str(path))
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
         line = f", line {mark.line + 1}" if mark else ""

@@ -12,8 +12,8 @@ from pydantic import BeforeValidator, Field, model_validator
 from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.constraints import ConstraintSection
 from paramreduce_cli.config.identification import IdentificationSection
-from paramreduce_cli.config.logs import LogSection
-from paramreduce_cli.config.terms import TermsSection
+from paramreduce_cli.config.log_settings import LogSection
+from paramreduce_cli.config.term_settings import TermsSection
 from paramreduce_cli.fields.names import OneMethod, OneOf
 from paramreduce_cli.fields.numbers import Number, Whole
 from paramreduce_cli.fields.section import (

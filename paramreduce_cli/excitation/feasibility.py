@@ -8,8 +8,8 @@ import numpy as np
 import scipy  # whose optimize is loaded when it is used
 
 from paramreduce_cli.errors import Cause, DataError, NumericalError
+from paramreduce_cli.excitation.excitation_objective import Bound, Excitation, FreeObjective
 from paramreduce_cli.excitation.fourier import FourierBasis
-from paramreduce_cli.excitation.objective import Bound, Excitation, FreeObjective
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits
 

@@ -19,6 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from paramreduce_cli.errors import Cause, DataError, NumericalError, ParamreduceError
+from paramreduce_cli.excitation.excitation_objective import Excitation, FreeObjective, Level
 from paramreduce_cli.excitation.feasibility import (
     find_resting_position,
     shrink_inside_bounds,
@@ -27,7 +28,6 @@ from paramreduce_cli.excitation.feasibility import (
 from paramreduce_cli.excitation.fourier import FINER, FourierBasis, evaluate_basis, sample_times
 from paramreduce_cli.excitation.ipopt import LOOSE, TIGHT, minimise
 from paramreduce_cli.excitation.limits import LimitMap, LimitMapping
-from paramreduce_cli.excitation.objective import Excitation, FreeObjective, Level
 from paramreduce_cli.multibody.loops.follower import Follower
 from paramreduce_cli.records import FloatArray, JointLimits, Trajectory
 

@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 
 from paramreduce_cli.excitation.criteria import criteria
-from paramreduce_cli.excitation.loads import Loads
-from paramreduce_cli.excitation.objective import Excitation
+from paramreduce_cli.excitation.excitation_objective import Excitation
 from paramreduce_cli.excitation.optimiser import TrajectorySettings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
-from paramreduce_cli.multibody.drives import smooth_friction
+from paramreduce_cli.excitation.torque_constraints import Loads
+from paramreduce_cli.multibody.drive_dynamics import smooth_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.quantities import Quantities

@@ -7,10 +7,10 @@ import numpy as np
 from paramreduce_cli.config.schema import Config, SourceSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.importing.formats import formats
-from paramreduce_cli.importing.imported import Inertial, to_transform
-from paramreduce_cli.importing.reading import detect_format, read_robot
+from paramreduce_cli.importing.imported_robot import Inertial, to_transform
 from paramreduce_cli.importing.robot_format import RobotFormat
-from paramreduce_cli.importing.simplified import SimplifiedRobot
+from paramreduce_cli.importing.simplification import SimplifiedRobot
+from paramreduce_cli.importing.source_reading import detect_format, read_robot
 from paramreduce_cli.records import DRIVE, INERTIAL, FloatArray, Kind, Mechanism, Model
 from paramreduce_cli.robots.inertia import compute_pseudo_inertia, is_positive_semidefinite
 from paramreduce_cli.robots.placement import compose_steps

@@ -8,8 +8,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.expressions.compiled import load
 from paramreduce_cli.expressions.functions import Argument
 from paramreduce_cli.records import FloatArray, Model, ReducedModel, Speed

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from math import prod
 
 from paramreduce_cli.expressions.graph import Node
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 
 
 @dataclass(frozen=True)

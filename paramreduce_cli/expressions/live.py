@@ -8,7 +8,7 @@ rearranged, is not looked at. It takes microseconds and is meant for comparing m
 import numpy as np
 
 from paramreduce_cli.expressions.loops import compile_loop
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import BoolArray, IntArray
 
 _LEAF, _SUM, _PRODUCT, _CALL = range(4)

@@ -7,7 +7,6 @@ distributed over a sum; what comes of it is settled again, and kept if it takes 
 
 from __future__ import annotations
 
-from paramreduce_cli.expressions.laws import insert, settle
 from paramreduce_cli.expressions.rows import (
     COST,
     FAILED,
@@ -27,6 +26,7 @@ from paramreduce_cli.expressions.rows import (
     wait,
     within,
 )
+from paramreduce_cli.expressions.simplification_rules import insert, settle
 
 _AT_MOST = 6
 """Places at which it is rewritten at once."""

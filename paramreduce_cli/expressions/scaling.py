@@ -15,7 +15,7 @@ from collections import Counter
 import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph, Node
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import FloatArray
 
 _ROUNDING = 1e-9

@@ -6,20 +6,20 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from paramreduce_cli.config.logs import Frequency, LogSection
+from paramreduce_cli.config.log_settings import Frequency, LogSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.identification import filters
+from paramreduce_cli.identification.data_split import Piece, split_pieces, trim_files
 from paramreduce_cli.identification.log_checks import find_log_warnings
-from paramreduce_cli.identification.outliers import replace_outliers
-from paramreduce_cli.identification.pieces import Piece, split_pieces, trim_files
-from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
-from paramreduce_cli.identification.shown import (
+from paramreduce_cli.identification.log_signals import (
     Outliers,
     collect_signals,
     decimate_recorded,
     find_longest,
     iterate_speeds,
 )
+from paramreduce_cli.identification.outliers import replace_outliers
+from paramreduce_cli.identification.position_jumps import find_position_jumps, name_rows
 from paramreduce_cli.identification.signals import Signals, read_signals, resample_evenly
 from paramreduce_cli.records import (
     FloatArray,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy  # its interpolate takes a quarter of a second to load, so only when it is used
 
-from paramreduce_cli.config.logs import (
+from paramreduce_cli.config.log_settings import (
     ACCELERATIONS,
     ANGLES,
     NUMBER,
@@ -19,7 +19,7 @@ from paramreduce_cli.config.logs import (
 )
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.identification.turns import unwrap_positions
+from paramreduce_cli.identification.encoder_wraps import unwrap_positions
 from paramreduce_cli.records import BoolArray, FloatArray, RawLog
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_columns
 

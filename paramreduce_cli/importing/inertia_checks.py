@@ -4,7 +4,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.imported_robot import Inertial
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.robots.inertia import is_positive_semidefinite
 

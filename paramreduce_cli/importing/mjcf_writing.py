@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.imported_robot import Inertial
 from paramreduce_cli.importing.inertia_checks import is_physical
-from paramreduce_cli.importing.mjcf import compile_mjcf
-from paramreduce_cli.importing.simplified import SimplifiedRobot
+from paramreduce_cli.importing.mjcf_files import compile_mjcf
+from paramreduce_cli.importing.simplification import SimplifiedRobot
 from paramreduce_cli.records import FloatArray
 
 _DRIVE = {

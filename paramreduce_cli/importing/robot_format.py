@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from paramreduce_cli.importing.imported import ImportedRobot, Inertial
-from paramreduce_cli.importing.simplified import SimplifiedRobot
+from paramreduce_cli.importing.imported_robot import ImportedRobot, Inertial
+from paramreduce_cli.importing.simplification import SimplifiedRobot
 from paramreduce_cli.records import Kind
 
 Writer = Callable[

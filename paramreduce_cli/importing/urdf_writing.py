@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from lxml import etree
 
-from paramreduce_cli.importing.imported import Inertial
-from paramreduce_cli.importing.simplified import BASE, SimplifiedRobot
+from paramreduce_cli.importing.imported_robot import Inertial
+from paramreduce_cli.importing.simplification import BASE, SimplifiedRobot
 
 _TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 

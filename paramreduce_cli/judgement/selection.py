@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from paramreduce_cli.config.schema import SelectedSection
 from paramreduce_cli.errors import ConfigError, DataError
 from paramreduce_cli.judgement.cross_validation import choose_by_one_standard_error
-from paramreduce_cli.judgement.picking import (
+from paramreduce_cli.judgement.model_selection import (
     Pick,
     compute_worst_ratios,
     find_best_of_size,

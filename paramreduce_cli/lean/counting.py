@@ -5,8 +5,8 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from paramreduce_cli.lean.model import LeanModels, get_lean_models
-from paramreduce_cli.multibody.plain import PlainDynamics
+from paramreduce_cli.lean.lean_models import LeanModels, get_lean_models
+from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
 from paramreduce_cli.records import (
     BoolArray,
     CountedDynamics,

@@ -1,7 +1,7 @@
 """The mass matrix of a tree by composite bodies [Walker1982], as the choices at its joints say."""
 
 from paramreduce_cli.lean.algebra import Scalar
-from paramreduce_cli.lean.inertia import Inertia
+from paramreduce_cli.lean.inertia_expressions import Inertia
 from paramreduce_cli.lean.inverse import (
     project_on_ancestors,
     rotate_to_rest,
@@ -9,7 +9,7 @@ from paramreduce_cli.lean.inverse import (
     transfer_inertia,
     transfer_to_parent,
 )
-from paramreduce_cli.lean.kinematics import JointState, Kinematics
+from paramreduce_cli.lean.joint_states import JointState, Kinematics
 from paramreduce_cli.lean.wrench import Wrench
 from paramreduce_cli.records import BASE
 

@@ -15,8 +15,9 @@ import numpy as np
 
 from paramreduce_cli.expressions.graph import Graph
 from paramreduce_cli.lean.algebra import forget
-from paramreduce_cli.lean.building import Build, build_direct_outputs, build_inverse_outputs
-from paramreduce_cli.lean.choices import (
+from paramreduce_cli.lean.formulation_search import search_choices
+from paramreduce_cli.lean.frame_motion import AngularAcceleration
+from paramreduce_cli.lean.joint_formulations import (
     InertiaPlace,
     JointFormulation,
     from_data,
@@ -24,9 +25,8 @@ from paramreduce_cli.lean.choices import (
     list_distant_alternatives,
     to_data,
 )
-from paramreduce_cli.lean.motion import AngularAcceleration
-from paramreduce_cli.lean.search import search_choices
-from paramreduce_cli.lean.tree import Tree, choose_frames
+from paramreduce_cli.lean.joint_frames import Tree, choose_frames
+from paramreduce_cli.lean.lean_outputs import Build, build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.records import (
     BoolArray,
     Formulation,

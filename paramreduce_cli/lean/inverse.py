@@ -13,9 +13,9 @@ from dataclasses import replace
 
 from paramreduce_cli.expressions.vectors import dot
 from paramreduce_cli.lean.algebra import Scalar, cache_expressions
-from paramreduce_cli.lean.choices import InertiaPlace, JointFormulation
-from paramreduce_cli.lean.inertia import Inertia
-from paramreduce_cli.lean.kinematics import JointState, Kinematics
+from paramreduce_cli.lean.inertia_expressions import Inertia
+from paramreduce_cli.lean.joint_formulations import InertiaPlace, JointFormulation
+from paramreduce_cli.lean.joint_states import JointState, Kinematics
 from paramreduce_cli.lean.wrench import (
     Gauge,
     Wrench,

@@ -7,8 +7,8 @@ from enum import StrEnum
 
 from paramreduce_cli.expressions.vectors import Vector, add, cross, scale
 from paramreduce_cli.lean.algebra import Scalar, cache_expressions
-from paramreduce_cli.lean.inertia import Inertia
-from paramreduce_cli.lean.motion import FrameMotion, RotationEffect
+from paramreduce_cli.lean.frame_motion import FrameMotion, RotationEffect
+from paramreduce_cli.lean.inertia_expressions import Inertia
 
 
 class Gauge(StrEnum):

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from paramreduce_cli.expressions.vectors import Matrix, Vector, add, apply, cross, dot, scale
-from paramreduce_cli.multibody.drives import CASADI, express_unit_force
+from paramreduce_cli.multibody.drive_dynamics import CASADI, express_unit_force
 from paramreduce_cli.multibody.kinematics import JointMotion, make_joint_motions
 from paramreduce_cli.records import BASE, INERTIAL, Mechanism, Rigid
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.multibody.drives import CASADI, express_unit_force
+from paramreduce_cli.multibody.drive_dynamics import CASADI, express_unit_force
 from paramreduce_cli.multibody.kinematics import express_cosine_and_sine
 from paramreduce_cli.records import BASE, INERTIAL, Body, FloatArray, Mechanism
 

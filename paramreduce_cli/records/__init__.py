@@ -6,15 +6,6 @@ Units are SI throughout: m, rad, s, kg, kg m, kg m^2, N, N m.
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
 from paramreduce_cli.records.artifacts import Artifacts
-from paramreduce_cli.records.errors import (
-    NO_MOTIONS,
-    ErrorRange,
-    JointErrors,
-    MassMatrices,
-    ModelErrors,
-    Operations,
-    SetErrors,
-)
 from paramreduce_cli.records.items import WHOLE, Items, Part, PartFinished
 from paramreduce_cli.records.logs import (
     Consistency,
@@ -48,6 +39,15 @@ from paramreduce_cli.records.model import (
     Formulation,
     Formulations,
     Model,
+)
+from paramreduce_cli.records.model_errors import (
+    NO_MOTIONS,
+    ErrorRange,
+    JointErrors,
+    MassMatrices,
+    ModelErrors,
+    Operations,
+    SetErrors,
 )
 from paramreduce_cli.records.parameters import (
     DRIVE,

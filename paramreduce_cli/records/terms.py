@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
-from paramreduce_cli.records.errors import ModelErrors, SetErrors
+from paramreduce_cli.records.model_errors import ModelErrors, SetErrors
 
 TERMS = "terms"
 """What the model is called of which each function has terms left out."""

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray
-from paramreduce_cli.records.errors import (
+from paramreduce_cli.records.model_errors import (
     JointErrors,
     MassMatrices,
     ModelErrors,

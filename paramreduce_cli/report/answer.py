@@ -6,7 +6,7 @@ import numpy as np
 
 from paramreduce_cli.records import ReducedModel, Speed
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
-from paramreduce_cli.texts.measured import format_measured
+from paramreduce_cli.texts.measured_values import format_measured
 
 _WEIGHTED = {
     "nominal-torque": "each joint weighted by its nominal torque",

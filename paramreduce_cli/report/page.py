@@ -17,7 +17,7 @@ from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.explorer import pack_explorer
 from paramreduce_cli.report.figures import figures
 from paramreduce_cli.report.methods import write_methods
-from paramreduce_cli.report.sections import PageSection, get_place
+from paramreduce_cli.report.page_sections import PageSection, get_place
 from paramreduce_cli.report.symbols import explain_symbols
 from paramreduce_cli.report.tables import tables
 from paramreduce_cli.texts import format_percent

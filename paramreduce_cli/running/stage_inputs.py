@@ -6,9 +6,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paramreduce_cli.artifacts.brought import load_coefficients, load_recording
 from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.artifacts.store import digest_file
+from paramreduce_cli.artifacts.user_files import load_coefficients, load_recording
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import NumericalError, ParamreduceWarning

@@ -7,8 +7,8 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ModelSection
 from paramreduce_cli.errors import ConfigError, DataError, NumericalError, ParamreduceWarning
-from paramreduce_cli.lean.checking import check_formulations
 from paramreduce_cli.lean.formulations import find_formulations
+from paramreduce_cli.lean.lean_verification import check_formulations
 from paramreduce_cli.multibody.base_parameters import (
     choose_base,
     compute_regrouping,

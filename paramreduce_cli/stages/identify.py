@@ -7,9 +7,9 @@ import numpy as np
 from paramreduce_cli.config.identification import IdentificationSection
 from paramreduce_cli.errors import DataError, ParamreduceWarning
 from paramreduce_cli.identification import consistency as physics
-from paramreduce_cli.identification.comparison import compare_held_out
 from paramreduce_cli.identification.estimation import LinearFit, collect_rows, fit_robustly
 from paramreduce_cli.identification.hints import find_hints
+from paramreduce_cli.identification.model_comparison import compare_held_out
 from paramreduce_cli.multibody.observation import combine_factors
 from paramreduce_cli.multibody.orthogonal import solve_least_squares
 from paramreduce_cli.records import (

@@ -4,7 +4,7 @@ import warnings
 
 import numpy as np
 
-from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell

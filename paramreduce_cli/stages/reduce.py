@@ -11,7 +11,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, Stop
 from paramreduce_cli.errors import ConfigError, DataError, ParamreduceWarning
-from paramreduce_cli.judgement.torque import NormErrors, compute_torque_errors
+from paramreduce_cli.judgement.torque_errors import NormErrors, compute_torque_errors
 from paramreduce_cli.lean.counting import Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.observation import (

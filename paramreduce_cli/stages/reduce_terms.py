@@ -8,10 +8,10 @@ from itertools import groupby
 import numpy as np
 
 from paramreduce_cli.config.schema import SamplingSection, TrajectoriesSection
-from paramreduce_cli.config.terms import TermsSection
+from paramreduce_cli.config.term_settings import TermsSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.lean.formulations import add_formulations
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.records import (
     CountedDynamics,
     Items,
@@ -29,9 +29,9 @@ from paramreduce_cli.records import (
 from paramreduce_cli.resources.item_completion import complete_items
 from paramreduce_cli.terms.descent import Simplified
 from paramreduce_cli.terms.evaluation import Errors, Evaluator
-from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.searching import Searcher, SearchSamples
-from paramreduce_cli.terms.simplify import simplify
+from paramreduce_cli.terms.leanest_program import simplify
+from paramreduce_cli.terms.parallel_descents import Searcher, SearchSamples
+from paramreduce_cli.terms.program_fitting import Budget
 from paramreduce_cli.terms.starts import list_starts
 from paramreduce_cli.texts import format_percent
 

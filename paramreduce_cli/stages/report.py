@@ -13,10 +13,10 @@ from paramreduce_cli.config.schema import (
     SelectedSection,
 )
 from paramreduce_cli.errors import ConfigError, DataError, FormulationError, ParamreduceWarning
-from paramreduce_cli.export.choice import find_chosen_model
+from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.named_models import find_chosen_model
 from paramreduce_cli.export.running import RunningModel, measure_speeds
-from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.fields.section import expand_per_joint
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -45,7 +45,7 @@ from paramreduce_cli.report.data import (
     find_first_motion,
 )
 from paramreduce_cli.report.figures import figures
-from paramreduce_cli.report.sections import get_place
+from paramreduce_cli.report.page_sections import get_place
 from paramreduce_cli.report.skeleton import Animation, Skeleton, make_animation, make_skeleton
 from paramreduce_cli.report.summary import gather_summary
 from paramreduce_cli.report.tables import tables
@@ -76,8 +76,8 @@ def report(
     left out. Figures are SVG; --set report.formats=pdf,png draws others instead.
     """
     # Late: every command that knows the stages would load Matplotlib and Jinja otherwise.
+    from paramreduce_cli.report.figure_rendering import render_figures
     from paramreduce_cli.report.page import render_page
-    from paramreduce_cli.report.rendering import render_figures
 
     model, reduction, validation = artifacts.model, artifacts.reduction, artifacts.validation
     selected = validation.selected

@@ -23,9 +23,9 @@ from paramreduce_cli.excitation.point_to_point import evaluate_along
 from paramreduce_cli.excitation.simulation import Input, SimulatedMotion, simulate
 from paramreduce_cli.excitation.symmetry import complete_series, generate_group
 from paramreduce_cli.fields.section import expand_per_joint
-from paramreduce_cli.identification.samples import LoggedSet
+from paramreduce_cli.identification.measured_samples import LoggedSet
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.joined import JoinedSet
+from paramreduce_cli.multibody.joined_samples import JoinedSet
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.observation import (
     ObservedSet,
@@ -35,8 +35,8 @@ from paramreduce_cli.multibody.observation import (
     compute_standard_deviation,
     make_spans,
 )
+from paramreduce_cli.multibody.progress_samples import ToldSet
 from paramreduce_cli.multibody.quantities import Quantities
-from paramreduce_cli.multibody.told import ToldSet
 from paramreduce_cli.records import (
     SETS,
     Block,

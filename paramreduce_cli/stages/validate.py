@@ -8,13 +8,24 @@ import numpy as np
 
 from paramreduce_cli.config.schema import ReductionSection, SelectedSection, ValidationSection
 from paramreduce_cli.errors import ConfigError, DataError, Key
-from paramreduce_cli.judgement.acceleration import AccelerationErrors, compute_acceleration_errors
+from paramreduce_cli.judgement.acceleration_errors import (
+    AccelerationErrors,
+    compute_acceleration_errors,
+)
 from paramreduce_cli.judgement.cross_validation import cross_validate
+from paramreduce_cli.judgement.model_selection import (
+    find_pareto_front,
+    list_models,
+    list_shown_models,
+)
 from paramreduce_cli.judgement.operation_counts import OperationCounts
-from paramreduce_cli.judgement.picking import find_pareto_front, list_models, list_shown_models
 from paramreduce_cli.judgement.selection import select_model
 from paramreduce_cli.judgement.stability import measure_stability
-from paramreduce_cli.judgement.torque import NormErrors, compute_joint_errors, compute_torque_errors
+from paramreduce_cli.judgement.torque_errors import (
+    NormErrors,
+    compute_joint_errors,
+    compute_torque_errors,
+)
 from paramreduce_cli.judgement.verdict import find_model_warnings, judge_model
 from paramreduce_cli.lean.counting import COUNTS, TEXTBOOK_COUNTS, Counts
 from paramreduce_cli.multibody.dynamics import Dynamics
@@ -23,7 +34,7 @@ from paramreduce_cli.multibody.observation import (
     compute_joint_factors,
     decimate_blocks,
 )
-from paramreduce_cli.multibody.told import told
+from paramreduce_cli.multibody.progress_samples import told
 from paramreduce_cli.records import (
     Block,
     CountedDynamics,

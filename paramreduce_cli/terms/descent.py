@@ -9,15 +9,15 @@ import numpy as np
 
 from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.expressions.scaling import rescale
 from paramreduce_cli.records import NOT_KEPT, FloatArray, ReducedModel
-from paramreduce_cli.terms.fitting import Budget, Fitting
+from paramreduce_cli.terms.fit_samples import TermSamples
+from paramreduce_cli.terms.program_fitting import Budget, Fitting
 from paramreduce_cli.terms.pruning import Pruning
-from paramreduce_cli.terms.samples import TermSamples
-from paramreduce_cli.terms.search import Step, TermSearch
 from paramreduce_cli.terms.starts import Start
 from paramreduce_cli.terms.tape import Outputs, Tape
+from paramreduce_cli.terms.term_removal import Step, TermSearch
 
 _LEG = 0.88
 """Share of the operations that are left when a program is rewritten on its way down."""

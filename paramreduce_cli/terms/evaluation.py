@@ -24,8 +24,8 @@ from paramreduce_cli.records import (
     SampleSet,
 )
 from paramreduce_cli.terms.descent import Simplified
-from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.samples import TermSamples, compute_joint_errors, make_samples
+from paramreduce_cli.terms.fit_samples import TermSamples, compute_joint_errors, make_samples
+from paramreduce_cli.terms.program_fitting import Budget
 
 _TORQUES = 10_000
 """Random states on which torques are compared with those of the full model."""

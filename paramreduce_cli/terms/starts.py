@@ -7,9 +7,9 @@ from itertools import chain, zip_longest
 
 import numpy as np
 
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.lean.formulations import vary_formulation
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.records import Formulation, Model, ReducedModel, Reduction
 
 _NEAR = 8

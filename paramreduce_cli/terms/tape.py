@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paramreduce_cli.expressions.graph import ZERO, Graph, Node
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
 from paramreduce_cli.terms import kernels
 from paramreduce_cli.terms.kernels import CODES, CONSTANT, INPUT, NONE, SUM

@@ -20,7 +20,7 @@ from hypothesis import strategies as st
 from paramreduce_cli.artifacts import hdf5, sample_files
 from paramreduce_cli.artifacts.atomic import remove_leftovers, replace_atomically
 from paramreduce_cli.artifacts.hdf5 import SCHEMA, Stamp, Writer, open_reader, read_stamp, write
-from paramreduce_cli.artifacts.plain import from_plain, to_plain
+from paramreduce_cli.artifacts.plain_data import from_plain, to_plain
 from paramreduce_cli.artifacts.store import LAYOUTS, Store, load_file
 from paramreduce_cli.artifacts.stored_items import StoredItems
 from paramreduce_cli.errors import ArtifactError

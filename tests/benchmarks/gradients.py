@@ -5,9 +5,9 @@ import time
 import numpy as np
 import scipy.linalg
 
+from paramreduce_cli.excitation.excitation_objective import FreeObjective
 from paramreduce_cli.excitation.ipopt import minimise
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.objective import FreeObjective
 from paramreduce_cli.excitation.optimiser import FREE
 from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.loops.follower import Follower

@@ -17,9 +17,9 @@ import numpy as np
 
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.choice import find_chosen_model, find_pruned_model
+from paramreduce_cli.export.code_generation import Exported, make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import Exported, make_exported_model
+from paramreduce_cli.export.named_models import find_chosen_model, find_pruned_model
 from paramreduce_cli.records import Kind, TermReduction
 from tests.conftest import ROOT, model_of, whole
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from paramreduce_cli.records import Part
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
-from paramreduce_cli.reduction.best_subset.search import Search, normalise_problem
+from paramreduce_cli.reduction.best_subset.subset_search import Search, normalise_problem
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.task import SelectionTask, run
 from tests.benchmarks.random_columns import autoregressive

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from paramreduce_cli.config import get_schema, load_config
 from paramreduce_cli.config.former_keys import FORMER_KEYS
-from paramreduce_cli.config.reading import read_yaml
 from paramreduce_cli.config.template import format_dh_template
+from paramreduce_cli.config.yaml_reading import read_yaml
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 
 pytestmark = pytest.mark.filterwarnings("ignore::paramreduce_cli.errors.ParamreduceWarning")

@@ -7,9 +7,9 @@ import pytest
 from conftest import config_and_model, slope
 
 from paramreduce_cli.config import load_config
+from paramreduce_cli.excitation.excitation_objective import FreeObjective, Level
 from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import _Search, optimise_trajectory
 from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.multibody.loops.coordinates import Coordinates

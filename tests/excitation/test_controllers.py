@@ -14,9 +14,9 @@ from oracles import capsules, pinocchio_model
 from paramreduce_cli.config.clearance import ClearanceSection
 from paramreduce_cli.config.error_keys import locate_error
 from paramreduce_cli.errors import ConfigError, DataError, NumericalError
+from paramreduce_cli.excitation.excitation_objective import FreeObjective, Level
 from paramreduce_cli.excitation.fourier import evaluate_basis, sample_times
 from paramreduce_cli.excitation.limits import LimitMap
-from paramreduce_cli.excitation.objective import FreeObjective, Level
 from paramreduce_cli.excitation.optimiser import optimise_trajectory
 from paramreduce_cli.excitation.workers import build_excitation
 from paramreduce_cli.export.trajectory_formats import trajectory_formats

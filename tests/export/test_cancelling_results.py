@@ -9,16 +9,16 @@ import pytest
 from loop_texts import PARALLELOGRAM, TURNTABLE, load_text
 
 from paramreduce_cli.errors import FormulationError
-from paramreduce_cli.export.check import check
-from paramreduce_cli.export.choice import find_chosen_model
-from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.term_sizes import estimate_term_sizes, find_entry_sizes
-from paramreduce_cli.export.writing import (
+from paramreduce_cli.export.code_generation import (
     Exported,
     make_exported_model,
     make_functions,
     make_random_cases,
 )
+from paramreduce_cli.export.code_verification import check
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.named_models import find_chosen_model
+from paramreduce_cli.export.term_sizes import estimate_term_sizes, find_entry_sizes
 from paramreduce_cli.records import Run
 from paramreduce_cli.stages.build_model import build_model
 

@@ -14,14 +14,14 @@ import pytest
 from conftest import TWO_LINK, model_of
 
 from paramreduce_cli.errors import ParamreduceWarning
-from paramreduce_cli.export.check import check, make_random_cases
-from paramreduce_cli.export.choice import find_chosen_model
-from paramreduce_cli.export.exported import make_harmless, make_identifier, wrap_line
+from paramreduce_cli.export.code_generation import Exported, make_exported_model, make_functions
+from paramreduce_cli.export.code_verification import check, make_random_cases
+from paramreduce_cli.export.exported_model import make_harmless, make_identifier, wrap_line
 from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.named_models import find_chosen_model
 from paramreduce_cli.export.term_sizes import estimate_term_sizes
-from paramreduce_cli.export.writing import Exported, make_exported_model, make_functions
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import ModelErrors, TermModel
 
 needs_gcc = pytest.mark.skipif(shutil.which("gcc") is None, reason="gcc is not installed")

@@ -5,8 +5,8 @@ import pytest
 from conftest import config_and_model
 
 from paramreduce_cli.export import running
+from paramreduce_cli.export.code_generation import Exported
 from paramreduce_cli.export.running import RunningModel, measure_speeds
-from paramreduce_cli.export.writing import Exported
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import draw_states

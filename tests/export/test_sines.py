@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from conftest import model_of
 
-from paramreduce_cli.export.choice import find_chosen_model
+from paramreduce_cli.export.code_generation import make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import make_exported_model
+from paramreduce_cli.export.named_models import find_chosen_model
 
 pytestmark = pytest.mark.skipif(shutil.which("gcc") is None, reason="needs gcc")
 _MANY = 200_000

@@ -7,7 +7,7 @@ from random_graphs import evaluated, expressions
 
 from paramreduce_cli.expressions.factoring import Values, minimise_operations
 from paramreduce_cli.expressions.graph import ZERO, Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 
 
 @settings(max_examples=150, deadline=None)

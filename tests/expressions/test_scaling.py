@@ -9,11 +9,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.expressions.scaling import rescale
-from paramreduce_cli.lean.building import build_direct_outputs, build_inverse_outputs
-from paramreduce_cli.lean.choices import JointFormulation
-from paramreduce_cli.lean.tree import choose_frames
+from paramreduce_cli.lean.joint_formulations import JointFormulation
+from paramreduce_cli.lean.joint_frames import choose_frames
+from paramreduce_cli.lean.lean_outputs import build_direct_outputs, build_inverse_outputs
 
 FREE, N = 3, 6
 NUMBERS = (0.0825, 0.088, 0.5, 2.0, -0.316, 9.81)

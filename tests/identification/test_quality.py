@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from simulated_logs import two_link_log
 
-from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.identification import filters
 from paramreduce_cli.identification.processing import UNUSED, process_logs
 from paramreduce_cli.identification.quality import estimate_noise_floor

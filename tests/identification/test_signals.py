@@ -11,7 +11,7 @@ from simulated_logs import two_link_log, write_log
 from paramreduce_cli.artifacts import log_files
 from paramreduce_cli.artifacts.log_files import load_log
 from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
-from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ArtifactError, ConfigError, DataError
 from paramreduce_cli.identification.signals import read_signals, resample_evenly
 from paramreduce_cli.records import RawLog

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from paramreduce_cli.importing.imported import Inertial
+from paramreduce_cli.importing.imported_robot import Inertial
 from paramreduce_cli.importing.inertia_checks import find_inertia_warnings
 
 ROD = np.diag([1e-4, 1 / 12, 1 / 12])

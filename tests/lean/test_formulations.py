@@ -11,22 +11,22 @@ from trees import random_tree
 
 from paramreduce_cli.errors import FormulationError
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
-from paramreduce_cli.lean import checking, search
+from paramreduce_cli.expressions.programs import Program
+from paramreduce_cli.lean import formulation_search, lean_verification
 from paramreduce_cli.lean import formulations as module
-from paramreduce_cli.lean.building import build_direct_outputs, build_inverse_outputs
-from paramreduce_cli.lean.choices import (
+from paramreduce_cli.lean.formulations import add_formulations, find_formulations, vary_formulation
+from paramreduce_cli.lean.joint_formulations import (
     OPTIONS,
     JointFormulation,
     from_data,
     list_alternatives,
     to_data,
 )
-from paramreduce_cli.lean.formulations import add_formulations, find_formulations, vary_formulation
-from paramreduce_cli.lean.model import LeanModels
-from paramreduce_cli.lean.tree import choose_frames
+from paramreduce_cli.lean.joint_frames import choose_frames
+from paramreduce_cli.lean.lean_models import LeanModels
+from paramreduce_cli.lean.lean_outputs import build_direct_outputs, build_inverse_outputs
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.plain import PlainDynamics
+from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
 from paramreduce_cli.records import Formulations, Run
 
 
@@ -123,19 +123,19 @@ def test_any_subset_of_a_formulation_is_the_reduced_model(puma):
     for n in (5, 15, 30):
         kept = np.sort(rng.choice(np.flatnonzero(puma.affecting), n, replace=False))
         states = tuple(rng.normal(size=(3, 40, mechanism.n_q)))
-        checking.check_formulations(mechanism, puma.formulations, kept, states, rng)
+        lean_verification.check_formulations(mechanism, puma.formulations, kept, states, rng)
 
 
 def test_a_wrong_formulation_is_an_error(puma, monkeypatch):
     rng = np.random.default_rng(0)
     states = tuple(rng.normal(size=(3, 10, 6)))
     kept = np.flatnonzero(puma.affecting)
-    right = checking.Dynamics.compute_torques
+    right = lean_verification.Dynamics.compute_torques
     monkeypatch.setattr(
-        checking.Dynamics, "compute_torques", lambda self, *a: right(self, *a) * (1 + 1e-8)
+        lean_verification.Dynamics, "compute_torques", lambda self, *a: right(self, *a) * (1 + 1e-8)
     )
     with pytest.raises(FormulationError, match="off by 1"):
-        checking.check_formulations(puma.mechanism, puma.formulations, kept, states, rng)
+        lean_verification.check_formulations(puma.mechanism, puma.formulations, kept, states, rng)
 
 
 def test_tied_and_known_parameters_take_less(puma):
@@ -206,7 +206,7 @@ def test_equal_branches_get_equal_choices(hexaglide):
 
 
 def test_the_search_repeats_itself(hexaglide, monkeypatch):
-    monkeypatch.setattr(search, "_found", {})
+    monkeypatch.setattr(formulation_search, "_found", {})
     again = find_formulations(hexaglide.mechanism, hexaglide.affecting, hexaglide.base.columns)
     assert again == hexaglide.formulations
 

@@ -14,7 +14,7 @@ from oracles import pinocchio_model
 from oracles.lagrange import Lagrange
 
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.plain import PlainDynamics
+from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
 
 
 def relative(found, expected):

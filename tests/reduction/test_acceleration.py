@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from conftest import branching_tree, random_states
 
-from paramreduce_cli.judgement.acceleration import compute_acceleration_errors
+from paramreduce_cli.judgement.acceleration_errors import compute_acceleration_errors
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import Block
 

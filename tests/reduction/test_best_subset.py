@@ -14,7 +14,7 @@ from paramreduce_cli.reduction.best_subset import kernel, parts
 from paramreduce_cli.reduction.best_subset.merging import join_subtrees, merge_proofs
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
 from paramreduce_cli.reduction.best_subset.proofs import ProofSearch
-from paramreduce_cli.reduction.best_subset.search import BEGINNING, Search, normalise_problem
+from paramreduce_cli.reduction.best_subset.subset_search import BEGINNING, Search, normalise_problem
 from paramreduce_cli.reduction.best_subset.ties import find_first_tie
 from paramreduce_cli.reduction.criteria.torque import TorqueObjective
 from paramreduce_cli.reduction.heuristics import swap

@@ -11,7 +11,7 @@ from selecting import problem
 
 from paramreduce_cli.multibody.base_parameters import find_affecting_columns
 from paramreduce_cli.multibody.dynamics import Dynamics
-from paramreduce_cli.multibody.plain import PlainDynamics
+from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
 from paramreduce_cli.reduction.criteria.acceleration import AccelerationObjective
 from paramreduce_cli.reduction.criteria.operations import OperationsObjective
 from paramreduce_cli.reduction.heuristics import heuristics

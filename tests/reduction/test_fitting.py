@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from selecting import blocks_of, dependent_problem
 
-from paramreduce_cli.judgement.torque import compute_torque_errors
+from paramreduce_cli.judgement.torque_errors import compute_torque_errors
 from paramreduce_cli.reduction.fitting import fit
 
 

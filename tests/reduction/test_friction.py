@@ -11,9 +11,9 @@ from oracles import pinocchio_model
 from oracles.selection import all_best_errors, error_by_definition
 from selecting import problem, subsets
 
-from paramreduce_cli.export.choice import find_chosen_model
+from paramreduce_cli.export.code_generation import make_exported_model
 from paramreduce_cli.export.languages import languages
-from paramreduce_cli.export.writing import make_exported_model
+from paramreduce_cli.export.named_models import find_chosen_model
 from paramreduce_cli.multibody.dynamics import Dynamics
 
 

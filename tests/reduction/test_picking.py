@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from paramreduce_cli.judgement.picking import (
+from paramreduce_cli.judgement.model_selection import (
     find_best_of_size,
     find_nearest_to,
     find_pareto_front,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from conftest import ROUGH_TERMS, TWO_LINK, config_and_model, run_stages, summary_of
 
-from paramreduce_cli.artifacts.brought import load_coefficients
+from paramreduce_cli.artifacts.user_files import load_coefficients
 from paramreduce_cli.errors import ParamreduceWarning
 from paramreduce_cli.excitation.point_to_point import (
     evaluate_point_to_point,

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 from conftest import model_of
-from terms.test_search import NOMINAL, states
+from terms.test_term_removal import NOMINAL, states
 
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.reduction.models import make_base_model
-from paramreduce_cli.terms.fitting import Budget
-from paramreduce_cli.terms.samples import make_samples
-from paramreduce_cli.terms.searching import Searcher, SearchSamples
+from paramreduce_cli.terms.fit_samples import make_samples
+from paramreduce_cli.terms.parallel_descents import Searcher, SearchSamples
+from paramreduce_cli.terms.program_fitting import Budget
 from paramreduce_cli.terms.starts import Start
 
 

@@ -7,9 +7,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from conftest import model_of
-from terms.test_search import states
+from terms.test_term_removal import states
 
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.descent import (
     Descent,
@@ -19,10 +19,10 @@ from paramreduce_cli.terms.descent import (
     find_leanest_histories,
     list_front,
 )
-from paramreduce_cli.terms.fitting import Budget, Fitting
-from paramreduce_cli.terms.samples import make_samples
-from paramreduce_cli.terms.search import NOISE, TermSearch
+from paramreduce_cli.terms.fit_samples import make_samples
+from paramreduce_cli.terms.program_fitting import Budget, Fitting
 from paramreduce_cli.terms.starts import Start
+from paramreduce_cli.terms.term_removal import NOISE, TermSearch
 
 BUDGET = Budget(0.03, np.inf)
 

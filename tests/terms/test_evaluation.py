@@ -10,7 +10,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Block, Constraint
 from paramreduce_cli.terms.evaluation import Evaluator
-from paramreduce_cli.terms.fitting import Budget
+from paramreduce_cli.terms.program_fitting import Budget
 from paramreduce_cli.terms.tape import Outputs
 
 OFF = np.array([0.5, -2.0])

@@ -14,19 +14,19 @@ from conftest import ONE_FORMAT, config_of
 from paramreduce_cli.artifacts.store import Store, load_file
 from paramreduce_cli.config import load_config
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
-from paramreduce_cli.export.choice import find_pruned_model
+from paramreduce_cli.export.code_generation import Exported, make_exported_model, make_functions
 from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.named_models import find_pruned_model
 from paramreduce_cli.export.values import write_values
-from paramreduce_cli.export.writing import Exported, make_exported_model, make_functions
 from paramreduce_cli.expressions.compiled import load
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import Model, Reduction, Report, Samples, TermReduction
 from paramreduce_cli.running.pipeline import list_stages, list_stages_to_run
 from paramreduce_cli.running.runner import Runner
 from paramreduce_cli.stages import reduce_terms
-from paramreduce_cli.terms import simplify
+from paramreduce_cli.terms import leanest_program
 from paramreduce_cli.texts import format_percent
 
 TERMS = ("terms={}", "terms.torque_error=0.05", "terms.acceleration_error=0.2", "terms.rounds=4")
@@ -94,8 +94,8 @@ def loaded(runner, record):
 def few_starts():
     """Descend from three starts instead of a dozen, which take most of the time."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simplify, "_FEWEST", 3)
-        patch.setattr(simplify, "_MOST", 3)
+        patch.setattr(leanest_program, "_FEWEST", 3)
+        patch.setattr(leanest_program, "_MOST", 3)
         yield
 
 
@@ -451,10 +451,10 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
 
 
 def test_what_is_found_does_not_depend_on_processes(two_link, tmp_path, monkeypatch):
-    monkeypatch.setattr(simplify, "_MANY", 0)
-    started, start_searchers = [], simplify.start_searchers
+    monkeypatch.setattr(leanest_program, "_MANY", 0)
+    started, start_searchers = [], leanest_program.start_searchers
     monkeypatch.setattr(
-        simplify,
+        leanest_program,
         "start_searchers",
         lambda one, jobs, *more: started.append(jobs) or start_searchers(one, jobs, *more),
     )
@@ -560,7 +560,7 @@ def test_errors_on_a_log_are_watched_on_other_quarters_than_are_fitted(measured_
 
     def nothing(searcher, starts, **__):
         seen.extend([searcher.looked_at, searcher.closely])
-        return simplify.Found([], [])
+        return leanest_program.Found([], [])
 
     module = sys.modules["paramreduce_cli.stages.reduce_terms"]
     monkeypatch.setattr(module, "simplify", nothing)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from conftest import model_of
 
-from paramreduce_cli.lean.model import LeanModels
+from paramreduce_cli.lean.lean_models import LeanModels
 from paramreduce_cli.reduction.models import make_base_model
 from paramreduce_cli.terms.starts import Start, near, order_by_promise
 

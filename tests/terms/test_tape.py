@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from paramreduce_cli.expressions.graph import Graph
-from paramreduce_cli.expressions.operations import Program
+from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.terms import kernels
 from paramreduce_cli.terms.kernels import ITSELF, NUMBER, WHOLE
 from paramreduce_cli.terms.tape import Tape

@@ -10,10 +10,10 @@ import hypothesis
 import yaml
 from hypothesis import strategies as st
 
-from paramreduce_cli.artifacts.brought import load_recording
 from paramreduce_cli.artifacts.log_files import load_log
+from paramreduce_cli.artifacts.user_files import load_recording
 from paramreduce_cli.config import load_config
-from paramreduce_cli.config.logs import LogSection
+from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.identification.processing import process_logs
 from paramreduce_cli.records import RawLogs

@@ -11,7 +11,7 @@ from paramreduce_cli.cli.options import SET, FilePath
 from paramreduce_cli.cli.terminal import LOG, say, say_table, warn_user
 from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
-from paramreduce_cli.config.logs import ColumnsSection, LogSection
+from paramreduce_cli.config.log_settings import ColumnsSection, LogSection
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.texts import format_percent
 

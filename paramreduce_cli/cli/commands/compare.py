@@ -8,8 +8,8 @@ from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say
 from paramreduce_cli.errors import ConfigError
-from paramreduce_cli.report.comparison import QUANTITIES, TOLERANCES, Tolerance
-from paramreduce_cli.report.comparison import compare as compared
+from paramreduce_cli.report.summary_comparison import QUANTITIES, TOLERANCES, Tolerance
+from paramreduce_cli.report.summary_comparison import compare as compared
 
 DIFFERENT = 1
 

@@ -14,7 +14,9 @@ from paramreduce_cli.cli.options import OPTIONAL_CONFIG, RESULTS, SET, make_stor
 from paramreduce_cli.cli.terminal import LOG, VERBOSE, say, show_progress
 from paramreduce_cli.config import Config, load_config
 from paramreduce_cli.errors import ArtifactError, ConfigError
-from paramreduce_cli.export.choice import (
+from paramreduce_cli.export.code_generation import Exported, make_exported_model
+from paramreduce_cli.export.languages import languages
+from paramreduce_cli.export.named_models import (
     BASE,
     CONSISTENT,
     FULL,
@@ -22,10 +24,8 @@ from paramreduce_cli.export.choice import (
     find_chosen_model,
     find_pruned_model,
 )
-from paramreduce_cli.export.languages import languages
 from paramreduce_cli.export.robot_file import write_robot_file
 from paramreduce_cli.export.values import VALUES, write_values
-from paramreduce_cli.export.writing import Exported, make_exported_model
 from paramreduce_cli.importing.formats import formats
 from paramreduce_cli.judgement.leanest import find_leanest
 from paramreduce_cli.records import (

@@ -27,9 +27,9 @@ from paramreduce_cli.config.template import (
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.fields.numbers import parse_number
 from paramreduce_cli.fields.section import NAME
-from paramreduce_cli.importing.reading import find_described_robot, read_robot
-from paramreduce_cli.importing.simplified import SimplifiedRobot
-from paramreduce_cli.importing.writing import format_config
+from paramreduce_cli.importing.config_writing import format_config
+from paramreduce_cli.importing.simplification import SimplifiedRobot
+from paramreduce_cli.importing.source_reading import find_described_robot, read_robot
 
 _BASE = 6
 """Coordinates of a base that floats, which come first."""
@@ -219,7 +219,7 @@ def _check_closure(text: str) -> str:
 def _close_loops(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRobot:
     """Return the robot with a guess from which its loops close, and with independent coordinates."""
     # Late: CasADi.
-    from paramreduce_cli.multibody.loops.imported import close_loops
+    from paramreduce_cli.multibody.loops.imported_loops import close_loops
 
     every = tuple(name for body in robot.bodies for name in body.list_coordinates())
     text = format_config(replace(robot, independent=robot.independent or every), choice)

@@ -14,15 +14,15 @@ import click
 import rich.markup
 import rich.table
 
+from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.inspection import list_contents
-from paramreduce_cli.artifacts.places import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import list_results_below, make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, escape_controls, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
-from paramreduce_cli.texts.measured import format_measured
+from paramreduce_cli.texts.measured_values import format_measured
 
 if TYPE_CHECKING:
     from paramreduce_cli.records import ReducedModel

@@ -22,7 +22,7 @@ from paramreduce_cli.cli.options import (
     make_callbacks,
     make_store,
 )
-from paramreduce_cli.cli.outcomes import say_outcome, say_verdict
+from paramreduce_cli.cli.stage_messages import say_outcome, say_verdict
 from paramreduce_cli.cli.terminal import (
     JSON,
     LOG,

@@ -8,7 +8,7 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.atomic import replace_atomically
-from paramreduce_cli.artifacts.places import SUMMARY
+from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.project_state import make_no_results_error

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, write_header
+from paramreduce_cli.export.exported_model import ExportedModel, write_header
 from paramreduce_cli.export.expressions import FUNCTIONS, Language, write_signed
-from paramreduce_cli.export.rendering import render_template
 from paramreduce_cli.export.sines import DOUBLE, SINGLE, write_polynomial
+from paramreduce_cli.export.template_rendering import render_template
 from paramreduce_cli.expressions.functions import Argument, Function
 
 BLOCK = 64

@@ -6,7 +6,7 @@ from tempfile import TemporaryDirectory
 import casadi as ca
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, write_header
+from paramreduce_cli.export.exported_model import ExportedModel, write_header
 from paramreduce_cli.expressions.functions import Argument, Function
 
 _CALLS = {

@@ -1,6 +1,6 @@
 """The approximate base parameters as equations for a paper."""
 
-from paramreduce_cli.export.exported import ExportedModel, make_harmless
+from paramreduce_cli.export.exported_model import ExportedModel, make_harmless
 from paramreduce_cli.texts.latex_table import format_latex_table
 from paramreduce_cli.texts.table import Table
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from paramreduce_cli.export.exported import ExportedModel, write_header
+from paramreduce_cli.export.exported_model import ExportedModel, write_header
 from paramreduce_cli.export.expressions import FUNCTIONS, Language
-from paramreduce_cli.export.rendering import render_template
+from paramreduce_cli.export.template_rendering import render_template
 from paramreduce_cli.expressions.functions import Argument, Function
 from paramreduce_cli.records import FloatArray
 

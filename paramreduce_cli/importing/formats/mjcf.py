@@ -1,6 +1,6 @@
 """MJCF, MuJoCo's own files."""
 
-from paramreduce_cli.importing.mjcf import read_mjcf
+from paramreduce_cli.importing.mjcf_files import read_mjcf
 from paramreduce_cli.importing.mjcf_writing import write_mjcf
 from paramreduce_cli.importing.robot_format import RobotFormat
 from paramreduce_cli.records import Kind

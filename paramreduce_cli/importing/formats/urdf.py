@@ -1,7 +1,7 @@
 """URDF."""
 
 from paramreduce_cli.importing.robot_format import RobotFormat
-from paramreduce_cli.importing.urdf import read_urdf
+from paramreduce_cli.importing.urdf_files import read_urdf
 from paramreduce_cli.importing.urdf_writing import write_urdf
 from paramreduce_cli.records import Kind
 

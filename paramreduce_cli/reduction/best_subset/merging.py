@@ -9,7 +9,7 @@ import numpy as np
 from paramreduce_cli.errors import DataError
 from paramreduce_cli.records import IntArray, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import concatenate_logs
-from paramreduce_cli.reduction.best_subset.search import BEGINNING
+from paramreduce_cli.reduction.best_subset.subset_search import BEGINNING
 from paramreduce_cli.reduction.best_subset.ties import find_ties
 
 

@@ -9,7 +9,7 @@ from itertools import count, pairwise
 import numpy as np
 
 from paramreduce_cli.records import IntArray, Part
-from paramreduce_cli.reduction.best_subset.search import Search
+from paramreduce_cli.reduction.best_subset.subset_search import Search
 
 _NEXT = np.iinfo(np.int64).max
 """Stands between the logs of two parts."""

@@ -14,7 +14,7 @@ from paramreduce_cli.errors import ParamreduceError
 from paramreduce_cli.multibody.orthogonal import select_independent
 from paramreduce_cli.records import IntArray, Progress, Proofs, ProofStatus
 from paramreduce_cli.reduction.best_subset.parts import PartedSearch
-from paramreduce_cli.reduction.best_subset.search import (
+from paramreduce_cli.reduction.best_subset.subset_search import (
     BEGINNING,
     RESOLUTION,
     Search,

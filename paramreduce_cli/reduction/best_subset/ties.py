@@ -4,7 +4,7 @@ import numpy as np
 
 from paramreduce_cli.multibody.orthogonal import DEPENDENT
 from paramreduce_cli.records import BoolArray, FloatArray, IntArray
-from paramreduce_cli.reduction.best_subset.search import RESOLUTION, UnitProblem
+from paramreduce_cli.reduction.best_subset.subset_search import RESOLUTION, UnitProblem
 
 
 def find_ties(squared_errors: FloatArray, best: float) -> BoolArray:

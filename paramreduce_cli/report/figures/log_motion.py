@@ -3,8 +3,8 @@
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.recorded import draw_signals
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
+from paramreduce_cli.report.signal_figures import draw_signals
 
 
 @placed(PageSection.LOG, 2)

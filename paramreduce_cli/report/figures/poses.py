@@ -6,7 +6,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.data import ReportData, Skeleton
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import break_lines, make_figure
 
 

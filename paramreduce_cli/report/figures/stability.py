@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from paramreduce_cli.records import DataChange
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import draw_message, make_figure, place_legend_above
 
 _WIDE_SPREAD = 100.0

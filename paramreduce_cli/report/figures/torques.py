@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import choose_joint_style, make_figure
 
 _DASHES = (0, (3, 2))

@@ -4,7 +4,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import (
     break_lines,
     choose_joint_style,

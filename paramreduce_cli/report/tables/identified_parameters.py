@@ -4,8 +4,8 @@ import numpy as np
 
 from paramreduce_cli.records import Estimate
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
-from paramreduce_cli.texts.measured import format_measured
+from paramreduce_cli.report.page_sections import PageSection, placed
+from paramreduce_cli.texts.measured_values import format_measured
 from paramreduce_cli.texts.table import Table
 
 

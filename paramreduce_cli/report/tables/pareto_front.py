@@ -2,7 +2,7 @@
 
 from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts import format_percent, format_percent_range
 from paramreduce_cli.texts.table import Table
 

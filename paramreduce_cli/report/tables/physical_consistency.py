@@ -1,7 +1,7 @@
 """Standard parameters that a machine can have."""
 
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
 

@@ -3,7 +3,7 @@
 from paramreduce_cli.records import ErrorRange
 from paramreduce_cli.report.data import ReportData
 from paramreduce_cli.report.overview import HEADER, make_function_cells
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
 

@@ -4,7 +4,7 @@ import numpy as np
 
 from paramreduce_cli.records import FloatArray
 from paramreduce_cli.report.data import ReportData
-from paramreduce_cli.report.sections import PageSection, placed
+from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.texts.table import Table
 
 

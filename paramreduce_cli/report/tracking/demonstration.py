@@ -8,7 +8,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import TrackingSection
 from paramreduce_cli.expressions.compiled import BatchFunction
-from paramreduce_cli.multibody.plain import PlainDynamics
+from paramreduce_cli.multibody.textbook_dynamics import PlainDynamics
 from paramreduce_cli.records import FloatArray, Model, Tracking
 from paramreduce_cli.report.tracking.control import Arm, advance_state, simulate
 from paramreduce_cli.report.tracking.paths import plan_paths

@@ -1,0 +1,208 @@
+"""A reduced model with all that its code says, checked before it is written in some language."""
+
+import warnings
+from collections.abc import Mapping
+from enum import StrEnum
+
+import numpy as np
+
+from paramreduce_cli import __version__
+from paramreduce_cli.errors import ParamreduceWarning
+from paramreduce_cli.export.code_verification import (
+    check,
+    check_against_mechanism,
+    check_closures,
+    find_unsafe_mass_matrices,
+    make_random_cases,
+    measure_single_precision,
+)
+from paramreduce_cli.export.exported_model import ExportedModel, ParameterValue
+from paramreduce_cli.export.term_sizes import estimate_term_sizes
+from paramreduce_cli.export.validity import describe_ranges, describe_validity
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.lean.lean_functions import LeanFunctions
+from paramreduce_cli.records import (
+    FloatArray,
+    Mechanism,
+    Model,
+    Progress,
+    ReducedModel,
+    Tell,
+    TermModel,
+    Validation,
+)
+from paramreduce_cli.texts.table import Table
+
+_TASK = "write code"
+
+_CASES = 16
+"""States in the self-test."""
+_CHECKED = 200
+"""States on which the functions are checked before they are written."""
+_LOOPS = {"z", "dz", "ddz", "guess", "q", "dq", "ddq", "R", "b"}
+"""What the position, velocity and acceleration problems take and give."""
+
+
+class Exported(StrEnum):
+    """A selection of functions to export."""
+
+    IDM = "idm"
+    DDM = "ddm"
+    BOTH = "both"
+    REGRESSOR = "regressor"
+
+
+_FUNCTIONS = {
+    Exported.IDM: (LeanFunctions.make_inverse,),
+    Exported.DDM: (LeanFunctions.make_direct,),
+    Exported.BOTH: (LeanFunctions.make_inverse, LeanFunctions.make_direct),
+    Exported.REGRESSOR: (LeanFunctions.make_regressor,),
+}
+
+
+def make_exported_model(
+    model: Model,
+    chosen: ReducedModel,
+    *,
+    title: str,
+    what: Exported = Exported.BOTH,
+    constant: bool = False,
+    single: bool = False,
+    origin: str = "",
+    simplified: TermModel | None = None,
+    validation: Validation | None = None,
+    tell: Tell = lambda _: None,
+) -> ExportedModel:
+    """Return a model for :data:`paramreduce_cli.export.languages.languages` to write, its functions checked.
+
+    Args:
+        model: Model of the robot.
+        chosen: Reduced model to export, with expressions.
+        title: Title of the model.
+        what: Functions to export.
+        constant: Whether the values of the parameters are part of the code.
+        single: Whether numbers have single precision.
+        origin: Of the model, for the comment that opens every file.
+        simplified: The function that is asked for with terms left out, whose parameters are those of
+            the model.
+        validation: Says in which ranges the model was validated; None where it was not.
+        tell: Told of its steps.
+
+    Raises:
+        FormulationError: The functions do not compute what the straightforward model does.
+    """
+    mechanism = model.mechanism
+    tell(Progress(_TASK, 0, 2, "functions"))
+    functions = make_functions(model, chosen, what, constant=constant, simplified=simplified)
+    closures: tuple[Function, ...] = ()
+    if mechanism.loops is not None:
+        closures = tuple(LeanFunctions(model, chosen, constant=constant).make_closures())
+    tell(Progress(_TASK, 1, 2, "checks"))
+    rng = np.random.default_rng(0)
+    checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified)
+    least = estimate_term_sizes(mechanism, chosen, checked)
+    check(functions, checked, least)
+    whole = np.array_equal(chosen.standard[model.affecting], model.values[model.affecting])
+    if whole and simplified is None:
+        check_against_mechanism(model, checked, least)
+    if closures:
+        check_closures(closures, checked, least)
+    unsafe = ""
+    # Without some terms M was positive definite wherever it was looked at where that holds; these states may be beyond.
+    if simplified is None and what in (Exported.DDM, Exported.BOTH):
+        unsafe = find_unsafe_mass_matrices(checked["M"])
+    if unsafe:
+        warnings.warn(f"{title}: {unsafe}", ParamreduceWarning, stacklevel=2)
+    worth = _describe_accuracy(model, unsafe, simplified, validation)
+    if single:
+        worth.append(_describe_rounding(functions, checked, least))
+    used = {a.name for f in functions for a in (*f.arguments, *f.results)}
+    if mechanism.loops is not None:
+        used |= _LOOPS
+    stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified)
+    tell(Progress(_TASK, 2, 2))
+    return ExportedModel(
+        robot=mechanism.robot,
+        heading=(f"{mechanism.robot}: {title}.", *worth, *_describe_origin(mechanism, origin)),
+        frames=_describe_frames(mechanism),
+        coordinates=mechanism.generalised_names,
+        units=tuple(body.unit for body in mechanism.bodies),
+        independent=np.array(mechanism.independent, dtype=np.int64),
+        parameters=_list_values(model, chosen),
+        symbols=mechanism.symbols,
+        constant=constant,
+        functions=functions,
+        closures=closures,
+        single=single,
+        cases={name: values for name, values in stored.items() if name in used},
+        least=least,
+    )
+
+
+def _describe_accuracy(
+    model: Model, unsafe: str, simplified: TermModel | None, validation: Validation | None
+) -> list[str]:
+    """Describe how accurate a model is and where it holds, line by line."""
+    lines = [f"NOT SAFE FOR DIRECT DYNAMICS: {unsafe}."] if unsafe else []
+    if model.unmeasured:
+        names = ", ".join(model.unmeasured)
+        lines.append(f"NOT PREDICTED, as not measured: the torques of {names}.")
+    if validation is not None:
+        lines.append("Errors were measured on motions within")
+        lines += describe_ranges(model.mechanism, validation.lower, validation.upper)
+    if simplified is not None:
+        lines += describe_validity(model.mechanism, simplified)
+    return lines
+
+
+def _describe_origin(mechanism: Mechanism, origin: str) -> tuple[str, str]:
+    """Return the gravity that the model holds under, and what made it."""
+    gravity = " ".join(f"{g:.6g}" for g in mechanism.gravity)
+    return (
+        f"Gravity in the base frame, m/s^2: {gravity}",
+        f"Made by paramreduce {__version__} ({origin}).",
+    )
+
+
+def _describe_rounding(
+    functions: tuple[Function, ...], checked: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> str:
+    """Describe the rounding error in single precision, on the states that the functions are checked on."""
+    errors = measure_single_precision(functions, checked, least)
+    listed = ", ".join(f"{name} {error:.1e}" for name, error in errors.items())
+    return f"Single precision, on {_CHECKED} random states off by about (of the largest): {listed}."
+
+
+def _describe_frames(mechanism: Mechanism) -> tuple[str, ...]:
+    """Return the geometry of the config, line by line."""
+    header, *rows = mechanism.table
+    lines = Table(mechanism.frames, header, tuple(rows)).to_text().splitlines()
+    return tuple(f"  {line}".rstrip() for line in lines if line)
+
+
+def _list_values(model: Model, chosen: ReducedModel) -> tuple[ParameterValue, ...]:
+    """Return the values of the parameters with units."""
+    units = chosen.list_units(model.mechanism.parameters)
+    found = zip(chosen.names, chosen.values.tolist(), units, chosen.expressions, strict=True)
+    return tuple(ParameterValue(*one) for one in found)
+
+
+def make_functions(
+    model: Model,
+    chosen: ReducedModel,
+    what: Exported,
+    *,
+    constant: bool = False,
+    simplified: TermModel | None = None,
+) -> tuple[Function, ...]:
+    """Return the functions of a model.
+
+    Args:
+        model: Model of the robot.
+        chosen: Reduced model.
+        what: Functions to return.
+        constant: Whether the values of the parameters are part of them.
+        simplified: The one function with pruned terms.
+    """
+    lean = LeanFunctions(model, chosen, constant=constant, simplified=simplified)
+    return tuple(make(lean) for make in _FUNCTIONS[what])

@@ -1,0 +1,223 @@
+"""Whether exported functions compute what plain recursion does."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from paramreduce_cli.export.term_sizes import find_entry_sizes
+from paramreduce_cli.expressions.functions import Function
+from paramreduce_cli.expressions.programs import Program
+from paramreduce_cli.lean.lean_verification import TOLERANCE, refuse_if_off
+from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
+from paramreduce_cli.multibody.loops.coordinates import Coordinates
+from paramreduce_cli.multibody.random_states import draw_states
+from paramreduce_cli.records import FloatArray, Mechanism, Model, ReducedModel, TermModel
+
+_GUESS = 0.01
+"""How far off the guesses of the position problem are in the self-test, rad or m."""
+
+
+def make_random_cases(
+    mechanism: Mechanism,
+    model: ReducedModel,
+    count: int,
+    rng: np.random.Generator,
+    simplified: TermModel | None = None,
+) -> dict[str, FloatArray]:
+    """Return random states and the results of textbook recursion, by the names of the functions' arrays.
+
+    Where terms were left out, results are those of the simplified program, which plain recursion does
+    not know; states are inside the ranges that it holds in, those of loops anywhere.
+
+    Args:
+        mechanism: Of the robot.
+        model: The reduced model.
+        count: Number of states.
+        rng: Where they come from.
+        simplified: A function with terms left out.
+    """
+    q, dq, ddq = draw_states(mechanism, count, rng)
+    if simplified is not None and mechanism.loops is None:
+        lower, upper = simplified.lower[:, None], simplified.upper[:, None]
+        q, dq, ddq = rng.uniform(lower, upper, (3, count, mechanism.n_dof))
+    plain = Dynamics(mechanism, once=True)
+    phi = model.standard
+    expansion = (model.position[:, None] == np.arange(model.n)).astype(float)
+    M, delta = plain.compute_mass_matrix_and_bias(q, dq, phi)
+    K = plain.compute_regressor(q, dq, ddq)
+    result = {
+        "phi": np.tile(model.values, (count, 1)),
+        "q": q,
+        "dq": dq,
+        "ddq": ddq,
+        "tau": K @ phi,
+        "M": M,
+        "delta": delta,
+        "K": K @ expansion,
+    }
+    if mechanism.loops is None:
+        return result | _evaluate_pruned(simplified, result, np.eye(mechanism.n_q)[None])
+    dependent, independent = list(mechanism.dependent), list(mechanism.independent)
+    R = Coordinates(mechanism, once=True).compute_tangent(q)[:, dependent]
+    b = ddq[:, dependent] - np.einsum("kij,kj->ki", R, ddq[:, independent])
+    guess = q.copy()
+    guess[:, dependent] += rng.uniform(-_GUESS, _GUESS, size=(count, len(dependent)))
+    z = {name: result[name][:, independent] for name in ("q", "dq", "ddq")}
+    loops = {"z": z["q"], "dz": z["dq"], "ddz": z["ddq"], "guess": guess, "R": R, "b": b}
+    tangent = np.zeros((count, mechanism.n_q, mechanism.n_dof))
+    tangent[:, dependent] = R
+    tangent[:, independent] = np.eye(mechanism.n_dof)
+    return result | loops | _evaluate_pruned(simplified, result | loops, tangent)
+
+
+def _evaluate_pruned(
+    simplified: TermModel | None, stored: Mapping[str, FloatArray], tangent: FloatArray
+) -> dict[str, FloatArray]:
+    """Return the results of a function with pruned terms, projected on the independent coordinates."""
+    if simplified is None:
+        return {}
+    count = len(stored["q"])
+    inputs = [np.broadcast_to(value, count) for value in simplified.values]
+    for name in ("q", "dq", "ddq", *(("R", "b") if simplified.projected else ())):
+        inputs += list(stored[name].reshape(count, -1).T)
+    given = Program.from_stored(simplified.program).evaluate(inputs)
+    outputs = np.column_stack([np.broadcast_to(value, count) for value in given])
+    n = tangent.shape[2] if simplified.projected else tangent.shape[1]
+    across = np.broadcast_to(
+        np.eye(n) if simplified.projected else tangent, (count, n, tangent.shape[2])
+    )
+    if outputs.shape[1] == n:
+        return {"tau": np.einsum("kij,ki->kj", across, outputs)}
+    rows, columns = np.tril_indices(n)
+    M = np.zeros((count, n, n))
+    M[:, rows, columns] = M[:, columns, rows] = outputs[:, :-n]
+    delta = outputs[:, -n:]
+    if "b" in stored and not simplified.projected:
+        drift = stored["ddq"] - np.einsum("kij,kj->ki", across, stored["ddz"])
+        delta = delta + np.einsum("kij,kj->ki", M, drift)
+    return {
+        "M": np.einsum("kia,kij,kjb->kab", across, M, across),
+        "delta": np.einsum("kij,ki->kj", across, delta),
+    }
+
+
+def check(
+    functions: tuple[Function, ...],
+    stored: Mapping[str, FloatArray],
+    least: Mapping[str, float],
+    tolerance: float = TOLERANCE,
+) -> None:
+    """Compare functions with stored results, joint by joint.
+
+    Args:
+        functions: To be checked.
+        stored: Their arguments and expected results, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+        tolerance: Share of the size of each result that is allowed.
+
+    Raises:
+        FormulationError: They are not the same.
+    """
+    for function in functions:
+        for name, got in _evaluate_function(function, stored).items():
+            wanted = stored[name].reshape(got.shape)
+            sizes = find_entry_sizes(name, wanted, least[name])
+            refuse_if_off(f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance)
+
+
+def check_against_mechanism(
+    model: Model, stored: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> None:
+    """Compare the torques of a model without any reduction with those of all parameters of the robot.
+
+    Args:
+        model: The robot.
+        stored: States and the torques of the exported model, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+
+    Raises:
+        FormulationError: A parameter that was taken for one without effect has one.
+    """
+    plain = Dynamics(model.mechanism, once=True)
+    wanted = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
+    off = (stored["tau"] - wanted) / find_entry_sizes("tau", wanted, least["tau"])
+    refuse_if_off("the full model", off, np.ones(1))
+
+
+def measure_single_precision(
+    functions: tuple[Function, ...], stored: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> dict[str, float]:
+    """Return the largest rounding error of each result in single precision, relative to the largest value of the
+    result.
+
+    That is with NumPy's sines and without contraction; compiled code has been found 1.5 times as far off.
+
+    Args:
+        functions: With their arguments and results.
+        stored: Arguments and exact results, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+    """
+    rounded: dict[str, Any] = {name: values.astype(np.float32) for name, values in stored.items()}
+    return {
+        name: float(
+            np.abs(got - stored[name].reshape(got.shape)).max()
+            / max(np.abs(stored[name]).max(), least[name])
+        )
+        for function in functions
+        for name, got in _evaluate_function(function, rounded).items()
+    }
+
+
+def check_closures(
+    closures: tuple[Function, ...], stored: Mapping[str, FloatArray], least: Mapping[str, float]
+) -> None:
+    """Check that the loops are closed, and that their derivatives are those of R and b.
+
+    Args:
+        closures: Functions of the closures.
+        stored: States of closed loops with R and b, (n_states, ...) by name.
+        least: Smallest sizes that results are judged by, by name.
+
+    Raises:
+        FormulationError: They are not.
+    """
+    values: dict[str, FloatArray] = {}
+    for function in closures:
+        values |= _evaluate_function(function, stored)
+    along = values["Phi_d"] @ stored["R"]
+    drift = np.einsum("kij,kj->ki", values["Phi_d"], stored["b"])
+    for what, off, name, against in (
+        ("closure", values["Phi"], "Phi", stored["q"]),
+        ("closure_jacobian", along + values["Phi_z"], "Phi_z", along),
+        ("closure_bias", drift - values["gamma"], "gamma", drift),
+    ):
+        refuse_if_off(what, off / find_entry_sizes(name, against, least[name]), np.ones(1))
+
+
+def _evaluate_function(
+    function: Function, stored: Mapping[str, FloatArray]
+) -> dict[str, FloatArray]:
+    """Return the results of a function for stored arguments, (n_states, ...) by name."""
+    inputs = [
+        column
+        for argument in function.arguments
+        for column in stored[argument.name].reshape(-1, argument.size).T
+    ]
+    values = function.program.evaluate(inputs)
+    count = len(stored["q"])
+    result = {}
+    for array in function.results:
+        own, values = values[: array.size], values[array.size :]
+        columns = [np.broadcast_to(value, count) for value in own]
+        result[array.name] = np.column_stack(columns).reshape(count, *array.shape)
+    return result
+
+
+def find_unsafe_mass_matrices(M: FloatArray) -> str:
+    """Describe what is wrong with the mass matrices of random states; return an empty text if nothing is."""
+    values = np.linalg.eigvalsh(M)
+    bad = int(np.sum(values[:, 0] <= SINGULAR_MASS * np.abs(values).max()))
+    if not bad:
+        return ""
+    return f"M is singular or not positive definite on {bad} of {len(M)} random states"

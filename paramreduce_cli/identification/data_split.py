@@ -1,0 +1,71 @@
+"""Pieces of motions, and which of their samples are used for training or held out."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from paramreduce_cli.config.log_settings import LogSection
+from paramreduce_cli.identification.signals import Signals
+
+_STILL = 2e-3
+"""Share of a joint's range within which it stands still."""
+_ROUNDING = 1e-9
+_SHORTEST = 20
+"""Samples of a piece that a border makes."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A piece of a motion with the times between which it is used."""
+
+    signals: Signals
+    first: float
+    last: float
+
+    def slice_rows(self, rows: slice) -> "Piece":
+        """Return some samples of the piece."""
+        return Piece(self.signals.slice_rows(rows), self.first, self.last)
+
+    @property
+    def used(self) -> slice:
+        """Samples that are used."""
+        time = self.signals.time
+        start, stop = np.searchsorted(time, [self.first - _ROUNDING, self.last + _ROUNDING])
+        return slice(int(start), int(max(start, stop)))
+
+
+def trim_files(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
+    """Return pieces without the cut-off start and end of a file, which still serve filters."""
+    first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
+    if wanted.standstill == "cut":
+        time = np.concatenate([piece.time for piece in pieces])
+        gone, back = [], []
+        for j in range(pieces[0].z.shape[1]):
+            z = np.concatenate([piece.z[:, j] for piece in pieces])
+            still = _STILL * max(np.ptp(z), 1e-12)
+            gone += np.flatnonzero(np.abs(z - z[0]) > still)[:1].tolist()
+            back += np.flatnonzero(np.abs(z - z[-1]) > still)[-1:].tolist()
+        if gone:
+            first, last = max(first, time[min(gone)]), min(last, time[max(back)])
+    return [Piece(piece, first, last) for piece in pieces]
+
+
+def split_pieces(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
+    """Return a first share of the used samples, and the rest; pieces that are too short are left out."""
+    left = int(share * sum(p.used.stop - p.used.start for p in pieces))
+    first, second = [], []
+    for piece in pieces:
+        size = piece.used.stop - piece.used.start
+        if left >= size:
+            first.append(piece)
+        elif left <= 0:
+            second.append(piece)
+        else:
+            border = piece.used.start + left
+            first.append(piece.slice_rows(slice(border)))
+            second.append(piece.slice_rows(slice(border, None)))
+        left -= size
+    return (
+        [p for p in first if p.signals.time.size >= _SHORTEST],
+        [p for p in second if p.signals.time.size >= _SHORTEST],
+    )
