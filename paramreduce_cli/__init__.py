@@ -27,7 +27,7 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """What there is, for completion in notebooks and for ``help``."""
+    """Return all public names, for completion in notebooks and for ``help``."""
     import paramreduce_cli.api as api
 
     return sorted([*globals(), *api.__all__])

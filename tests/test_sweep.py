@@ -82,8 +82,8 @@ def test_commands_are_those_of_the_shell(tmp_path):
     assert words[-6:-4] == ["--part", "2/3"]
     assert run.format_command(STAGES["validate"]).endswith("|| [ $? -eq 1 ]")
     for stage in run.stages:
-        assert Path(run.list_needed_files(stage)[0]).resolve() == config
-    needed = [name.rpartition("/")[2] for name in run.list_needed_files(STAGES["report"])]
+        assert Path(run.list_required_files(stage)[0]).resolve() == config
+    needed = [name.rpartition("/")[2] for name in run.list_required_files(STAGES["report"])]
     assert needed == ["two_link.yaml", "model.h5", "trajectories.h5", "samples.h5", "reduction.h5",
                       "validation.h5"]  # fmt: skip
 

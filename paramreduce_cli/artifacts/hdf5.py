@@ -324,7 +324,7 @@ class Reader:
         # Through HDF5's own functions: h5py's objects take longer than reading a small dataset.
         """Return a dataset, or raise ArtifactError if there is none."""
         try:
-            self._refuse_other_files(name)
+            self._reject_other_files(name)
             found = h5py.h5o.open(self.file.id, name.encode())
         except (KeyError, RuntimeError):
             found = None
@@ -335,7 +335,7 @@ class Reader:
             )
         return self._check_dataset(name, found)
 
-    def _refuse_other_files(self, name: str) -> None:
+    def _reject_other_files(self, name: str) -> None:
         """Raise ArtifactError if a name leads into another file."""
         parts = name.split("/")
         for k in range(len(parts)):
@@ -348,19 +348,19 @@ class Reader:
                 )
             self._inside.add(place)
 
-    def _check_dataset(self, name: str, found: h5py.h5d.DatasetID) -> CheckedRows:
+    def _check_dataset(self, name: str, dataset: h5py.h5d.DatasetID) -> CheckedRows:
         """Return a dataset if its numbers are in this file and complete.
 
         Raises:
             ArtifactError: Its numbers are in another file, or are not there.
         """
-        properties = found.get_create_plist()
+        properties = dataset.get_create_plist()
         layout = properties.get_layout()
         outside = layout == h5py.h5d.CONTIGUOUS and properties.get_external_count()
         if layout == h5py.h5d.VIRTUAL or outside:
             raise ArtifactError(f"{self.path}: /{name} is in another file; copy it into this one.")
-        data = CheckedRows(found)
-        if data.nbytes > _SMALL + _MOST_COMPRESSED * found.get_storage_size():
+        data = CheckedRows(dataset)
+        if data.nbytes > _SMALL + _MOST_COMPRESSED * dataset.get_storage_size():
             raise ArtifactError(
                 f"{self.path}: /{name} declares {' x '.join(map(str, data.shape))} numbers, but "
                 "holds hardly any."

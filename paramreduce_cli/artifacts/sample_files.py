@@ -64,7 +64,7 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
     for block in _iterate_blocks(sample_set, known):
         if not appenders:
             n_parameters = block.W.shape[1]
-            kept = not _is_matrix_left_out(sample_set, block.tau.shape[1], n_parameters)
+            kept = not _is_matrix_omitted(sample_set, block.tau.shape[1], n_parameters)
             appenders = _start_datasets(writer, name, block, sample_set.n_samples, kept=kept)
         for key, append in appenders.items():  # in this order: the digest depends on it
             own = np.full(block.time.size, float(block.trajectory))
@@ -74,16 +74,16 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
     writer.write_dataset(f"{name}/factors", accumulator.get_factors() if known is None else known)
 
 
-def _iterate_blocks(sample_set: SampleSet, known: FloatArray | None) -> Iterator[Block]:
+def _iterate_blocks(sample_set: SampleSet, known_torques: FloatArray | None) -> Iterator[Block]:
     """Yield the samples, without observation matrices if these are neither kept nor needed."""
-    if isinstance(sample_set, JoinedSet) and known is not None:
-        _, n_dof, k, _ = known.shape
-        if _is_matrix_left_out(sample_set, n_dof, k - 1):
+    if isinstance(sample_set, JoinedSet) and known_torques is not None:
+        _, n_dof, k, _ = known_torques.shape
+        if _is_matrix_omitted(sample_set, n_dof, k - 1):
             return sample_set.iterate_states()
     return sample_set.iterate_blocks()
 
 
-def _is_matrix_left_out(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
+def _is_matrix_omitted(sample_set: SampleSet, n_dof: int, n_parameters: int) -> bool:
     """Return whether the observation matrix is not kept."""
     return sample_set.recomputable and sample_set.n_samples * n_dof * n_parameters > _MOST_KEPT
 
@@ -113,18 +113,18 @@ class StoredSet:
         path: The file.
         name: Of its group.
         n_parameters: Columns that W must have.
-        own: Whether the project wrote the file, so that its triangular factors can be trusted.
+        owns_file: Whether the project wrote the file, so that its triangular factors can be trusted.
 
     Raises:
         ArtifactError: W and tau do not fit each other, or hold numbers that are not finite.
     """
 
-    def __init__(self, path: Path, name: str, n_parameters: int, *, own: bool) -> None:
-        self._path, self._name, self._own = path, name, own
+    def __init__(self, path: Path, name: str, n_parameters: int, *, owns_file: bool) -> None:
+        self._path, self._name, self._own = path, name, owns_file
         self._n_parameters = n_parameters
         with open_reader(path) as reader:
             tau = reader.open_rows(f"{name}/tau")
-            self.recomputable = own and f"{name}/{_LEFT_OUT}" in reader
+            self.recomputable = owns_file and f"{name}/{_LEFT_OUT}" in reader
             self._check_matrix(_read_matrix_shape(reader, name), tau.shape, n_parameters)
             self.n_samples, self.n_dof = tau.shape
             present = [key for key in ("z", "dz", "ddz") if f"{name}/{key}" in reader]
@@ -279,7 +279,7 @@ def load_samples(reader: Reader) -> Samples:
 
     def stored(name: str) -> SampleSet | None:
         if f"{name}/W" in reader or f"{name}/{_LEFT_OUT}" in reader:
-            return StoredSet(reader.path, name, n, own=own)
+            return StoredSet(reader.path, name, n, owns_file=own)
         return None
 
     estimation = stored("estimation")
@@ -304,7 +304,7 @@ def load_samples(reader: Reader) -> Samples:
 
 def load_item_set(reader: Reader, name: str) -> StoredSet:
     """Return a set that the project wrote by itself."""
-    return StoredSet(reader.path, name, _read_matrix_shape(reader, name)[1], own=True)
+    return StoredSet(reader.path, name, _read_matrix_shape(reader, name)[1], owns_file=True)
 
 
 def _read_matrix_shape(reader: Reader, name: str) -> tuple[int, ...]:

@@ -92,7 +92,7 @@ class Store:
             return False
         return True
 
-    def refuse_to_replace(self, record: type, robot: str) -> None:
+    def reject_replacement(self, record: type, robot: str) -> None:
         """Keep what is not this robot's from being overwritten.
 
         A damaged artifact may be replaced; a file of another robot, or one that paramreduce did

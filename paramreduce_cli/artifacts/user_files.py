@@ -137,6 +137,7 @@ def _check_time(path: Path, time: FloatArray) -> None:
 
 
 def _read_hdf5_arrays(reader: Reader) -> dict[str, FloatArray]:
+    """Return the states, torques and times that the file holds."""
     names = ("z", "dz", "ddz", "tau", "time")
     return {name: reader.read_array(name).astype(float) for name in names if name in reader}
 

@@ -35,14 +35,14 @@ class ExampleCommand(click.Command):
         self._example, self._robot = example, Path(config).stem
         self.help = f"{inspect.cleandoc(self.help or '')}\n\nExample: {self._fill({})}"
 
-    def _fill(self, found: dict[str, str]) -> str:
+    def _fill(self, values: dict[str, str]) -> str:
         """Return the example with what is found, and with the robot of the help for the rest."""
         names = {
             "config": f"configs/{self._robot}.yaml",
             "results": f"results/{self._robot}",
             "results_2": "results/my_run",
         }
-        return f"paramreduce {self._example.format(**names | found)}"
+        return f"paramreduce {self._example.format(**names | values)}"
 
     def show_example(self, words: Sequence[str]) -> str:
         """Return the example with what is in this folder, or with what to do first; empty where too little is here.

@@ -32,7 +32,7 @@ def compile_loops() -> None:
 
 
 def _search_examples() -> dict[str, Callable[[], None]]:
-    return {"proofs": _prove_best_subsets, "terms": _leave_out_terms}
+    return {"proofs": _prove_best_subsets, "terms": _prune_terms}
 
 
 def _compile(examples: dict[str, Callable[[], None]], name: str) -> None:
@@ -55,7 +55,7 @@ def _prove_best_subsets() -> None:
     Search(normalise_problem(problem), 3, 1.0, BEGINNING).advance(10)
 
 
-def _leave_out_terms() -> None:
+def _prune_terms() -> None:
     """Run the small arm as far as its functions without terms; their operations are counted on the way."""
     from paramreduce_cli.config import load_config
     from paramreduce_cli.config.examples import list_examples

@@ -27,7 +27,7 @@ from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.config.loading import has_robot, load_settings
 from paramreduce_cli.errors import MissingConfigError
 from paramreduce_cli.records import WHOLE, Identification, MeasuredLog, Part, Validation
-from paramreduce_cli.running.pipeline import Stage, check_is_asked_for, describe_stage
+from paramreduce_cli.running.pipeline import Stage, check_is_part, describe_stage
 from paramreduce_cli.running.runner import Outcome, Runner, format_arguments
 from paramreduce_cli.stages import stages
 
@@ -61,7 +61,7 @@ def make_stage_command(name: str) -> click.Command:
         lock = "" if part is None else f"-{stage.name}-{part.number}-{part.count}"
         with placed, store.lock(lock, wait=wait), show_progress(stage.name, quiet) as progress:
             if loaded is not None:
-                check_is_asked_for(stage, loaded)
+                check_is_part(stage, loaded)
             runner = Runner(
                 loaded,
                 store,

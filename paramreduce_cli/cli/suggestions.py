@@ -43,14 +43,14 @@ class UnknownCommandError(click.UsageError):
 
     Args:
         name: Name that was typed.
-        known: Names of the commands.
+        commands: Names of the commands.
         context: Context of the program.
     """
 
-    def __init__(self, name: str, known: Sequence[str], context: click.Context) -> None:
+    def __init__(self, name: str, commands: Sequence[str], context: click.Context) -> None:
         self.name = name
         wanted = name.lower().replace("_", "-")
-        near = difflib.get_close_matches(wanted, known, n=1, cutoff=_LIKE_COMMAND)
+        near = difflib.get_close_matches(wanted, commands, n=1, cutoff=_LIKE_COMMAND)
         hint = "`paramreduce --help` lists them."
         if wanted in ("version", "help"):
             hint = f"see `paramreduce --{wanted}`."
@@ -161,11 +161,11 @@ def _replace_by_other_kind(word: str, words: list[str]) -> list[str] | None:
     if word == words[0]:
         return None if config is None or len(words) > 1 else ["run", str(config)]
     if words[0] in (*stages, *_OF_CONFIGS):
-        return None if config is None else _exchange_word(words, word, str(config))
+        return None if config is None else _replace_word(words, word, str(config))
     if words[0] not in _OF_RESULTS:
         return None
     if results is not None and results.resolve() != Path(word).resolve():
-        return _exchange_word(words, word, str(results))
+        return _replace_word(words, word, str(results))
     return None if config is None else ["run", str(config)]
 
 
@@ -175,7 +175,7 @@ def _correct_robot_name(word: str, words: list[str]) -> list[str] | None:
         return None
     here = {path.stem: path for path in list_configs(Path())}
     near = difflib.get_close_matches(word, here, n=1, cutoff=_LIKE_ROBOT)
-    return _exchange_word(words, word, str(here[near[0]])) if near else None
+    return _replace_word(words, word, str(here[near[0]])) if near else None
 
 
 def _suggest_example(word: str) -> str:
@@ -189,11 +189,11 @@ def _suggest_example(word: str) -> str:
 def _correct_call(error: ParamreduceError, words: list[str]) -> list[str] | None:
     """Return the call with a choice or an option of the error; None where the error has none."""
     if error.choices:
-        return _exchange_word(
+        return _replace_word(
             words, error.rejected, find_nearest_choice(error.rejected, error.choices)
         )
     if error.options:
-        return _exchange_word(words, error.rejected, error.options[-1]) or [*words, *error.options]
+        return _replace_word(words, error.rejected, error.options[-1]) or [*words, *error.options]
     if error.rejected.startswith("results/") and (config := guess_config(error.rejected)):
         return ["run", str(config)]
     return words if isinstance(error, ConfigError) and error.in_file else None
@@ -236,13 +236,13 @@ def _limit_to_range(choice: str, number: str) -> str:
     return f"{name}:{min(known, key=lambda one: abs(one - wanted))}"
 
 
-def _exchange_word(words: Sequence[str], one: str, other: str) -> list[str] | None:
+def _replace_word(words: Sequence[str], old: str, new: str) -> list[str] | None:
     """Return the words with another word, or another value after ``--option=``; None where it is not there."""
     changed = []
     for word in words:
         option, equals, value = word.partition("=")
-        joined = word.startswith("--") and equals and value == one
-        changed.append(f"{option}={other}" if joined else other if word == one else word)
+        joined = word.startswith("--") and equals and value == old
+        changed.append(f"{option}={new}" if joined else new if word == old else word)
     return changed if changed != list(words) else None
 
 

@@ -289,13 +289,13 @@ class _PacedLines:
     """A printer of progress with one line every ten seconds.
 
     Args:
-        tell: Callback with a step and the seconds that are left for its task, None where that is unknown.
+        print_line: Callback with a step and the seconds that are left for its task, None where that is unknown.
     """
 
     _PAUSE = 10.0
 
-    def __init__(self, tell: Callable[[Progress, float | None], None]) -> None:
-        self._tell = tell
+    def __init__(self, print_line: Callable[[Progress, float | None], None]) -> None:
+        self._tell = print_line
         self._told = time.monotonic()
         self._begun: dict[str, float] = {}
 
@@ -323,11 +323,11 @@ class _Lines:
 
     Args:
         pause: Time between two lines of a task, s.
-        tell: Callback with a step and the seconds that are left, None where that is unknown.
+        print_line: Callback with a step and the seconds that are left, None where that is unknown.
     """
 
-    def __init__(self, pause: float, tell: Callable[[Progress, float | None], None]) -> None:
-        self._pause, self._tell = pause, tell
+    def __init__(self, pause: float, print_line: Callable[[Progress, float | None], None]) -> None:
+        self._pause, self._tell = pause, print_line
         self._begun: dict[str, float] = {}
         self._told: dict[str, float] = {}
 

@@ -46,8 +46,9 @@ def find_warnings(config: Config) -> list[str]:
 
 
 def _check_bodies(config: Config) -> Iterator[Problem]:
+    """Yield problems of names and parents of bodies."""
     bodies = config.description.bodies
-    path: Key = ("description", config.description.way, bodies.ROWS)
+    path: Key = ("description", config.description.kind, bodies.ROWS)
     names = bodies.list_body_names()
     seen: set[str] = set()
     for k, (name, parent) in enumerate(zip(names, bodies.list_parents(), strict=True)):
@@ -65,6 +66,7 @@ def _check_bodies(config: Config) -> Iterator[Problem]:
 
 
 def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
+    """Yield problems of payloads and drives."""
     bodies = config.description.bodies
     for key, message in payloads.find_payload_problems(config.payloads, bodies.list_body_names()):
         yield ("payloads", *key), message
@@ -73,6 +75,7 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
 
 
 def _check_tracking(config: Config) -> Iterator[Problem]:
+    """Yield problems of the simulated control."""
     if config.report.tracking is not None and config.unmeasured:
         yield ("report", "tracking"), "needs the torques of all joints; leave it out"
     if config.report.tracking is not None and config.description.bodies.closed:
@@ -84,10 +87,11 @@ def _check_tracking(config: Config) -> Iterator[Problem]:
 
 def _check_description(config: Config) -> Iterator[Problem]:
     for key, message in config.description.bodies.find_problems():
-        yield ("description", config.description.way, *key), message
+        yield ("description", config.description.kind, *key), message
 
 
 def _check_constraints(config: Config) -> Iterator[Problem]:
+    """Yield problems of constraints on trajectories."""
     description = config.description
     bodies = ["base", *description.bodies.list_body_names()]
     coordinates = description.bodies.list_coordinates()
@@ -118,6 +122,7 @@ def _list_parameters(config: Config) -> list[str]:
 
 
 def _check_groups(config: Config) -> Iterator[Problem]:
+    """Yield problems of groups of parameters."""
     known = _list_parameters(config)
     owner: dict[str, str] = {}
     for k, entry in enumerate(config.reduction.groups):
@@ -145,6 +150,7 @@ def _check_groups(config: Config) -> Iterator[Problem]:
 
 
 def _check_symmetries(config: Config) -> Iterator[Problem]:
+    """Yield problems of symmetries."""
     names = config.description.bodies.list_independent_coordinates()
     for k, images in enumerate(config.sampling.symmetries):
         if sorted(name.removeprefix("-") for name in images) != sorted(names):
@@ -157,6 +163,7 @@ def _check_symmetries(config: Config) -> Iterator[Problem]:
 
 
 def _check_simulation(config: Config) -> Iterator[Problem]:
+    """Yield problems of the simulation."""
     wanted = config.sampling.simulation
     if wanted is None:
         return
@@ -187,6 +194,7 @@ def _check_inertia(config: Config) -> Iterator[Problem]:
 
 
 def _check_parameter_sets(config: Config) -> Iterator[Problem]:
+    """Yield problems of sets of parameters."""
     names = config.description.bodies.list_inertial_bodies()
     for label, bodies in config.parameter_sets.items():
         for body in bodies:
@@ -206,6 +214,7 @@ def _check_parameter_sets(config: Config) -> Iterator[Problem]:
 
 
 def _check_per_joint(config: Config) -> Iterator[Problem]:
+    """Yield problems of lists with one value per joint."""
     n = config.n_dof
     for path, unit in PER_JOINT.items():
         values = read_per_joint(config, path)
@@ -225,6 +234,7 @@ def _name_coordinates(config: Config) -> str:
 
 
 def _check_limits(config: Config) -> Iterator[Problem]:
+    """Yield problems of position limits."""
     for k, (lower, upper) in enumerate(config.trajectories.position_limits):
         path: Key = ("trajectories", "position_limits")
         if len(config.trajectories.position_limits) > 1:
@@ -272,6 +282,7 @@ def _check_acceptance(config: Config) -> Iterator[Problem]:
 
 
 def _check_unmeasured(config: Config) -> Iterator[Problem]:
+    """Yield problems of joints whose torque is not measured."""
     names = config.description.bodies.list_independent_coordinates()
     for k, name in enumerate(config.unmeasured):
         if name not in names:
@@ -291,6 +302,7 @@ def _check_unmeasured(config: Config) -> Iterator[Problem]:
 
 
 def _check_base_columns(config: Config) -> Iterator[Problem]:
+    """Yield problems of the columns that are chosen as base parameters."""
     known = _list_parameters(config)
     for k, name in enumerate(config.model.base_columns or []):
         if name not in known:
@@ -300,6 +312,7 @@ def _check_base_columns(config: Config) -> Iterator[Problem]:
 
 
 def _check_selection(config: Config) -> Iterator[Problem]:
+    """Yield problems of heuristics and of the selected model."""
     total = len(config.list_parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:

@@ -110,9 +110,9 @@ def _choose_time(times: Sequence[str], positions: str | list[str]) -> str:
     return max(times, key=lambda time: _count_common_characters(time, name))
 
 
-def _count_common_characters(one: str, other: str) -> int:
+def _count_common_characters(first: str, other: str) -> int:
     """Return the number of leading characters that two names share."""
-    pairs = zip(one, other, strict=False)
+    pairs = zip(first, other, strict=False)
     return sum(1 for _ in itertools.takewhile(lambda pair: pair[0] == pair[1], pairs))
 
 
@@ -179,10 +179,10 @@ def match_joint_names(
     return [found[0] for found in partial.values()]
 
 
-def _check_unambiguous(found: Mapping[str, Sequence[str]]) -> None:
+def _check_unambiguous(matches: Mapping[str, Sequence[str]]) -> None:
     """Raise ConfigError where several columns fit a joint, or one column several joints."""
-    for joint, candidates in found.items():
-        rivals = [other for other in found if other != joint and found[other] == candidates]
+    for joint, candidates in matches.items():
+        rivals = [other for other in matches if other != joint and matches[other] == candidates]
         if len(candidates) > 1:
             raise ConfigError(
                 f"several columns may be of the joint {joint}: {', '.join(candidates[:_MOST_SHOWN])}. {_BY_HAND}"
@@ -222,7 +222,7 @@ def _match_partly(
     return found
 
 
-def _keep_likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
+def _keep_likeliest(matches: Sequence[str], words: Sequence[str]) -> list[str]:
     """Keep the columns with the likeliest word; commanded values count if nothing was measured."""
 
     def rank(name: str) -> int:
@@ -231,8 +231,8 @@ def _keep_likeliest(found: Sequence[str], words: Sequence[str]) -> list[str]:
         first = min((k for k, word in enumerate(words) if word in whole), default=len(words))
         return first + len(words) * (not tokens.isdisjoint(_WANTED_ONLY))
 
-    ranks = [rank(name) for name in found]
-    return [name for name, place in zip(found, ranks, strict=True) if place == min(ranks)]
+    ranks = [rank(name) for name in matches]
+    return [name for name, place in zip(matches, ranks, strict=True) if place == min(ranks)]
 
 
 def _split_name(name: str) -> list[str]:

@@ -270,6 +270,7 @@ def _find_all_problems(data: dict[str, Any]) -> tuple[Config | None, list[Proble
 
 
 def _parse_config(data: dict[str, Any], constants: dict[str, float]) -> Config:
+    """Return the config of YAML data, with the constants already evaluated."""
     if isinstance(data.get("constants"), dict):
         data = {**data, "constants": constants}
     return Config.model_validate(data, context={"constants": constants})
@@ -290,6 +291,7 @@ def _merge_by_key(problems: list[Problem]) -> list[Problem]:
 
 
 def _is_ancestor_or_descendant(a: Key, b: Key) -> bool:
+    """Return whether one of two keys lies within the other."""
     short = min(len(a), len(b))
     return a[:short] == b[:short]
 

@@ -133,7 +133,7 @@ class LogSection(Section):
         return SignsSection(motion=self.signs, torque=self.signs)
 
     @property
-    def held_out_share(self) -> float:
+    def held_out_fraction(self) -> float:
         """Share of every file that is held out; zero where other files are."""
         return 0.0 if isinstance(self.held_out, list) else self.held_out
 

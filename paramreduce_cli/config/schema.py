@@ -148,6 +148,7 @@ class InputSection(Section):
 
     @model_validator(mode="after")
     def _check_amplitude(self) -> InputSection:
+        """Raise ValueError unless amplitude and frequencies are given together."""
         if bool(self.amplitude) != bool(self.frequencies):
             raise ValueError("amplitude and frequencies belong together; one of them does nothing")
         return self
@@ -225,7 +226,8 @@ class GroupSection(Section):
     """Whether they share one value, which then counts as one parameter; otherwise each has its own."""
 
     @model_validator(mode="after")
-    def _check_one_way(self) -> GroupSection:
+    def _check_members(self) -> GroupSection:
+        """Raise ValueError unless either bodies or parameters are given."""
         if (self.bodies is None) == (self.parameters is None):
             raise ValueError("give bodies or parameters, one of them")
         return self

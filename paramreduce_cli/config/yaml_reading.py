@@ -96,16 +96,16 @@ def _check_depth(text: str) -> None:
             raise yaml.YAMLError(_TOO_DEEP)
 
 
-def _count_values(node: yaml.Node, known: dict[int, int], depth: int) -> int:
+def _count_values(node: yaml.Node, counts: dict[int, int], depth: int) -> int:
     """Return the number of values in a node, counting aliases as often as they repeat; each node is visited once."""
     if depth > _DEEPEST:
         raise yaml.YAMLError(_TOO_DEEP)
-    if id(node) not in known:
+    if id(node) not in counts:
         inner = node.value if isinstance(node, yaml.CollectionNode) else []
         if isinstance(node, yaml.MappingNode):
             inner = [part for pair in node.value for part in pair]
-        known[id(node)] = 1 + sum(_count_values(part, known, depth + 1) for part in inner)
-    return known[id(node)]
+        counts[id(node)] = 1 + sum(_count_values(part, counts, depth + 1) for part in inner)
+    return counts[id(node)]
 
 
 def _build_data(loader: yaml.SafeLoader, node: yaml.Node, path: Key, document: Document) -> Any:

@@ -16,7 +16,7 @@ from paramreduce_cli.excitation.criteria import Criterion
 from paramreduce_cli.excitation.fourier import FourierBasis
 from paramreduce_cli.excitation.limits import LimitMap
 from paramreduce_cli.excitation.scalings import Scaling, scalings
-from paramreduce_cli.excitation.torque_constraints import Loads
+from paramreduce_cli.excitation.torque_constraints import TorqueConstraints
 from paramreduce_cli.multibody.dynamics import ObservationFunction
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.loops.follower import Follower
@@ -65,7 +65,7 @@ class Excitation:
     """What rows of each joint are divided by, (n_dof,), N m or N."""
     criterion: Criterion
     scaling: Scaling
-    loads: Loads
+    loads: TorqueConstraints
     """Limits of torque and power."""
 
     def weigh_rows(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
@@ -116,10 +116,12 @@ class Excitation:
             if np.isinf(load):
                 return np.inf, np.full_like(coefficients, np.nan)
             value += load
-            torque_bar, load_dz_bar = self.loads.pull_back(torques, rates[0], bar)
+            torque_bar, load_dz_bar = self.loads.compute_vector_jacobian_product(
+                torques, rates[0], bar
+            )
             W_bar += np.outer(torque_bar, self.loads.values)
         W_bar *= weights
-        z_bar, dz_bar, ddz_bar = self.observation.pull_back(q, *rates, W_bar)
+        z_bar, dz_bar, ddz_bar = self.observation.compute_vector_jacobian_product(q, *rates, W_bar)
         dz_bar = dz_bar + load_dz_bar
         gradient = (
             z_bar.T @ basis.position + dz_bar.T @ basis.velocity + ddz_bar.T @ basis.acceleration
@@ -143,7 +145,7 @@ class Excitation:
         z_bar = np.einsum("kc,kcj->kj", slopes, self.quantities.compute_jacobian(q))
         return value, z_bar.T @ basis.position
 
-    def compute_load_share(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
+    def compute_load_ratio(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> float:
         """Return the largest share of a torque or power limit that a motion uses, zero without limits."""
         if not self.loads.limited:
             return 0.0

@@ -27,7 +27,7 @@ def find_resting_position(
     excitation: Excitation,
     limits: JointLimits,
     margin: float = 1.0,
-    wanted: FloatArray | None = None,
+    preferred: FloatArray | None = None,
 ) -> FloatArray:
     """Return independent coordinates inside all limits and bounds, (n_dof,): the middle of the limits, or the assembly,
     or what a search from there finds.
@@ -36,14 +36,14 @@ def find_resting_position(
         excitation: Excitation with the bounds.
         limits: Limits of the independent coordinates.
         margin: Fraction of the limits that may be used.
-        wanted: Coordinates from which to search first, (n_dof,).
+        preferred: Coordinates from which to search first, (n_dof,).
 
     Raises:
         NumericalError: There is none to be found; says which bound stands in the way.
     """
     mechanism = excitation.coordinates.mechanism
     middle, reach = limits.middle, _INSET * margin * limits.reach
-    tried = [middle] if wanted is None else [np.clip(wanted, middle - reach, middle + reach)]
+    tried = [middle] if preferred is None else [np.clip(preferred, middle - reach, middle + reach)]
     if mechanism.loops is not None:
         home = mechanism.loops.assembly[list(mechanism.independent)]
         tried.append(np.clip(home, middle - reach, middle + reach))
@@ -133,11 +133,11 @@ def shrink_inside_bounds(
     still = np.zeros_like(coefficients)
     still[:, 0] = rest
 
-    def drawn(share: float) -> FloatArray:
-        return still + share * (coefficients - still)
+    def drawn(fraction: float) -> FloatArray:
+        return still + fraction * (coefficients - still)
 
-    def inside(share: float) -> bool:
-        z, dz, ddz = basis.evaluate(drawn(share))
+    def inside(fraction: float) -> bool:
+        z, dz, ddz = basis.evaluate(drawn(fraction))
         positions = Follower(excitation.coordinates)
         if excitation.find_worst_bound(z, positions).excess > 0:
             return False
@@ -146,7 +146,7 @@ def shrink_inside_bounds(
             excitation.coordinates.check_motion(basis.time, q)
         except DataError:
             return False
-        return excitation.compute_load_share(q, dz, ddz) <= 1
+        return excitation.compute_load_ratio(q, dz, ddz) <= 1
 
     if inside(1.0):
         return coefficients

@@ -61,14 +61,14 @@ class LimitMap:
         accelerations = _divide_by_limits(basis.acceleration, limits.acceleration * self.margin)
         self._rates = np.concatenate([speeds, accelerations], axis=1)
 
-    def compute_shares(self, free: FloatArray) -> FloatArray:
+    def compute_ratios(self, free: FloatArray) -> FloatArray:
         """Return the largest share of a limit that each joint's motion uses on the grid, (n_dof,)."""
         up, down, rate = self._compute_extremes(free[:, 1:] @ self._projection)
         return np.maximum((up + down) / 2, rate)
 
     def scale_to_limits(self, free: FloatArray) -> FloatArray:
         """Return the series scaled so that its motion reaches a limit exactly, or stays inside for the ball mapping."""
-        share = self.compute_shares(free)
+        share = self.compute_ratios(free)
         if self._mapping == "ball":
             share = np.maximum(share, 1.0)
         harmonics = free[:, 1:] @ self._projection / share[:, None]
@@ -150,8 +150,9 @@ def _divide_by_limits(motion: FloatArray, limits: FloatArray) -> FloatArray:
     return shares
 
 
-def _apply_map(shares: FloatArray, harmonics: FloatArray) -> FloatArray:
-    used: FloatArray = (shares @ harmonics[:, :, None])[:, :, 0]
+def _apply_map(coefficients: FloatArray, harmonics: FloatArray) -> FloatArray:
+    """Return the harmonics as seen through linear maps of the joints."""
+    used: FloatArray = (coefficients @ harmonics[:, :, None])[:, :, 0]
     return used
 
 
@@ -166,13 +167,13 @@ def _squash(offset: FloatArray) -> FloatArray:
 
 
 def _compute_smooth_maximum(
-    used: FloatArray, shares: FloatArray, norm: float, signs: FloatArray | float = 1.0
+    used: FloatArray, fractions: FloatArray, norm: float, signs: FloatArray | float = 1.0
 ) -> tuple[FloatArray, FloatArray]:
     """Return the norm of each row of ``used``, (n_dof,), and its derivative by the harmonics.
 
     Args:
         used: Magnitudes, (n_dof, n_points).
-        shares: Harmonics to what ``used`` is the magnitude of, (n_dof, n_points, 2 harmonics).
+        fractions: Harmonics to what ``used`` is the magnitude of, (n_dof, n_points, 2 harmonics).
         norm: The exponent.
         signs: Of what ``used`` is the magnitude of.
     """
@@ -181,4 +182,4 @@ def _compute_smooth_maximum(
     power = ratio ** (norm - 1)
     total = np.sum(power * ratio, axis=1, keepdims=True)
     weight = signs * power * total ** (1 / norm - 1)
-    return (largest * total ** (1 / norm))[:, 0], (weight[:, None, :] @ shares)[:, 0, :]
+    return (largest * total ** (1 / norm))[:, 0], (weight[:, None, :] @ fractions)[:, 0, :]

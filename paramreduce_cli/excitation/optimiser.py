@@ -112,9 +112,9 @@ class TrajectorySettings:
     scaling: str
     """Name of the scaling whose condition number is reported first."""
 
-    def count_candidates(self, share: float) -> int:
+    def count_candidates(self, fraction: float) -> int:
         """Return the number of candidates that take a step with this share."""
-        return self.polished + round(share * (self.starts - self.polished))
+        return self.polished + round(fraction * (self.starts - self.polished))
 
     def build_basis(self, finer: int = 1) -> FourierBasis:
         """Return the basis of the series on the grid, or on a grid that is so many times finer."""
@@ -245,9 +245,9 @@ class _Search:
         limits = self._limits
         free = rng.normal(size=(limits.n_dof, limits.n_columns))
         if not self._bounded:  # on a scale of its own for every joint
-            free[:, 1:] /= limits.compute_shares(free)[:, None]
+            free[:, 1:] /= limits.compute_ratios(free)[:, None]
             return free
-        free[:, 1:] /= limits.compute_shares(self._mixing @ free).max()
+        free[:, 1:] /= limits.compute_ratios(self._mixing @ free).max()
         still = np.zeros_like(free)
         still[:, 0] = np.linalg.solve(self._mixing, limits.compute_resting_offset(self._rest))
         return shrink_to_feasible(

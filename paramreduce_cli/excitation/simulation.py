@@ -42,7 +42,7 @@ class Input:
     """rad or m"""
 
     def __call__(self, time: float, z: float, dz: float) -> float:
-        """The force at a time and a state."""
+        """Return the force at a time and a state."""
         sines = sum(
             np.sin(2 * np.pi * frequency * time + phase)
             for frequency, phase in zip(self.frequencies, self.phases, strict=True)

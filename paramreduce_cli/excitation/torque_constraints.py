@@ -8,7 +8,7 @@ from paramreduce_cli.records import FloatArray
 
 
 @dataclass(frozen=True)
-class Loads:
+class TorqueConstraints:
     """The limits of torque and power as rows that are at most zero where the limits are kept.
 
     Attributes:
@@ -39,7 +39,7 @@ class Loads:
         power = scaled * dz * self._per_power
         return np.column_stack([share, power]) ** 2 - 1
 
-    def pull_back(
+    def compute_vector_jacobian_product(
         self, scaled: FloatArray, dz: FloatArray, bar: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives by scaled torques and by speeds, from the derivatives by the rows."""

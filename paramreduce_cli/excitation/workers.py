@@ -16,7 +16,7 @@ from paramreduce_cli.excitation.criteria import criteria
 from paramreduce_cli.excitation.excitation_objective import Excitation
 from paramreduce_cli.excitation.optimiser import TrajectorySettings, optimise_trajectory
 from paramreduce_cli.excitation.scalings import scalings
-from paramreduce_cli.excitation.torque_constraints import Loads
+from paramreduce_cli.excitation.torque_constraints import TorqueConstraints
 from paramreduce_cli.multibody.drive_dynamics import smooth_friction
 from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
@@ -72,7 +72,7 @@ def build_excitation(task: ExcitationTask) -> Excitation:
         torque_scale=task.torque_scale,
         criterion=criteria[task.criterion],
         scaling=scalings[task.settings.scaling],
-        loads=Loads(
+        loads=TorqueConstraints(
             task.base_values, settings.limits.torque, settings.limits.power, task.torque_scale
         ),
     )

@@ -26,8 +26,8 @@ from paramreduce_cli.records import (
     Mechanism,
     Model,
     Progress,
+    ProgressCallback,
     ReducedModel,
-    Tell,
     TermModel,
     Validation,
 )
@@ -71,7 +71,7 @@ def make_exported_model(
     origin: str = "",
     simplified: TermModel | None = None,
     validation: Validation | None = None,
-    tell: Tell = lambda _: None,
+    report_progress: ProgressCallback = lambda _: None,
 ) -> ExportedModel:
     """Return a model for :data:`paramreduce_cli.export.languages.languages` to write, its functions checked.
 
@@ -86,18 +86,18 @@ def make_exported_model(
         simplified: The function that is asked for with terms left out, whose parameters are those of
             the model.
         validation: Says in which ranges the model was validated; None where it was not.
-        tell: Told of its steps.
+        report_progress: Told of its steps.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.
     """
     mechanism = model.mechanism
-    tell(Progress(_TASK, 0, 2, "functions"))
+    report_progress(Progress(_TASK, 0, 2, "functions"))
     functions = make_functions(model, chosen, what, constant=constant, simplified=simplified)
     closures: tuple[Function, ...] = ()
     if mechanism.loops is not None:
         closures = tuple(LeanFunctions(model, chosen, constant=constant).make_closures())
-    tell(Progress(_TASK, 1, 2, "checks"))
+    report_progress(Progress(_TASK, 1, 2, "checks"))
     rng = np.random.default_rng(0)
     checked = make_random_cases(mechanism, chosen, _CHECKED, rng, simplified)
     least = estimate_term_sizes(mechanism, chosen, checked)
@@ -120,7 +120,7 @@ def make_exported_model(
     if mechanism.loops is not None:
         used |= _LOOPS
     stored = make_random_cases(mechanism, chosen, _CASES, rng, simplified)
-    tell(Progress(_TASK, 2, 2))
+    report_progress(Progress(_TASK, 2, 2))
     return ExportedModel(
         robot=mechanism.robot,
         heading=(f"{mechanism.robot}: {title}.", *worth, *_describe_origin(mechanism, origin)),

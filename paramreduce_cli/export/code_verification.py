@@ -8,7 +8,7 @@ import numpy as np
 from paramreduce_cli.export.term_sizes import find_entry_sizes
 from paramreduce_cli.expressions.functions import Function
 from paramreduce_cli.expressions.programs import Program
-from paramreduce_cli.lean.lean_verification import TOLERANCE, refuse_if_off
+from paramreduce_cli.lean.lean_verification import TOLERANCE, reject_if_wrong
 from paramreduce_cli.multibody.dynamics import SINGULAR_MASS, Dynamics
 from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.multibody.random_states import draw_states
@@ -123,7 +123,9 @@ def check(
         for name, got in _evaluate_function(function, stored).items():
             wanted = stored[name].reshape(got.shape)
             sizes = find_entry_sizes(name, wanted, least[name])
-            refuse_if_off(f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance)
+            reject_if_wrong(
+                f"{function.name}: {name}", (got - wanted) / sizes, np.ones(1), tolerance
+            )
 
 
 def check_against_mechanism(
@@ -142,7 +144,7 @@ def check_against_mechanism(
     plain = Dynamics(model.mechanism, once=True)
     wanted = plain.compute_torques(stored["q"], stored["dq"], stored["ddq"], model.values)
     off = (stored["tau"] - wanted) / find_entry_sizes("tau", wanted, least["tau"])
-    refuse_if_off("the full model", off, np.ones(1))
+    reject_if_wrong("the full model", off, np.ones(1))
 
 
 def measure_single_precision(
@@ -192,7 +194,7 @@ def check_closures(
         ("closure_jacobian", along + values["Phi_z"], "Phi_z", along),
         ("closure_bias", drift - values["gamma"], "gamma", drift),
     ):
-        refuse_if_off(what, off / find_entry_sizes(name, against, least[name]), np.ones(1))
+        reject_if_wrong(what, off / find_entry_sizes(name, against, least[name]), np.ones(1))
 
 
 def _evaluate_function(

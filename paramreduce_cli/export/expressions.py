@@ -23,7 +23,7 @@ class Language:
 
     def write_leaves(self, function: Function) -> dict[int, str]:
         """Return the texts of constants and inputs, by node."""
-        places = function.list_places(function.arguments)
+        places = function.list_positions(function.arguments)
         names = {}
         for number, node in enumerate(function.program.nodes):
             if node.operation == "constant":

@@ -106,17 +106,17 @@ def _make_identified_model(
     return make_full_model(replace(model, values=consistency.standard)), worth
 
 
-def find_pruned_model(found: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:
+def find_pruned_model(terms: TermReduction, name: str) -> tuple[ReducedModel, TermModel, str]:
     """Return the parameters of a function with pruned terms, the function and its title.
 
     Args:
-        found: Result of the search of terms.
+        terms: Result of the search of terms.
         name: ``inverse`` or ``direct``.
 
     Raises:
         ConfigError: It was not simplified.
     """
-    term = found.functions.get(name)
+    term = terms.functions.get(name)
     if term is None:
         raise ConfigError(
             f"--model {TERMS}: terms.h5 has no {name} dynamics; it has to stand under terms.functions, and "
@@ -125,9 +125,9 @@ def find_pruned_model(found: TermReduction, name: str) -> tuple[ReducedModel, Te
         )
     errors = [term.torque_error.estimation, term.torque_error.validation]
     known = " / ".join(format_percent(error) for error in errors if error == error)
-    allowed = format_percent(found.torque_budget)
-    if name == "direct" and found.acceleration_budget < float("inf"):
-        allowed += f", of accelerations {format_percent(found.acceleration_budget)}"
+    allowed = format_percent(terms.torque_budget)
+    if name == "direct" and terms.acceleration_budget < float("inf"):
+        allowed += f", of accelerations {format_percent(terms.acceleration_budget)}"
     title = (
         f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation), allowed {allowed}"

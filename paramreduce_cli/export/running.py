@@ -68,13 +68,13 @@ class RunningModel:
         """Language that the functions run in."""
         return "C" if self._library is not None else "Python"
 
-    def __call__(self, *states: FloatArray, rounds: int = 1) -> FloatArray:
+    def __call__(self, *states: FloatArray, repetitions: int = 1) -> FloatArray:
         """Results for some states, (n_states, n): torques, or mass matrices row by row and then delta.
 
         Args:
             states: What it takes: q, dq and ddq, (n_states, n_q) each, and with loops R, (n_states, n_q - n_dof, n_dof),
                 and b, (n_states, n_q - n_dof).
-            rounds: How often the same is done.
+            repetitions: How often the same is done.
         """
         count = len(states[0])
         arrays = [np.ascontiguousarray(x).reshape(count, -1) for x in states]
@@ -84,7 +84,7 @@ class RunningModel:
             return np.column_stack(self._function.program.evaluate(inputs))
         results = [np.empty((count, result.size)) for result in self._function.results]
         self._library.repeated(
-            ctypes.c_long(rounds),
+            ctypes.c_long(repetitions),
             ctypes.c_long(count),
             ctypes.c_void_p(self._phi.ctypes.data),
             *(
@@ -97,10 +97,10 @@ class RunningModel:
     def measure_time(self, *states: FloatArray) -> float:
         """Return the mean time of one evaluation over some states, s."""
         self(*states)
-        rounds = _ROUNDS if self._library is not None else 1
+        repetitions = _ROUNDS if self._library is not None else 1
         started = time.perf_counter()
-        self(*states, rounds=rounds)
-        return (time.perf_counter() - started) / rounds / len(states[0])
+        self(*states, repetitions=repetitions)
+        return (time.perf_counter() - started) / repetitions / len(states[0])
 
 
 def measure_speeds(models: Mapping[str, RunningModel], states: Mapping[str, FloatArray]) -> Speed:

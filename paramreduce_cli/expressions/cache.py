@@ -33,7 +33,7 @@ def find_cache_folder() -> Path:
     something there that would be run.
     """
     try:
-        folder = _get_wanted_folder()
+        folder = _get_preferred_folder()
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         found = folder.stat()
     except (OSError, RuntimeError) as error:  # the latter where there is no home
@@ -79,7 +79,7 @@ def identify_machine() -> str:
     return "\n".join([platform.system(), platform.machine(), *platform.libc_ver(), able])
 
 
-def _get_wanted_folder() -> Path:
+def _get_preferred_folder() -> Path:
     """Return the folder that the environment asks for."""
     named = os.environ.get("PARAMREDUCE_CACHE")
     if named:

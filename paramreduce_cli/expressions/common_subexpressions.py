@@ -30,7 +30,7 @@ from paramreduce_cli.records import IntArray
 
 
 @within
-def share_pairs(rows: Rows, kind: int) -> None:
+def extract_common_pairs(rows: Rows, kind: int) -> None:
     """Compute the pairs once that rows of a kind have in common."""
     which = SHARE_SUM if kind == SUM else SHARE_PRODUCT
     while True:

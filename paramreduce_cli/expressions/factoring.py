@@ -75,20 +75,20 @@ class Values(NamedTuple):
         return Values(target, _Assembly(self.graph, sums, products, target).build(self.outputs))
 
 
-def minimise_operations(ways: Iterable[Values], dice: int = 0) -> Values:
+def minimise_operations(candidates: Iterable[Values], seed: int = 0) -> Values:
     """Return the values with the fewest operations found.
 
     Args:
-        ways: The same values, written in one or several ways; those that are far behind before they are
+        candidates: The same values, written in one or several ways; those that are far behind before they are
             rewritten are dropped.
-        dice: Where they begin; others may come to another end.
+        seed: Where they begin; others may come to another end.
 
     Returns:
         What takes the fewest operations.
     """
-    apart = [(way, way.to_rows()) for way in ways]
+    apart = [(way, way.to_rows()) for way in candidates]
     for _, rows in apart:
-        rows.counters[DICE] = dice
+        rows.counters[DICE] = seed
     for tries, share in _CLOSE.items():
         for _, rows in apart:
             rewrite(rows, int(tries * _count_places(rows)))
@@ -109,6 +109,7 @@ def _rewrite_fully(rows: Rows) -> None:
 
 
 def _count_places(rows: Rows) -> int:
+    """Return the number of columns that common factors are searched in, fewer for long programs."""
     count = int(rows.counters[COST])
     return min(count, _LONG**2 // max(count, 1))
 
@@ -141,10 +142,12 @@ class _Assembly:
         return self._get_built(values)
 
     def _get_built(self, values: Sequence[int]) -> list[int]:
+        """Return the signed references of rebuilt operands."""
         negate, built = self._target.negate, self._built
         return [negate(built[v >> 1]) if v & 1 else built[v >> 1] for v in values]
 
     def _list_operands(self, number: int) -> Sequence[int]:
+        """Return the operands of a node after rewriting."""
         terms = self._sums.get(number) or self._products.get(number)
         return terms or self._source.nodes[number].operands
 

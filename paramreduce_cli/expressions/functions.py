@@ -41,26 +41,26 @@ class Function:
     results: tuple[Argument, ...]
     program: Program
 
-    def list_places(self, arrays: Sequence[Argument]) -> list[tuple[Argument, int]]:
+    def list_positions(self, arrays: Sequence[Argument]) -> list[tuple[Argument, int]]:
         """Return for every input or output its array and the position in it."""
         return [(array, k) for array in arrays for k in range(array.size)]
 
     def find_used_arguments(self) -> set[str]:
         """Return the names of the arguments that the results depend on."""
-        places = self.list_places(self.arguments)
+        places = self.list_positions(self.arguments)
         numbers = (int(n.number) for n in self.program.nodes if n.operation == "input")
         return {places[number][0].name for number in numbers}
 
     def restrict_arguments(self, names: Collection[str]) -> Function:
         """Return the function with some of its arguments only; it uses no others."""
-        places = enumerate(self.list_places(self.arguments))
+        places = enumerate(self.list_positions(self.arguments))
         kept = [position for position, (argument, _) in places if argument.name in names]
         arguments = tuple(a for a in self.arguments if a.name in names)
         return replace(self, arguments=arguments, program=self.program.renumber(kept.index))
 
     def find_state_dependent(self) -> list[bool]:
         """Return which nodes of the program depend on more than the parameters ``phi``."""
-        places = self.list_places(self.arguments)
+        places = self.list_positions(self.arguments)
         found: list[bool] = []
         for node in self.program.nodes:
             if node.operation == "input":

@@ -26,7 +26,7 @@ from paramreduce_cli.expressions.rows import (
     wait,
     within,
 )
-from paramreduce_cli.expressions.simplification_rules import insert, settle
+from paramreduce_cli.expressions.simplification_rules import insert, simplify_to_fixed_point
 
 _AT_MOST = 6
 """Places at which it is rewritten at once."""
@@ -47,7 +47,7 @@ def rewrite(rows: Rows, tries: int) -> None:
         if k > 0:
             for _ in range(1 + draw_random(rows) % _AT_MOST):
                 _rewrite_somewhere(rows)
-        settle(rows, draw_random(rows) % 2 == 0)
+        simplify_to_fixed_point(rows, draw_random(rows) % 2 == 0)
         if rows.counters[FAILED] or rows.counters[COST] > cost:
             undo(rows)
         else:

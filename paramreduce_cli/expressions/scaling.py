@@ -71,7 +71,7 @@ class _Rescaler:
         return Program.from_graph(self._graph, [self._get_value(v) for v in self._program.outputs])
 
     def _get_value(self, value: int) -> int:
-        """What has become of one."""
+        """Return the rescaled reference of a node."""
         found = self._values[value >> 1]
         return self._graph.negate(found) if value & 1 else found
 

@@ -7,7 +7,7 @@ factor common to terms of a sum is taken out. Only rows that wait are looked at.
 from __future__ import annotations
 
 from paramreduce_cli.expressions.common_factors import factor
-from paramreduce_cli.expressions.common_subexpressions import share_pairs
+from paramreduce_cli.expressions.common_subexpressions import extract_common_pairs
 from paramreduce_cli.expressions.rows import (
     AFTER,
     COST,
@@ -32,7 +32,7 @@ from paramreduce_cli.expressions.rows import (
 
 
 @within
-def settle(rows: Rows, products_first: bool) -> None:
+def simplify_to_fixed_point(rows: Rows, products_first: bool) -> None:
     """Apply all laws until none saves an operation.
 
     Args:
@@ -41,16 +41,16 @@ def settle(rows: Rows, products_first: bool) -> None:
     """
     tidy(rows)
     if products_first:
-        share_pairs(rows, PRODUCT)
+        extract_common_pairs(rows, PRODUCT)
         tidy(rows)
     factor(rows)
     tidy(rows)
     cost = rows.counters[COST] + 1
     while rows.counters[COST] < cost and not rows.counters[FAILED]:
         cost = rows.counters[COST]
-        share_pairs(rows, PRODUCT)
+        extract_common_pairs(rows, PRODUCT)
         tidy(rows)
-        share_pairs(rows, SUM)
+        extract_common_pairs(rows, SUM)
         tidy(rows)
         factor(rows)
         tidy(rows)

@@ -44,6 +44,7 @@ def apply(matrix: Sequence[Sequence], a: Vector) -> Vector:
 
 def _sum_weighted(weights: Sequence, a: Vector) -> Any:
     # An operation of CasADi takes long even where nothing comes of it, and turns are mostly zeros.
+    """Return the weighted sum of a vector's entries without products with 0 and 1."""
     terms = [
         entry if isinstance(weight, float) and weight == 1 else weight * entry
         for weight, entry in zip(weights, a, strict=True)

@@ -18,9 +18,9 @@ _NEAR = 0.72
 _CRITERIA = "reduction/criteria"
 
 
-def find_nearest_name(name: str, known: Iterable[str]) -> str | None:
+def find_nearest_name(name: str, names: Iterable[str]) -> str | None:
     """Return the known name most similar to ``name``, or None if no name is similar."""
-    folded = {candidate.lower().replace("_", "-"): candidate for candidate in known}
+    folded = {candidate.lower().replace("_", "-"): candidate for candidate in names}
     close = difflib.get_close_matches(name.lower().replace("_", "-"), folded, n=1, cutoff=_NEAR)
     return folded[close[0]] if close else None
 
@@ -31,11 +31,11 @@ class UnknownNameError(ValueError):
     Args:
         what: Kind of thing that has such names.
         name: The unknown name.
-        known: All known names.
+        choices: All known names.
     """
 
-    def __init__(self, what: str, name: str, known: Iterable[str]) -> None:
-        names = list(known)
+    def __init__(self, what: str, name: str, choices: Iterable[str]) -> None:
+        names = list(choices)
         self.name, self.is_key = name, what == "key"
         self.nearest = find_nearest_name(name, names)
         hint = f"there is {', '.join(names) or 'none'}."

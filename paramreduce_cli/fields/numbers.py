@@ -68,19 +68,19 @@ def parse_number(value: Any, constants: Mapping[str, float] | None = None) -> fl
     return result
 
 
-def _evaluate(node: ast.expr, known: Mapping[str, float]) -> float:
+def _evaluate(node: ast.expr, constants: Mapping[str, float]) -> float:
     """Return the value of a syntax tree, or raise ValueError if it is no arithmetic on known names."""
     if isinstance(node, ast.Constant) and not isinstance(node.value, bool):
         if isinstance(node.value, int | float):
             return float(node.value)
         raise ValueError("not a number")
-    if isinstance(node, ast.Name) and node.id in known:
-        return known[node.id]
+    if isinstance(node, ast.Name) and node.id in constants:
+        return constants[node.id]
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.UAdd | ast.USub):
-        operand = _evaluate(node.operand, known)
+        operand = _evaluate(node.operand, constants)
         return -operand if isinstance(node.op, ast.USub) else operand
     if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        left, right = _evaluate(node.left, known), _evaluate(node.right, known)
+        left, right = _evaluate(node.left, constants), _evaluate(node.right, constants)
         if isinstance(node.op, ast.Pow) and abs(right) > _LARGEST_POWER:
             raise ValueError("power too large")
         result = _BINARY[type(node.op)](left, right)

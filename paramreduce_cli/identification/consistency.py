@@ -48,12 +48,14 @@ class Physical:
     known: FloatArray
 
 
-def list_constraints(mechanism: Mechanism, known: FloatArray, factor: FloatArray) -> Physical:
+def list_constraints(
+    mechanism: Mechanism, known_values: FloatArray, factor: FloatArray
+) -> Physical:
     """Return which parameters of a mechanism must be physical, and what is known of them.
 
     Args:
         mechanism: The robot.
-        known: Values that are known beforehand, zero where nothing is, (n_parameters,).
+        known_values: Values that are known beforehand, zero where nothing is, (n_parameters,).
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
     """
     columns = np.array([[r.columns[kind] for kind in INERTIAL] for r in mechanism.rigid])
@@ -65,8 +67,8 @@ def list_constraints(mechanism: Mechanism, known: FloatArray, factor: FloatArray
     lengths[lengths == 0] = 1.0
     sizes = np.linalg.norm(factor[:, -1]) / lengths
     for row in columns:
-        sizes[row] = _compute_body_scales(known[row])
-    return Physical(names, columns, np.array(positive, dtype=np.int64), sizes, known)
+        sizes[row] = _compute_body_scales(known_values[row])
+    return Physical(names, columns, np.array(positive, dtype=np.int64), sizes, known_values)
 
 
 def _compute_body_scales(values: FloatArray) -> FloatArray:
@@ -156,6 +158,7 @@ def fit_consistent(factor: FloatArray, physical: Physical, distance: str) -> Flo
 
 
 def _scale_rows(factor: FloatArray, physical: Physical) -> tuple[FloatArray, FloatArray]:
+    """Return rows and right side for the scaled deviations from the known values."""
     W, tau = factor[:, :-1], factor[:, -1]
     return W * physical.sizes, tau - W @ physical.known
 

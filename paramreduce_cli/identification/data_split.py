@@ -34,10 +34,10 @@ class Piece:
         return slice(int(start), int(max(start, stop)))
 
 
-def trim_files(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
+def trim_files(pieces: list[Signals], section: LogSection) -> list[Piece]:
     """Return pieces without the cut-off start and end of a file, which still serve filters."""
-    first, last = pieces[0].time[0] + wanted.trim[0], pieces[-1].time[-1] - wanted.trim[1]
-    if wanted.standstill == "cut":
+    first, last = pieces[0].time[0] + section.trim[0], pieces[-1].time[-1] - section.trim[1]
+    if section.standstill == "cut":
         time = np.concatenate([piece.time for piece in pieces])
         gone, back = [], []
         for j in range(pieces[0].z.shape[1]):
@@ -50,9 +50,9 @@ def trim_files(pieces: list[Signals], wanted: LogSection) -> list[Piece]:
     return [Piece(piece, first, last) for piece in pieces]
 
 
-def split_pieces(pieces: list[Piece], share: float) -> tuple[list[Piece], list[Piece]]:
+def split_pieces(pieces: list[Piece], fraction: float) -> tuple[list[Piece], list[Piece]]:
     """Return a first share of the used samples, and the rest; pieces that are too short are left out."""
-    left = int(share * sum(p.used.stop - p.used.start for p in pieces))
+    left = int(fraction * sum(p.used.stop - p.used.start for p in pieces))
     first, second = [], []
     for piece in pieces:
         size = piece.used.stop - piece.used.start

@@ -185,14 +185,14 @@ def _sample_states(model: Model, training: SampleSet) -> _SampledStates:
     )
 
 
-def _hint_at_bodies(model: Model, looked_at: _SampledStates, full: Estimate) -> list[str]:
+def _hint_at_bodies(model: Model, sampled: _SampledStates, full: Estimate) -> list[str]:
     """Return hints that compare torques with the config's values of bodies and ratings of joints."""
     bodies = [k for k, p in enumerate(model.mechanism.parameters) if p.kind in INERTIAL]
-    W = looked_at.W[:, :, bodies]
+    W = sampled.W[:, :, bodies]
     found = hint_at_unit(W @ model.values[bodies], W @ full.standard[bodies])
     if found or not model.nominal_torque_given:
         return found
-    return hint_at_rating(looked_at.tau, model.nominal_torque, model.mechanism.coordinate_names)
+    return hint_at_rating(sampled.tau, model.nominal_torque, model.mechanism.coordinate_names)
 
 
 def _compute_tilt_torques(

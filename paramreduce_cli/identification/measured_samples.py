@@ -121,6 +121,7 @@ class LoggedSet:
         return self._taps.size == 1
 
     def _get_torques(self, rows: slice) -> FloatArray:
+        """Return measured torques, zero where they are not measured."""
         tau = self.motions.tau[rows]
         return tau if self.measured is None else np.where(self.measured, tau, 0.0)
 

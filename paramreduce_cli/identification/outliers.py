@@ -55,9 +55,9 @@ def _smooth_largest(away: FloatArray) -> FloatArray:
     return largest
 
 
-def _find_spikes(column: FloatArray, places: IntArray, least: FloatArray) -> BoolArray:
+def _find_spikes(column: FloatArray, rows: IntArray, least: FloatArray) -> BoolArray:
     """Return which samples stand out from both neighbours on one side; samples of a step do not."""
-    before = column[places] - column[np.maximum(places - 1, 0)]
-    after = column[places] - column[np.minimum(places + 1, column.size - 1)]
+    before = column[rows] - column[np.maximum(rows - 1, 0)]
+    after = column[rows] - column[np.minimum(rows + 1, column.size - 1)]
     found: BoolArray = (before * after > 0) & (np.minimum(np.abs(before), np.abs(after)) > least)
     return found

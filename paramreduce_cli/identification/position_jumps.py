@@ -39,7 +39,7 @@ class PositionJumps:
     """Rows with which positions begin anew after a step that stays, (n_steps,)."""
 
 
-def find_position_jumps(found: Signals) -> PositionJumps:
+def find_position_jumps(signals: Signals) -> PositionJumps:
     """Find runs of bad rows, and steps of positions that stay.
 
     The recording is followed from its longest stretch without jumps to both ends. What lies between two
@@ -48,19 +48,19 @@ def find_position_jumps(found: Signals) -> PositionJumps:
     numbers of a bad row.
 
     Args:
-        found: A recording with all of its rows.
+        signals: A recording with all of its rows.
 
     Raises:
         DataError: Too many rows are bad.
     """
-    speed, slack = _find_largest_speeds(found), _SMALL * _compute_ranges(found.z)
-    bad = np.zeros(found.time.size, bool)
-    edges = [0, *(_find_jumps(found, speed, slack) + 1).tolist(), found.time.size]
+    speed, slack = _find_largest_speeds(signals), _SMALL * _compute_ranges(signals.z)
+    bad = np.zeros(signals.time.size, bool)
+    edges = [0, *(_find_jumps(signals, speed, slack) + 1).tolist(), signals.time.size]
     if len(edges) == _UNBROKEN:
         return PositionJumps(bad, np.zeros(0, np.int64))
     stretches = []
     for a, b in itertools.pairwise(edges):
-        if b - a > 1 and _is_frozen(found, slice(a, b)):
+        if b - a > 1 and _is_frozen(signals, slice(a, b)):
             bad[a:b] = True
         else:
             stretches.append((a, b))
@@ -68,13 +68,16 @@ def find_position_jumps(found: Signals) -> PositionJumps:
         return PositionJumps(np.zeros_like(bad), np.zeros(0, np.int64))
     longest = max(range(len(stretches)), key=lambda k: stretches[k][1] - stretches[k][0])
 
-    def reachable(one: int, other: int) -> bool:
+    def reachable(first: int, other: int) -> bool:
         """Whether the joints can move from a row to another, later or earlier one."""
-        most = slack + _FASTER * speed * abs(found.time[other] - found.time[one])
-        return bool(np.all(np.abs(found.z[other] - found.z[one]) <= most))
+        most = slack + _FASTER * speed * abs(signals.time[other] - signals.time[first])
+        return bool(np.all(np.abs(signals.z[other] - signals.z[first]) <= most))
 
-    def soon(one: int, other: int) -> bool:
-        return abs(other - one) <= _FEW_ROWS or abs(found.time[other] - found.time[one]) <= _LONGEST
+    def soon(first: int, other: int) -> bool:
+        return (
+            abs(other - first) <= _FEW_ROWS
+            or abs(signals.time[other] - signals.time[first]) <= _LONGEST
+        )
 
     steps: list[int] = []
     after = [(a, b - 1) for a, b in stretches[longest:]]
@@ -85,7 +88,7 @@ def find_position_jumps(found: Signals) -> PositionJumps:
                 bad[min(a, b) : max(a, b) + 1] = True
             if not reachable(last, first):
                 steps.append(max(first, last))
-    bad |= _repeat_bad_rows(found, bad)
+    bad |= _repeat_bad_rows(signals, bad)
     if np.mean(bad) > _MOST_BAD:
         raise DataError(
             f"positions jump in {np.count_nonzero(bad)} of {bad.size} rows, faster than the joints move otherwise. Bring "
@@ -99,44 +102,49 @@ _Stretches = Sequence[tuple[int, int]]
 
 
 def _follow_stretches(
-    way: _Stretches, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
+    stretches: _Stretches, reachable: Callable[[int, int], bool], soon: Callable[[int, int], bool]
 ) -> Iterator[tuple[int, int, _Stretches]]:
     """Yield the row that is left, the one that is gone on with, and the stretches between them."""
-    last, k = way[0][1], 1
-    while k < len(way):
+    last, k = stretches[0][1], 1
+    while k < len(stretches):
         found = k
-        while found < len(way) and soon(last, way[found][0]) and not reachable(last, way[found][0]):
+        while (
+            found < len(stretches)
+            and soon(last, stretches[found][0])
+            and not reachable(last, stretches[found][0])
+        ):
             found += 1
-        if found == len(way) or not reachable(last, way[found][0]):
+        if found == len(stretches) or not reachable(last, stretches[found][0]):
             found = k
-        yield last, way[found][0], way[k:found]
-        last, k = way[found][1], found + 1
+        yield last, stretches[found][0], stretches[k:found]
+        last, k = stretches[found][1], found + 1
 
 
-def _find_jumps(found: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
+def _find_jumps(signals: Signals, speed: FloatArray, slack: FloatArray) -> IntArray:
     """Return the rows after which a position moves farther than its joint can, (n_jumps,)."""
-    duration = np.diff(found.time)
+    duration = np.diff(signals.time)
     jumps = np.zeros(duration.size, bool)
-    for j, column in enumerate(found.z.T):  # one after the other, as there may be gigabytes
+    for j, column in enumerate(signals.z.T):  # one after the other, as there may be gigabytes
         jumps |= np.abs(np.diff(column)) > slack[j] + _FASTER * speed[j] * duration
     return np.flatnonzero(jumps)
 
 
-def _is_frozen(found: Signals, rows: slice) -> bool:
+def _is_frozen(signals: Signals, rows: slice) -> bool:
     """Whether all rows hold the same positions and torques."""
     return bool(
-        np.all(np.ptp(found.z[rows], axis=0) == 0) and np.all(np.ptp(found.tau[rows], axis=0) == 0)
+        np.all(np.ptp(signals.z[rows], axis=0) == 0)
+        and np.all(np.ptp(signals.tau[rows], axis=0) == 0)
     )
 
 
-def _find_largest_speeds(found: Signals) -> FloatArray:
+def _find_largest_speeds(signals: Signals) -> FloatArray:
     """Return the largest speeds that joints keep for some samples, recorded or from positions, (n_dof,)."""
     speeds = []
-    for j in range(found.z.shape[1]):
-        smooth = scipy.ndimage.median_filter(found.z[:, j], _WINDOW, mode="nearest")
-        slopes = [np.gradient(smooth, found.time)]
-        if found.dz is not None:
-            slopes.append(found.dz[:, j])
+    for j in range(signals.z.shape[1]):
+        smooth = scipy.ndimage.median_filter(signals.z[:, j], _WINDOW, mode="nearest")
+        slopes = [np.gradient(smooth, signals.time)]
+        if signals.dz is not None:
+            slopes.append(signals.dz[:, j])
         speeds.append(
             max(
                 np.abs(scipy.ndimage.median_filter(slope, _SPIKE, mode="nearest")).max()
@@ -152,11 +160,11 @@ def _compute_ranges(z: FloatArray) -> FloatArray:
     return np.array([np.ptp(column) for column in smooth])
 
 
-def _repeat_bad_rows(found: Signals, bad: BoolArray) -> BoolArray:
+def _repeat_bad_rows(signals: Signals, bad: BoolArray) -> BoolArray:
     """Whether rows hold the numbers that most rows with these numbers are bad by."""
     if not bad.any():
         return bad
-    parts = [part for part in (found.z, found.dz, found.ddz, found.tau) if part is not None]
+    parts = [part for part in (signals.z, signals.dz, signals.ddz, signals.tau) if part is not None]
     rows = np.ascontiguousarray(np.column_stack(parts))
     kinds = np.unique(rows.view(f"V{rows.itemsize * rows.shape[1]}").ravel(), return_inverse=True)[
         1

@@ -27,10 +27,10 @@ from paramreduce_cli.records import (
     MeasuredLog,
     MeasuredMotions,
     Progress,
+    ProgressCallback,
     RawLog,
     RawLogs,
     Spectra,
-    Tell,
 )
 from paramreduce_cli.resources.scratch import allocate_matrix, stack_rows
 
@@ -63,18 +63,18 @@ _TOO_SHORT = "the log leaves hardly any samples {}. Bring a longer one, or cut o
 
 def process_logs(
     logs: RawLogs,
-    wanted: LogSection,
+    section: LogSection,
     names: Sequence[str],
-    tell: Tell = lambda _: None,
+    report_progress: ProgressCallback = lambda _: None,
     unmeasured: Collection[str] = (),
 ) -> MeasuredLog:
     """Process logs for identification.
 
     Args:
         logs: Logs as recorded.
-        wanted: Settings of the section for logs.
+        section: Settings of the section for logs.
         names: Names of the independent coordinates.
-        tell: Called with the progress.
+        report_progress: Called with the progress.
         unmeasured: Coordinates without torques.
 
     Raises:
@@ -83,12 +83,14 @@ def process_logs(
     """
 
     def begin(k: int) -> None:
-        tell(Progress("make logs ready", k, len(_WORK), _WORK[k] if k < len(_WORK) else ""))
+        report_progress(
+            Progress("make logs ready", k, len(_WORK), _WORK[k] if k < len(_WORK) else "")
+        )
 
     steps: list[str] = []
     begin(0)
-    files = _read_files(logs.training, wanted, names, unmeasured, steps)
-    others = _read_files(logs.held_out, wanted, names, unmeasured, steps)
+    files = _read_files(logs.training, section, names, unmeasured, steps)
+    others = _read_files(logs.held_out, section, names, unmeasured, steps)
     training, held_out, rate = files.motions, others.motions, files.rate
     if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
         raise DataError(
@@ -107,8 +109,8 @@ def process_logs(
             ),
         ]
     )
-    learned_from, tested_on = _split_files(training, held_out, wanted)
-    _check_left(learned_from, files.sources, wanted)
+    learned_from, tested_on = _split_files(training, held_out, section)
+    _check_left(learned_from, files.sources, section)
     raw = [piece for part in learned_from for piece in part]
     tested_raw = [piece for part in tested_on for piece in part]
     place = find_longest(learned_from, [] if held_out else tested_on, rate)
@@ -116,8 +118,8 @@ def process_logs(
     before = decimate_recorded(place.get_pieces(raw, tested_raw), rate)
     begin(1)
     spectra = _estimate_spectra(longest, rate)
-    cutoffs = _choose_cutoffs(wanted, spectra, rate, steps)
-    thin = _choose_decimation(wanted, cutoffs, rate)
+    cutoffs = _choose_cutoffs(section, spectra, rate, steps)
+    thin = _choose_decimation(section, cutoffs, rate)
 
     def ready(pieces: list[Piece]) -> list[Piece]:
         """Nothing of one piece is in another: they are low-passed apart."""
@@ -127,9 +129,9 @@ def process_logs(
     begin(2)
     made = ready(raw)
     made_tested = ready(tested_raw)
-    learned, tested = _join_pieces(made, wanted.folds), _join_pieces(made_tested, 1)
+    learned, tested = _join_pieces(made, section.folds), _join_pieces(made_tested, 1)
     _check_enough(learned, tested)
-    steps.append(_describe_split(learned, tested, wanted, rate / thin))
+    steps.append(_describe_split(learned, tested, section, rate / thin))
     begin(3)
     noise = _estimate_noise(learned, cutoffs, rate / thin)
     used = learned.fold != UNUSED
@@ -141,8 +143,8 @@ def process_logs(
         recorded_rate=rate,
         state_cutoff=cutoffs.state,
         torque_cutoff=cutoffs.torque,
-        output_rate=_choose_output_rate(wanted, cutoffs, rate / thin),
-        delay=wanted.delay,
+        output_rate=_choose_output_rate(section, cutoffs, rate / thin),
+        delay=section.delay,
         noise=noise,
         noise_share=float(np.sqrt(np.sum(noise**2) / power)),
         shown=collect_signals(
@@ -175,7 +177,7 @@ class _Files:
 
 def _read_files(
     logs: Iterable[RawLog],
-    wanted: LogSection,
+    section: LogSection,
     names: Sequence[str],
     unmeasured: Collection[str],
     steps: list[str],
@@ -184,21 +186,21 @@ def _read_files(
     files = _Files()
     for log in logs:
         source = log.source
-        recorded = read_signals(log, wanted, names, unmeasured)
+        recorded = read_signals(log, section, names, unmeasured)
         rows, first_line = recorded.time.size, log.first_line
         del log  # the next one is read while this name would hold it
         try:
-            recorded, parted, jumps = _cut_out_jumps(recorded, wanted, names, first_line)
+            recorded, parted, jumps = _cut_out_jumps(recorded, section, names, first_line)
             files.warnings += [f"{source}: {text}" for text in jumps]
-            if wanted.delay:
-                _compensate_delay(recorded, wanted.delay, source)
+            if section.delay:
+                _compensate_delay(recorded, section.delay, source)
             pieces, rate, said = resample_evenly(recorded, parted)
         except DataError as error:
             raise DataError(f"{source}: {error}") from error
         duration = recorded.time[-1] - recorded.time[0]
         steps.append(f"{source}: {rows} rows, {duration:.4g} s at {rate:.5g} Hz.")
         steps += said
-        outliers = replace_outliers(pieces) if wanted.outliers == "replace" else {}
+        outliers = replace_outliers(pieces) if section.outliers == "replace" else {}
         steps += _describe_outliers(outliers, names)
         if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
             raise DataError(
@@ -213,13 +215,13 @@ def _read_files(
 
 
 def _cut_out_jumps(
-    recorded: Signals, wanted: LogSection, names: Sequence[str], first_line: int | None
+    recorded: Signals, section: LogSection, names: Sequence[str], first_line: int | None
 ) -> tuple[Signals, list[int], list[str]]:
     """Cut out the rows of a recording in which positions jump.
 
     Args:
         recorded: The recording with all of its rows.
-        wanted: The section of the config, which may ask for outliers to be kept.
+        section: The section of the config, which may ask for outliers to be kept.
         names: Names of the coordinates.
         first_line: Line of the first row in its file, None where the file has no lines.
 
@@ -231,7 +233,7 @@ def _cut_out_jumps(
         counts = zip(names, recorded.turns, strict=True)
         counted = ", ".join(f"{name} {count} times" for name, count in counts if count)
         said.append(f"positions jump by whole turns ({counted}); the turns are added.")
-    if wanted.outliers == "keep":
+    if section.outliers == "keep":
         return recorded, [], said
     jumps = find_position_jumps(recorded)
     if jumps.bad.any():
@@ -267,13 +269,13 @@ def _compensate_delay(recorded: Signals, delay: float, source: str) -> None:
 
 
 def _split_files(
-    training: list[list[Signals]], held_out: list[list[Signals]], wanted: LogSection
+    training: list[list[Signals]], held_out: list[list[Signals]], section: LogSection
 ) -> tuple[list[list[Piece]], list[list[Piece]]]:
     """Return the training and the held-out pieces, by file."""
-    moved = [trim_files(pieces, wanted) for pieces in training]
+    moved = [trim_files(pieces, section) for pieces in training]
     if held_out:
-        return moved, [trim_files(pieces, wanted) for pieces in held_out]
-    halves = [split_pieces(pieces, 1 - wanted.held_out_share) for pieces in moved]
+        return moved, [trim_files(pieces, section) for pieces in held_out]
+    halves = [split_pieces(pieces, 1 - section.held_out_fraction) for pieces in moved]
     return [one for one, _ in halves], [two for _, two in halves]
 
 
@@ -285,7 +287,7 @@ def _estimate_spectra(piece: Signals, rate: float) -> Spectra:
 
 
 def _choose_cutoffs(
-    wanted: LogSection, spectra: Spectra, rate: float, steps: list[str]
+    section: LogSection, spectra: Spectra, rate: float, steps: list[str]
 ) -> _Cutoffs:
     """Return the cut-off frequencies that the config gives, or that the spectra suggest."""
     band = filters.find_motion_band(spectra.frequency, spectra.velocity)
@@ -303,8 +305,8 @@ def _choose_cutoffs(
             )
         return float(given)
 
-    state = chosen(wanted.state_cutoff, band, "state_cutoff")
-    torque = chosen(wanted.torque_cutoff, band, "torque_cutoff")
+    state = chosen(section.state_cutoff, band, "state_cutoff")
+    torque = chosen(section.torque_cutoff, band, "torque_cutoff")
     steps.append(
         f"Speeds stand out of their noise up to {band:.3g} Hz. Positions and speeds: {_describe_low_pass(state)}; "
         f"torques and observation matrix: {_describe_low_pass(torque)}."
@@ -313,34 +315,35 @@ def _choose_cutoffs(
 
 
 def _describe_low_pass(cutoff: float) -> str:
+    """Describe a low-pass filter; an infinite cut-off means no filter."""
     if np.isinf(cutoff):
         return "as recorded"
     return f"zero-phase low-pass at {cutoff:.3g} Hz"
 
 
-def _choose_decimation(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
+def _choose_decimation(section: LogSection, cutoffs: _Cutoffs, rate: float) -> int:
     """Return the decimation factor of the motions: one of how many samples of the log is kept."""
     if np.isfinite(cutoffs.torque):
         needed = _PER_TORQUE_CUTOFF * cutoffs.torque
         if np.isfinite(cutoffs.state):
             needed = max(needed, _PER_STATE_CUTOFF * cutoffs.state)
     else:
-        needed = wanted.rate or rate
+        needed = section.rate or rate
     return max(1, int(rate / needed + 1e-9))
 
 
-def _choose_output_rate(wanted: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
+def _choose_output_rate(section: LogSection, cutoffs: _Cutoffs, rate: float) -> float:
     """Return the rate of the samples that are used, Hz."""
     usual = rate if np.isinf(cutoffs.torque) else _USED_PER_CUTOFF * cutoffs.torque
-    return rate / max(1, int(rate / (wanted.rate or usual) + 1e-9))
+    return rate / max(1, int(rate / (section.rate or usual) + 1e-9))
 
 
-def _check_left(parts: list[list[Piece]], sources: list[str], wanted: LogSection) -> None:
+def _check_left(parts: list[list[Piece]], sources: list[str], section: LogSection) -> None:
     for part, source in zip(parts, sources, strict=True):
         if sum(p.used.stop - p.used.start for p in part) < _FEWEST_USED:
             raise DataError(
                 f"{source}: hardly any samples are left to learn from after sampling.log.trim "
-                f"{wanted.trim} and standstill. Bring a longer log, or cut off less."
+                f"{section.trim} and standstill. Bring a longer log, or cut off less."
             )
 
 
@@ -399,15 +402,15 @@ def _join_pieces(pieces: list[Piece], folds: int) -> MeasuredMotions:
     return MeasuredMotions(time=time, **joined, piece=number, fold=np.concatenate(fold_of))
 
 
-def _describe_outliers(found: Outliers, names: Sequence[str]) -> Iterator[str]:
+def _describe_outliers(outliers: Outliers, names: Sequence[str]) -> Iterator[str]:
     """Yield a sentence on replaced outliers, if there are any."""
-    if not found:
+    if not outliers:
         return
     listed = ", ".join(
         f"{len(times)} in the {signal} of {names[j]} (the first at {times[0]:.6g} s)"
-        for (signal, j), times in found.items()
+        for (signal, j), times in outliers.items()
     )
-    count = sum(map(len, found.values()))
+    count = sum(map(len, outliers.values()))
     yield f"{count} outliers are replaced by what lies between their neighbours: {listed}."
 
 
@@ -429,17 +432,17 @@ def _describe_states(piece: Signals, thin: int, rate: float) -> str:
 
 
 def _describe_split(
-    learned: MeasuredMotions, tested: MeasuredMotions, wanted: LogSection, rate: float
+    learned: MeasuredMotions, tested: MeasuredMotions, section: LogSection, rate: float
 ) -> str:
     """Return a sentence on the durations of training and held-out motions."""
     one, two = (np.count_nonzero(m.fold != UNUSED) / rate for m in (learned, tested))
     cut = (learned.time.size + tested.time.size) / rate - one - two
     how = (
         "by file"
-        if wanted.held_out_files
-        else f"the last {100 * wanted.held_out_share:.3g} % of each file"
+        if section.held_out_files
+        else f"the last {100 * section.held_out_fraction:.3g} % of each file"
     )
-    text = f"{one:.4g} s are learned from, in {wanted.folds} folds, {two:.4g} s held out ({how})"
+    text = f"{one:.4g} s are learned from, in {section.folds} folds, {two:.4g} s held out ({how})"
     return f"{text}; {cut:.3g} s at the ends are cut off." if cut * rate >= 1 else f"{text}."
 
 

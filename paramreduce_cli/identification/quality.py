@@ -58,7 +58,7 @@ def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray)
     sizes = np.linalg.svd(X, compute_uv=False)
     rank = int(np.sum(sizes > _DEPENDENT * sizes[0]))
     names = [mechanism.parameter_names[k] for k in base.columns]
-    left = _compute_independent_shares(X, lengths)
+    left = _compute_independent_fractions(X, lengths)
     order = np.argsort(left)
     return LogQuality(
         n_base=base.columns.size,
@@ -68,7 +68,7 @@ def measure_quality(mechanism: Mechanism, log: MeasuredLog, measured: BoolArray)
     )
 
 
-def _compute_independent_shares(X: FloatArray, lengths: FloatArray) -> FloatArray:
+def _compute_independent_fractions(X: FloatArray, lengths: FloatArray) -> FloatArray:
     """Return the share of each column of unit length that the others do not explain, (n,)."""
     inverse = np.linalg.pinv(X.T @ X, rcond=_DEPENDENT**2, hermitian=True)
     diagonal = np.diag(inverse)

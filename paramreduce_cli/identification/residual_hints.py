@@ -101,10 +101,10 @@ def find_residual_hints(
     return found
 
 
-def _is_convincing(sureness: float, share: float, coefficient: float) -> bool:
+def _is_convincing(sureness: float, fraction: float, coefficient: float) -> bool:
     """Return whether a signal is significant and explains enough of the residuals."""
-    sure = abs(sureness) > _SURE and share > _SHARE
-    return sure or (abs(sureness) > _OBVIOUSLY_SURE and share > _OBVIOUS)
+    sure = abs(sureness) > _SURE and fraction > _SHARE
+    return sure or (abs(sureness) > _OBVIOUSLY_SURE and fraction > _OBVIOUS)
 
 
 def _test_signal(fitted: LinearFit, candidate: _Signal) -> tuple[float, float, float]:
@@ -202,9 +202,9 @@ def _make_missing_hint(
 ) -> Callable[[float, float], str]:
     """Return a function that words the hint at a missing term."""
 
-    def said(coefficient: float, share: float) -> str:
+    def said(coefficient: float, fraction: float) -> str:
         return (
-            f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * share:.0f} % of them): "
+            f"Residuals of {name} follow {what} ({coefficient:.3g} {unit}, {100 * fraction:.0f} % of them): "
             f"{key} is {'of another form' if key in modelled else 'missing'}."
         )
 
@@ -214,9 +214,9 @@ def _make_missing_hint(
 def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at smooth friction."""
 
-    def said(coefficient: float, share: float) -> str:
+    def said(coefficient: float, fraction: float) -> str:
         return (
-            f"Residuals of {name} follow a smooth sign of its speed ({100 * share:.0f} % of them): friction that "
+            f"Residuals of {name} follow a smooth sign of its speed ({100 * fraction:.0f} % of them): friction that "
             f"goes over from one sign to the other; try drives.{name}.smoothing: {speed:.2g}."
         )
 
@@ -226,7 +226,7 @@ def _make_smoothing_hint(name: str, speed: float) -> Callable[[float, float], st
 def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a wrong scale of torques, or None for small errors."""
 
-    def said(coefficient: float, share: float) -> str | None:
+    def said(coefficient: float, fraction: float) -> str | None:
         if abs(coefficient) < _GAIN:
             return None
         return (
@@ -237,16 +237,16 @@ def _make_scale_hint(name: str) -> Callable[[float, float], str | None]:
     return said
 
 
-def _make_delay_hint(step: float, known: float) -> Callable[[float, float], str | None]:
+def _make_delay_hint(step: float, known_delay: float) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a delay of torques."""
 
-    def said(coefficient: float, share: float) -> str | None:
+    def said(coefficient: float, fraction: float) -> str | None:
         if abs(coefficient) < _DELAY * step:
             return None
         later = "later" if coefficient < 0 else "earlier"
         return (
             f"Torques come {abs(coefficient) * 1e3:.3g} ms {later} than positions; try "
-            f"sampling.log.delay: {known - coefficient:.3g}."
+            f"sampling.log.delay: {known_delay - coefficient:.3g}."
         )
 
     return said
@@ -255,7 +255,7 @@ def _make_delay_hint(step: float, known: float) -> Callable[[float, float], str 
 def _make_tilt_hint(axis: str, gravity: float) -> Callable[[float, float], str | None]:
     """Return a function that words the hint at a tilted base."""
 
-    def said(coefficient: float, share: float) -> str | None:
+    def said(coefficient: float, fraction: float) -> str | None:
         angle = float(np.degrees(np.arctan2(abs(coefficient), gravity)))
         if angle < _TILT:
             return None

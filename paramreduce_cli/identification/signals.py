@@ -64,13 +64,13 @@ class Signals:
 
 
 def read_signals(
-    log: RawLog, wanted: LogSection, names: Sequence[str], unmeasured: Collection[str] = ()
+    log: RawLog, section: LogSection, names: Sequence[str], unmeasured: Collection[str] = ()
 ) -> Signals:
     """Return the signals of a file, row by row.
 
     Args:
         log: Log file.
-        wanted: What is where in it.
+        section: What is where in it.
         names: Names of the coordinates.
         unmeasured: Those without torques, for which zeros stand; columns may lack, or hold anything.
 
@@ -78,7 +78,7 @@ def read_signals(
         DataError: Columns are missing, or hold what cannot be; file, line and column are named.
         ConfigError: Signs, gears and the like do not fit the robot.
     """
-    columns, units = wanted.columns, wanted.units
+    columns, units = section.columns, section.units
     time = _read_column(log, columns.time) * TIMES[units.time]
 
     def matrix(key: str, factor: float) -> FloatArray | None:
@@ -97,23 +97,23 @@ def read_signals(
     assert z is not None
     assert tau is not None
     _check_time(log, columns.time, time)
-    turns = unwrap_positions(z) if wanted.outliers == "replace" else ()
-    return _convert_to_joints(Signals(time, z, dz, ddz, tau, turns), wanted, len(names))
+    turns = unwrap_positions(z) if section.outliers == "replace" else ()
+    return _convert_to_joints(Signals(time, z, dz, ddz, tau, turns), section, len(names))
 
 
-def _convert_to_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signals:
+def _convert_to_joints(signals: Signals, section: LogSection, n_dof: int) -> Signals:
     """Convert signals of motors to signals of joints, in place, as there may be gigabytes."""
-    sign = _expand_per_joint(wanted.apart.motion, "signs", n_dof)
-    tau = found.tau
-    tau *= _expand_per_joint(wanted.apart.torque, "signs", n_dof)
-    if wanted.torque_constants is not None:
-        tau *= _expand_per_joint(wanted.torque_constants, "torque_constants", n_dof)
-    motion = [found.z, found.dz, found.ddz]
+    sign = _expand_per_joint(section.apart.motion, "signs", n_dof)
+    tau = signals.tau
+    tau *= _expand_per_joint(section.apart.torque, "signs", n_dof)
+    if section.torque_constants is not None:
+        tau *= _expand_per_joint(section.torque_constants, "torque_constants", n_dof)
+    motion = [signals.z, signals.dz, signals.ddz]
     for values in motion:
         if values is not None:
             values *= sign
     try:
-        gears = wanted.compute_motor_matrix(n_dof)
+        gears = section.compute_motor_matrix(n_dof)
     except ValueError as error:
         raise ConfigError(str(error), ("sampling", "log", "transmission")) from error
     if gears is not None:
@@ -124,8 +124,8 @@ def _convert_to_joints(found: Signals, wanted: LogSection, n_dof: int) -> Signal
         _multiply_in_place(tau, gears)
     z, dz, ddz = motion
     assert z is not None
-    z += _expand_per_joint(wanted.offsets, "offsets", n_dof)
-    return Signals(found.time, z, dz, ddz, tau, found.turns)
+    z += _expand_per_joint(section.offsets, "offsets", n_dof)
+    return Signals(signals.time, z, dz, ddz, tau, signals.turns)
 
 
 def _multiply_in_place(values: FloatArray, factors: FloatArray) -> None:
@@ -233,14 +233,14 @@ def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
 
 
 def resample_evenly(
-    found: Signals, steps: Collection[int] = ()
+    signals: Signals, steps: Collection[int] = ()
 ) -> tuple[list[Signals], float, list[str]]:
     """Split a recording into uninterrupted motions at an even rate.
 
     Uneven time is resampled by cubic splines; gaps separate motions.
 
     Args:
-        found: The recording.
+        signals: The recording.
         steps: Rows with which a motion begins anew although no time is missing.
 
     Returns:
@@ -249,10 +249,10 @@ def resample_evenly(
     Raises:
         DataError: Nothing long enough is left.
     """
-    step = float(np.median(np.diff(found.time)))
-    gaps = np.flatnonzero(np.diff(found.time) > _GAP * step)
-    edges = sorted({0, *(gaps + 1).tolist(), *steps, found.time.size})
-    pieces = [found.slice_rows(slice(a, b)) for a, b in itertools.pairwise(edges)]
+    step = float(np.median(np.diff(signals.time)))
+    gaps = np.flatnonzero(np.diff(signals.time) > _GAP * step)
+    edges = sorted({0, *(gaps + 1).tolist(), *steps, signals.time.size})
+    pieces = [signals.slice_rows(slice(a, b)) for a, b in itertools.pairwise(edges)]
     kept = [piece for piece in pieces if piece.time.size >= _FEWEST]
     if not kept:
         raise DataError(
@@ -260,7 +260,7 @@ def resample_evenly(
         )
     said = []
     if gaps.size:
-        longest = float(np.diff(found.time).max())
+        longest = float(np.diff(signals.time).max())
         said.append(
             f"{gaps.size} gaps in time, the longest of {longest:.3g} s, part the log; {len(kept)} of "
             f"{len(pieces)} pieces are long enough."
@@ -275,16 +275,16 @@ def resample_evenly(
     return kept, 1 / step, said
 
 
-def _resample(found: Signals, step: float) -> Signals:
+def _resample(signals: Signals, step: float) -> Signals:
     """Return signals at an even time step, by cubic splines."""
-    time = found.time[0] + step * np.arange(int((found.time[-1] - found.time[0]) / step) + 1)
+    time = signals.time[0] + step * np.arange(int((signals.time[-1] - signals.time[0]) / step) + 1)
 
     def at(values: FloatArray) -> FloatArray:
         result = allocate_matrix(time.size, values.shape[1])
         for j, column in enumerate(values.T):
-            result[:, j] = scipy.interpolate.CubicSpline(found.time, column)(time)
+            result[:, j] = scipy.interpolate.CubicSpline(signals.time, column)(time)
         return result
 
-    dz = None if found.dz is None else at(found.dz)
-    ddz = None if found.ddz is None else at(found.ddz)
-    return Signals(time, at(found.z), dz, ddz, at(found.tau))
+    dz = None if signals.dz is None else at(signals.dz)
+    ddz = None if signals.ddz is None else at(signals.ddz)
+    return Signals(time, at(signals.z), dz, ddz, at(signals.tau))

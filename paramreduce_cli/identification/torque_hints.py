@@ -25,15 +25,15 @@ _NEAR = 0.1
 """Share of gravity by which its direction may be off an axis of the base."""
 
 
-def hint_at_unit(expected: FloatArray, found: FloatArray) -> list[str]:
+def hint_at_unit(expected: FloatArray, ratios: FloatArray) -> list[str]:
     """Return a hint if the bodies' torques are those of the config's values except for a large factor.
 
     Args:
         expected: Torques of the bodies with the values in the config, (n_samples, n_dof).
-        found: The same with the identified values.
+        ratios: The same with the identified values.
     """
-    sizes = np.sqrt(np.mean(found**2, axis=0))
-    scaled = [torques / np.where(sizes > 0, sizes, np.inf) for torques in (expected, found)]
+    sizes = np.sqrt(np.mean(ratios**2, axis=0))
+    scaled = [torques / np.where(sizes > 0, sizes, np.inf) for torques in (expected, ratios)]
     product = float(np.sum(scaled[0] * scaled[1]))
     lengths = [float(np.linalg.norm(torques)) for torques in scaled]
     if not abs(product) > _ALIKE * lengths[0] * lengths[1] > 0:

@@ -273,12 +273,14 @@ def _has_speed_limit(limits: ImportedJoint) -> bool:
 
 
 def _format_position_limits(kind: str, limits: ImportedJoint | None) -> str:
+    """Return position limits as YAML; usual ones where the file has none."""
     if limits is None or not limits.is_limited:
         return _RANGE[kind]
     return f"[{limits.lower:.6g}, {limits.upper:.6g}]"
 
 
 def _format_velocity_limit(kind: str, limits: ImportedJoint | None) -> str:
+    """Return a velocity limit as YAML; a usual one where the file has none."""
     if limits is None or not limits.velocity or not math.isfinite(limits.velocity):
         return f"{_SPEED[kind]:g}"
     return f"{abs(limits.velocity):.6g}"

@@ -292,7 +292,7 @@ class MjcfReader:
                     f"{self._path}: the equality {name} of type {text} has no rigid-body meaning here; "
                     "connect, weld and joint have."
                 )
-        self._check_followers(followers)
+        self._check_mimics(followers)
         return followers, tuple(closures)
 
     def _is_moved_from_outside(self, k: int) -> bool:
@@ -315,14 +315,14 @@ class MjcfReader:
             )
         return self._joints[follower], Mimic(self._joints[leader], ratio, offset)
 
-    def _check_followers(self, followers: dict[str, Mimic]) -> None:
-        for name in followers:
-            seen, joint = {name}, followers[name].joint
-            while joint in followers:
+    def _check_mimics(self, mimics: dict[str, Mimic]) -> None:
+        for name in mimics:
+            seen, joint = {name}, mimics[name].joint
+            while joint in mimics:
                 if joint in seen:
                     raise ConfigError(f"{self._path}: joint {joint} follows itself by equalities.")
                 seen.add(joint)
-                joint = followers[joint].joint
+                joint = mimics[joint].joint
 
     def _read_closure(self, k: int, name: str, *, welded: bool) -> ImportedClosure:
         """Return the closure of an equality of bodies or sites."""

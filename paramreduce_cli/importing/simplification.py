@@ -144,7 +144,7 @@ class _Simplification:
         if choice.tip is not None:
             self._lock_other_branches(choice.tip)
         self._joints = {joint.name: joint for joint in robot.joints}
-        self._lock_followers()
+        self._lock_mimics()
         self._names = _Names(self._warnings)
         self._carried: dict[str, str] = {}
         self._frames: dict[str, FloatArray] = {}
@@ -356,7 +356,7 @@ class _Simplification:
             joint = self._joints[joint.mimic.joint]
         return joint, ratio, offset
 
-    def _lock_followers(self) -> None:
+    def _lock_mimics(self) -> None:
         """Lock the joints that follow a joint that does not move."""
         for joint in self._robot.joints if not self._choice.uncoupled else ():
             leader, ratio, offset = self._resolve_leader(joint)

@@ -72,6 +72,7 @@ def _write_inertia(link: Any, inertial: Inertial | None) -> None:
 
 
 def _find_or_add_child(element: Any, tag: str) -> Any:
+    """Return the child element of a tag, added if it is missing."""
     found = element.find(tag)
     return etree.SubElement(element, tag) if found is None else found
 

@@ -16,7 +16,7 @@ Results = Mapping[str, HeuristicValidation]
 
 
 def find_leanest(
-    function: str, wanted: SelectedSection, results: Results, terms: TermReduction | None
+    function: str, section: SelectedSection, results: Results, terms: TermReduction | None
 ) -> Leanest | None:
     """Return the function with the fewest operations whose errors are within the tolerances, or None.
 
@@ -26,14 +26,14 @@ def find_leanest(
 
     Args:
         function: ``inverse`` or ``direct``.
-        wanted: What the config asks for.
+        section: What the config asks for.
         results: What reduced models are worth.
         terms: Functions with terms left out, if there are any.
 
     Returns:
         None if there is none.
     """
-    tolerances = _list_tolerances(function, wanted.get_tolerances())
+    tolerances = _list_tolerances(function, section.get_tolerances())
     looked_at: tuple[str, ...] = _BOTH
     if not tolerances and terms is not None:
         budget = {
@@ -60,9 +60,9 @@ def _list_tolerances(function: str, given: Tolerances) -> Tolerances:
     return {key: given[key] for key in kinds if np.isfinite(given.get(key, np.inf))}
 
 
-def _rank(one: Leanest) -> tuple[int, float]:
+def _rank(candidate: Leanest) -> tuple[int, float]:
     """Return operations, then torque error: what the leanest function minimises."""
-    return one.operations, one.torque_error.estimation
+    return candidate.operations, candidate.torque_error.estimation
 
 
 def _iterate_models(function: str, limits: _Limits, results: Results) -> Iterator[Leanest]:

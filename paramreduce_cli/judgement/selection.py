@@ -25,8 +25,8 @@ from paramreduce_cli.texts import format_percent
 
 
 def select_model(
-    wanted: SelectedSection,
-    known: FloatArray | None,
+    section: SelectedSection,
+    known_values: FloatArray | None,
     reduction: Reduction,
     results: Mapping[str, HeuristicValidation],
     cross_validation: Mapping[str, CrossValidation] | None,
@@ -37,8 +37,8 @@ def select_model(
     that the data cannot distinguish from the best.
 
     Args:
-        wanted: What the config asks for.
-        known: Standard parameters, (n_standard,), where they are known.
+        section: What the config asks for.
+        known_values: Standard parameters, (n_standard,), where they are known.
         reduction: The subsets.
         results: What they are worth.
         cross_validation: Where it chooses.
@@ -47,18 +47,18 @@ def select_model(
         ConfigError: There is no model of that size.
         DataError: The heuristic asked for was not run.
     """
-    if wanted.heuristic is not None:
-        if wanted.heuristic not in results:
-            raise DataError(f"reduction.h5 has no {wanted.heuristic}.", command="reduce")
-        results = {wanted.heuristic: results[wanted.heuristic]}
+    if section.heuristic is not None:
+        if section.heuristic not in results:
+            raise DataError(f"reduction.h5 has no {section.heuristic}.", command="reduce")
+        results = {section.heuristic: results[section.heuristic]}
     missed = ""
     if cross_validation is not None:
         heuristic, row, reason = _choose_by_cross_validation(results, cross_validation)
-    elif wanted.n is not None:
-        heuristic, row = _find_of_size(wanted.n, results)
-        reason = f"{heuristic} with the {wanted.n} parameters that selected.n asks for."
+    elif section.n is not None:
+        heuristic, row = _find_of_size(section.n, results)
+        reason = f"{heuristic} with the {section.n} parameters that selected.n asks for."
     else:
-        tolerances = wanted.get_tolerances() or SelectedSection.USUAL
+        tolerances = section.get_tolerances() or SelectedSection.USUAL
         choice = find_smallest_within(results, tolerances)
         heuristic, row = choice if choice is not None else find_nearest_to(results, tolerances)
         n = int(results[heuristic].n[row])
@@ -67,22 +67,22 @@ def select_model(
             missed = f"no model has {_format_tolerances(tolerances)}, the nearest is {worst:.3g} times beyond"
             reason = f"{heuristic} with n = {n}: {missed}."
         else:
-            reason = _explain_choice(wanted, tolerances, reduction, heuristic, n)
-    chosen = make_reduced_model(reduction, heuristic, row, known)
+            reason = _explain_choice(section, tolerances, reduction, heuristic, n)
+    chosen = make_reduced_model(reduction, heuristic, row, known_values)
     return Selected(heuristic=heuristic, model=chosen, reason=reason, missed=missed)
 
 
 def _choose_by_cross_validation(
-    results: Mapping[str, HeuristicValidation], found: Mapping[str, CrossValidation]
+    results: Mapping[str, HeuristicValidation], folds: Mapping[str, CrossValidation]
 ) -> tuple[str, int, str]:
     """Return heuristic, row and reason of the model that cross-validation chooses."""
-    choice = choose_by_one_standard_error(found)
+    choice = choose_by_one_standard_error(folds)
     row = results[choice.heuristic].find_row(choice.n)
     assert row is not None  # only sizes of the heuristic itself are judged
-    own = found[choice.heuristic]
-    best = min(found.values(), key=lambda r: float(r.mean.min()))
+    own = folds[choice.heuristic]
+    best = min(folds.values(), key=lambda r: float(r.mean.min()))
     least = int(best.mean.argmin())
-    folds = own.torque_error.shape[0]
+    n_folds = own.torque_error.shape[0]
     if own is best and best.n[least] == choice.n:
         beside = "the least of all, and no smaller model is within one standard error of it"
     else:
@@ -91,7 +91,7 @@ def _choose_by_cross_validation(
             f"with n = {best.n[least]}"
         )
     reason = (
-        f"{choice.heuristic} with n = {choice.n}: with each of {folds} parts left out in turn its torque error "
+        f"{choice.heuristic} with n = {choice.n}: with each of {n_folds} parts left out in turn its torque error "
         f"there is {format_percent(float(own.mean[own.n == choice.n][0]))}, {beside}."
     )
     return choice.heuristic, row, reason
@@ -115,7 +115,7 @@ def _find_of_size(n: int, results: Mapping[str, HeuristicValidation]) -> Pick:
 
 
 def _explain_choice(
-    wanted: SelectedSection,
+    section: SelectedSection,
     tolerances: Mapping[str, float],
     reduction: Reduction,
     heuristic: str,
@@ -125,7 +125,7 @@ def _explain_choice(
     who = f"{heuristic} with n = {n}"
     if set(tolerances) == {"operations"}:
         return f"{who} has the smallest torque error with {_format_tolerances(tolerances)}."
-    whose = f" of {wanted.heuristic}" if wanted.heuristic is not None else ""
+    whose = f" of {section.heuristic}" if section.heuristic is not None else ""
     text = f"{who} is the smallest model found{whose} with {_format_tolerances(tolerances)}"
     limit = tolerances.get("torque_error")
     if reduction.proofs is None or limit is None or n == 1:

@@ -4,7 +4,14 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
-from paramreduce_cli.records import DataVariant, FloatArray, IntArray, Progress, Stability, Tell
+from paramreduce_cli.records import (
+    DataVariant,
+    FloatArray,
+    IntArray,
+    Progress,
+    ProgressCallback,
+    Stability,
+)
 from paramreduce_cli.reduction.fitting import fit
 from paramreduce_cli.reduction.problem import SelectionProblem
 
@@ -13,7 +20,7 @@ def measure_stability(
     problem: SelectionProblem,
     factors: Sequence[tuple[DataVariant, FloatArray]],
     select: Callable[[SelectionProblem], IntArray],
-    tell: Tell,
+    report_progress: ProgressCallback,
 ) -> Stability:
     """Repeat the selection on other data.
 
@@ -21,7 +28,7 @@ def measure_stability(
         problem: Selection problem, whose candidates, preference and groups stay.
         factors: Triangular factors of the weighted [W | chi], with the variant of the data.
         select: Returns the subset for a problem.
-        tell: Called with the progress.
+        report_progress: Called with the progress.
     """
     n = problem.W.shape[1]
     chosen = np.zeros((len(factors), n), dtype=bool)
@@ -34,5 +41,5 @@ def measure_stability(
         chosen[k, subset] = True
         values[k, subset] = fitted.parameters
         errors[k] = fitted.torque_error
-        tell(Progress("selection on other data", k + 1, len(factors)))
+        report_progress(Progress("selection on other data", k + 1, len(factors)))
     return Stability(tuple(variant for variant, _ in factors), chosen, values, errors)

@@ -46,7 +46,7 @@ class Counts:
         self._model = model
 
     @cached_property
-    def _plain(self) -> PlainDynamics:
+    def _make_textbook(self) -> PlainDynamics:
         return PlainDynamics(self._model.mechanism)
 
     @cached_property
@@ -74,7 +74,7 @@ class Counts:
         return [
             count
             for signs_free in (True, False)
-            for count in self._plain.count_operations(
+            for count in self._make_textbook.count_operations(
                 model, signs_free=signs_free, independent=self._independent
             )
         ]
@@ -110,11 +110,11 @@ def count_all(
     return np.array([known[key] for key in keys], dtype=np.int64)
 
 
-def digest_structure(one: ReducedModel, model: Model) -> bytes:
+def digest_structure(reduced: ReducedModel, model: Model) -> bytes:
     """Return what the operations of a reduced model depend on: which parameters are kept, and which share a value."""
-    one = one.drop_unaffecting(model.affecting)
-    ties = one.ties
-    return bytes(str([ties.get(k, k) for k in one.kept.tolist()]), "ascii")
+    reduced = reduced.drop_unaffecting(model.affecting)
+    ties = reduced.ties
+    return bytes(str([ties.get(k, k) for k in reduced.kept.tolist()]), "ascii")
 
 
 def _count(counts: Counts, chunk: list[tuple[bytes, ReducedModel]]) -> dict[bytes, list[int]]:

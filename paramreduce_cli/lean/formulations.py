@@ -133,14 +133,14 @@ def _starts(direct: bool) -> tuple[JointFormulation, ...]:
 
 
 def _run_searches(
-    mechanism: Mechanism, asked: Sequence[_SearchChain], jobs: int
+    mechanism: Mechanism, chains: Sequence[_SearchChain], jobs: int
 ) -> Iterator[tuple[_SearchChain, list[_Choices]]]:
     """Yield each chain of searches with its results, in any order."""
     pays = len(choose_frames(mechanism).joints) >= _MANY
     with start_workers(
-        min(jobs, len(asked)) if pays else 1, partial(_return_mechanism, mechanism)
+        min(jobs, len(chains)) if pays else 1, partial(_return_mechanism, mechanism)
     ) as pool:
-        yield from pool.map_unordered(_work, asked)
+        yield from pool.map_unordered(_work, chains)
     forget()
 
 
@@ -148,15 +148,15 @@ def _return_mechanism(mechanism: Mechanism) -> Mechanism:
     return mechanism
 
 
-def _work(mechanism: Mechanism, asked: _SearchChain) -> list[_Choices]:
-    return _run_chain(mechanism, asked)
+def _work(mechanism: Mechanism, chain: _SearchChain) -> list[_Choices]:
+    return _run_chain(mechanism, chain)
 
 
-def _run_chain(mechanism: Mechanism, asked: _SearchChain) -> list[_Choices]:
+def _run_chain(mechanism: Mechanism, chain: _SearchChain) -> list[_Choices]:
     """Return the choices that each search of a chain ends with."""
-    tree, build = choose_frames(mechanism), _build(asked.direct)
-    choices, found = list(asked.start), []
-    for dropped in asked.dropped:
+    tree, build = choose_frames(mechanism), _build(chain.direct)
+    choices, found = list(chain.start), []
+    for dropped in chain.dropped:
         choices = search_choices(tree, build, choices, dropped)
         found.append(tuple(choices))
     return found

@@ -102,6 +102,7 @@ def split_axial_part(
 
 
 def _make_zero_inertia(body: Inertia) -> Inertia:
+    """Return an inertia of zeros in the graph of another inertia."""
     zero = body.m - body.m
     return Inertia(zero, (zero, zero, zero), *[zero] * 6)
 
@@ -164,7 +165,7 @@ def transfer_inertia(
     i: int,
     axial: Inertia,
     handed: Inertia,
-    own: list[Inertia],
+    inertias: list[Inertia],
     at_rest: list[Inertia],
 ) -> None:
     """Add a joint's inertia to the inertia of the parent body.
@@ -174,15 +175,15 @@ def transfer_inertia(
         i: Number of the joint.
         axial: Part that may as well belong to the parent body.
         handed: Inertia in the frame at rest.
-        own: Inertias of all bodies, in their frames; changed in place.
+        inertias: Inertias of all bodies, in their frames; changed in place.
         at_rest: Inertias of all bodies, in their frames at rest; changed in place.
     """
     state = kinematics.states[i]
     parent = state.joint.parent
     if state.aligned:
         place = kinematics.symbols.make_vector(state.joint.place)
-        own[parent] = own[parent] + axial.move_point(place)
+        inertias[parent] = inertias[parent] + axial.move_point(place)
         at_rest[parent] = at_rest[parent] + handed.move_point(state.reach)
     else:
         both = state.rest_to_parent.rotate_inertia(handed + axial)
-        own[parent] = own[parent] + both.move_point(state.reach)
+        inertias[parent] = inertias[parent] + both.move_point(state.reach)

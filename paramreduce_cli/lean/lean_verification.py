@@ -58,10 +58,10 @@ def check_formulations(
             program = Program.from_graph(*Values(graph, outputs).simplify())
             values = program.evaluate(inputs)
             got = np.column_stack([np.broadcast_to(value, q.shape[0]) for value in values])
-            refuse_if_off(f"a lean formulation of the {kind} dynamics", got - wanted, wanted)
+            reject_if_wrong(f"a lean formulation of the {kind} dynamics", got - wanted, wanted)
 
 
-def refuse_if_off(
+def reject_if_wrong(
     what: str, off: FloatArray, against: FloatArray, tolerance: float = TOLERANCE
 ) -> None:
     """Refuse results that are too far from those of plain recursion.

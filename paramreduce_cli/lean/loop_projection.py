@@ -60,6 +60,7 @@ def _read_tangent(mechanism: Mechanism, graph: Graph) -> tuple[list[list[Scalar]
 
 
 def _multiply_vectors(a: Sequence[Scalar], b: Sequence[Scalar], graph: Graph) -> Scalar:
+    """Return the scalar product of two vectors."""
     result = Scalar(graph, graph.constant(0.0))
     for x, y in zip(a, b, strict=True):
         result = result + x * y

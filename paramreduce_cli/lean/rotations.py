@@ -9,7 +9,7 @@ from paramreduce_cli.expressions.vectors import Vector
 from paramreduce_cli.lean.algebra import Scalar, cache_expressions
 from paramreduce_cli.lean.inertia_expressions import Inertia
 from paramreduce_cli.records import FloatArray
-from paramreduce_cli.robots.frames import count_quarter_turns
+from paramreduce_cli.robots.frames import count_right_angles
 
 _SLIGHT = 1e-3
 """Sine of a tilt below which rounding would show in the angles of the turns before and after it."""
@@ -54,7 +54,7 @@ class JointRotation:
 
 def make_joint_rotation(angle: Scalar, offset: float) -> JointRotation:
     """Return the rotation by angle + offset; whole multiples of 90 degrees cost nothing and are exact."""
-    quarters = count_quarter_turns(offset)
+    quarters = count_right_angles(offset)
     if quarters is None:
         angle, quarters = angle + offset, 0
     c, s = angle.take_cosine(), angle.take_sine()
@@ -87,7 +87,7 @@ class ConstantRotation:
         if self.is_permutation or self._slight:
             return _multiply_rows(self._rows, a)
         first, middle, last = self._turns
-        return last.to_parent(_cycle(middle.to_parent(_cycle_back(first.to_parent(a)))))
+        return last.to_parent(_cycle(middle.to_parent(_uncycle(first.to_parent(a)))))
 
     @cache_expressions
     def to_child(self, a: Vector) -> Vector:
@@ -95,7 +95,7 @@ class ConstantRotation:
         if self.is_permutation or self._slight:
             return _multiply_rows(self._columns, a)
         first, middle, last = self._turns
-        return first.to_child(_cycle(middle.to_child(_cycle_back(last.to_child(a)))))
+        return first.to_child(_cycle(middle.to_child(_uncycle(last.to_child(a)))))
 
     @cache_expressions
     def rotate_inertia(self, body: Inertia) -> Inertia:
@@ -143,7 +143,7 @@ def _find_euler_angles(rotation: FloatArray) -> list[tuple[float, float]]:
     return [first, (cosine, sine), last]
 
 
-def _cycle_back(a: Vector) -> Vector:
+def _uncycle(a: Vector) -> Vector:
     """Return the components with x in the place of z."""
     return (a[1], a[2], a[0])
 
@@ -153,5 +153,6 @@ def _cycle(a: Vector) -> Vector:
 
 
 def _multiply_rows(rows: list[list[float]], a: Vector) -> Vector:
+    """Return the product of a constant matrix and a vector."""
     x, y, z = (row[0] * a[0] + row[1] * a[1] + row[2] * a[2] for row in rows)
     return (x, y, z)

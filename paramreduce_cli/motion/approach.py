@@ -128,13 +128,13 @@ class PathPlanner:
                 return [clear[leg] for leg in legs]
         return []
 
-    def _sample_poses(self, one: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
+    def _sample_poses(self, position: FloatArray, other: FloatArray) -> Iterator[FloatArray]:
         """Yield clear poses, the same at every call: around the middle, and ever farther away."""
         rng = np.random.default_rng(0)
         limits = self._limits
         for k in range(_POSES):
             spread = _FARTHEST * limits.reach * (k + 1) / _POSES
-            pose = (one + other) / 2 + spread * rng.normal(size=one.size)
+            pose = (position + other) / 2 + spread * rng.normal(size=position.size)
             pose = np.clip(pose, limits.lower, limits.upper)
             if self._find_violated_bound(pose[None]) is None:
                 yield pose

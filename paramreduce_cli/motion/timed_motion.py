@@ -41,7 +41,7 @@ def sample_motion(
     rate: float,
     title: str,
     start_pose: FloatArray | None = None,
-    ways: PathPlanner | None = None,
+    planner: PathPlanner | None = None,
 ) -> TimedMotion:
     """Return a trajectory at some rate, from the pose of the machine and back to it.
 
@@ -52,7 +52,7 @@ def sample_motion(
         rate: Samples per second.
         title: Title for people.
         start_pose: Where the machine stands, (n_dof,); None to begin with the trajectory itself.
-        ways: Finds ways there and back, where there is a pose.
+        planner: Finds ways there and back, where there is a pose.
 
     Raises:
         DataError: No way there and back was found that keeps to limits and bounds.
@@ -65,15 +65,15 @@ def sample_motion(
         z, dz, ddz = evaluate_basis(period, harmonics, time).evaluate(trajectory.coefficients)
         return z + 2 * np.pi * turns, dz, ddz
 
-    if start_pose is None or ways is None:
+    if start_pose is None or planner is None:
         time = np.arange(int(np.floor(period * rate + 1e-9)) + 1) / rate
         z, dz, ddz = along(time)
         return TimedMotion(title, names, rate, time, z, dz, ddz, 0.0, period)
-    turns = _choose_turns(mechanism, trajectories, along, start_pose)
+    turns = _choose_revolutions(mechanism, trajectories, along, start_pose)
     border = tuple(state[0] for state in along(np.zeros(1)))
     there, back = (
-        ways.plan(make_rest_state(start_pose), border),
-        ways.plan(border, make_rest_state(start_pose)),
+        planner.plan(make_rest_state(start_pose), border),
+        planner.plan(border, make_rest_state(start_pose)),
     )
     lead = sum(way.duration for way in there)
     parts: list[tuple[float, Callable[[FloatArray], State]]] = [
@@ -85,7 +85,7 @@ def sample_motion(
     return TimedMotion(title, names, rate, time, z, dz, ddz, lead, period)
 
 
-def _choose_turns(
+def _choose_revolutions(
     mechanism: Mechanism,
     trajectories: Trajectories,
     along: Callable[[FloatArray], State],

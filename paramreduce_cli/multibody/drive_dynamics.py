@@ -49,6 +49,7 @@ def express_unit_force(
 
 
 def _express_friction_sign(drive: Drive, states: Sequence[Sequence[Any]], odd: OddFunctions) -> Any:
+    """Return the sign of a drive's speed, smoothed by a hyperbolic tangent if the drive asks for it."""
     speed = sum_along(drive, states[1])
     return odd.tanh(speed * (1 / drive.smoothing)) if drive.smoothing else odd.sign(speed)
 

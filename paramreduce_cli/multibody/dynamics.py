@@ -139,7 +139,7 @@ class Dynamics:
             return ObservationFunction(states, tree(*states), lambda q_bar: q_bar)
         dz, ddz = ca.MX.sym("dz", self.n_dof), ca.MX.sym("ddz", self.n_dof)
         KT = loop.project_regressor(tree, *loop.express_rates(dz, ddz))
-        return ObservationFunction([loop.q, dz, ddz], KT, loop.pull_back)
+        return ObservationFunction([loop.q, dz, ddz], KT, loop.compute_vector_jacobian_product)
 
 
 class ObservationFunction:
@@ -148,16 +148,16 @@ class ObservationFunction:
     Args:
         states: Symbols of q, dz and ddz.
         KT: Columns of the regressor of one sample in them, transposed, (n_columns, n_dof).
-        pulled: Takes a derivative by q to one by z.
+        gradient: Takes a derivative by q to one by z.
     """
 
-    def __init__(self, states: list[ca.MX], KT: ca.MX, pulled: Callable[[ca.MX], ca.MX]) -> None:
+    def __init__(self, states: list[ca.MX], KT: ca.MX, gradient: Callable[[ca.MX], ca.MX]) -> None:
         self.n_columns, self.n_dof = KT.shape
         self._forward = BatchFunction(states, [KT])
         seed = ca.MX.sym("seed", self.n_columns, self.n_dof)
         inner = ca.dot(seed, KT)
         q_bar, dz_bar, ddz_bar = (ca.gradient(inner, state) for state in states)
-        self._adjoint = BatchFunction([*states, ca.vec(seed)], [pulled(q_bar), dz_bar, ddz_bar])
+        self._adjoint = BatchFunction([*states, ca.vec(seed)], [gradient(q_bar), dz_bar, ddz_bar])
 
     def evaluate(self, q: FloatArray, dz: FloatArray, ddz: FloatArray) -> FloatArray:
         """Return W, (n_samples * n_dof, n_columns).
@@ -170,7 +170,7 @@ class ObservationFunction:
         (K,) = self._forward(q, dz, ddz)
         return K.reshape(-1, self.n_columns)
 
-    def pull_back(
+    def compute_vector_jacobian_product(
         self, q: FloatArray, dz: FloatArray, ddz: FloatArray, W_bar: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Pull a derivative with respect to W back to the independent coordinates.

@@ -106,12 +106,12 @@ def _express_inertial_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tup
         apply(back, rates.omega_dot),
         apply(back, rates.accelerate_point(place)),
     )
-    force, moment = _express_own_wrench(rigid, phi, own)
+    force, moment = _express_body_wrench(rigid, phi, own)
     force, moment = apply(turn.tolist(), force), apply(turn.tolist(), moment)
     return force, add(moment, cross(place, force))
 
 
-def _express_own_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
+def _express_body_wrench(rigid: Rigid, phi: ca.SX, rates: FrameRates) -> tuple[Vector, Vector]:
     """Return force and moment about the origin of the part's own frame, in that frame."""
     values = [phi[column] for column in (rigid.columns[kind] for kind in INERTIAL)]
     m, d, (xx, xy, xz, yy, yz, zz) = values[0], values[1:4], values[4:]

@@ -7,7 +7,7 @@ import numpy as np
 
 from paramreduce_cli.expressions.vectors import Vector, add, apply
 from paramreduce_cli.records import BASE, Body, FloatArray, Mechanism
-from paramreduce_cli.robots.frames import count_quarter_turns
+from paramreduce_cli.robots.frames import count_right_angles
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def make_joint_motion(body: Body, z: ca.SX) -> JointMotion:
 
 def express_cosine_and_sine(z: ca.SX, offset: float) -> tuple[ca.SX, ca.SX]:
     """Return cosine and sine of z + offset; whole quarter turns are exact and cost no operations."""
-    quarters = count_quarter_turns(offset)
+    quarters = count_right_angles(offset)
     if quarters is None:
         return ca.cos(z + offset), ca.sin(z + offset)
     c, s = ca.cos(z), ca.sin(z)

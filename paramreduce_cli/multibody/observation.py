@@ -246,6 +246,7 @@ def _reduce(stacked: FloatArray) -> FloatArray:
 
 
 def _factorise(rows: FloatArray) -> FloatArray:
+    """Return the triangular factor of rows."""
     result: FloatArray = np.linalg.qr(rows, mode="r")  # type: ignore[assignment]
     return result
 

@@ -63,17 +63,19 @@ def normalise_columns(W: FloatArray) -> tuple[FloatArray, FloatArray]:
     return W / lengths, lengths
 
 
-def select_independent(W: FloatArray, wanted: IntArray, dependent: float = DEPENDENT) -> list[int]:
+def select_independent(
+    W: FloatArray, preferred: IntArray, dependent: float = DEPENDENT
+) -> list[int]:
     """Take columns in the order wanted, leaving out those that depend on columns taken before.
 
     Args:
         W: (k, n)
-        wanted: Column indices.
+        preferred: Column indices.
         dependent: A column depends on others when no more than this share of its length is
             left of it.
     """
-    rest = Orthogonaliser(normalise_columns(W[:, wanted])[0], dependent=dependent)
-    return [int(column) for j, column in enumerate(wanted) if rest.take(j)]
+    rest = Orthogonaliser(normalise_columns(W[:, preferred])[0], dependent=dependent)
+    return [int(column) for j, column in enumerate(preferred) if rest.take(j)]
 
 
 def solve_least_squares(factor: FloatArray) -> FloatArray:

@@ -3,16 +3,18 @@
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from paramreduce_cli.records import Block, FloatArray, Progress, SampleSet, Tell
+from paramreduce_cli.records import Block, FloatArray, Progress, ProgressCallback, SampleSet
 
 
-def told(blocks: Iterable[Block], n_samples: int, what: str, tell: Tell) -> Iterator[Block]:
+def add_progress(
+    blocks: Iterable[Block], n_samples: int, what: str, report_progress: ProgressCallback
+) -> Iterator[Block]:
     """Blocks as they are, with an audience that hears how far the reading has come."""
     done = 0
     for block in blocks:
         yield block
         done += block.time.size
-        tell(Progress(what, done, n_samples))
+        report_progress(Progress(what, done, n_samples))
 
 
 @dataclass(frozen=True)
@@ -21,7 +23,7 @@ class ToldSet:
 
     computed: SampleSet
     what: str
-    tell: Tell
+    tell: ProgressCallback
 
     @property
     def n_samples(self) -> int:
@@ -35,7 +37,7 @@ class ToldSet:
 
     def iterate_blocks(self) -> Iterator[Block]:
         """Yield the samples in order; every call starts anew."""
-        return told(self.computed.iterate_blocks(), self.n_samples, self.what, self.tell)
+        return add_progress(self.computed.iterate_blocks(), self.n_samples, self.what, self.tell)
 
     def compute_factors(self) -> FloatArray:
         """Triangular factors of [W | tau] per trajectory and joint."""

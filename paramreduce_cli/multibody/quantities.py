@@ -57,7 +57,7 @@ class Quantities:
         """Compiled derivatives of the rows by the independent coordinates."""
         q, loop = self._symbols[0], self._projection
         by_q = ca.jacobian(self._bounded, q)
-        by_z = by_q if loop is None else loop.pull_back(by_q.T).T
+        by_z = by_q if loop is None else loop.compute_vector_jacobian_product(by_q.T).T
         return BatchFunction([q], [by_z.T])
 
     @cached_property

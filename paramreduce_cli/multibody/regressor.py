@@ -115,6 +115,7 @@ def _propagate_states(
 
 
 def _make_frame_symbols() -> list[ca.SX]:
+    """Return symbols of a frame: rotation, position, angular velocity and acceleration, acceleration."""
     vectors = (ca.SX.sym(name, 3) for name in ("p", "omega", "omega_dot", "a"))
     return [ca.SX.sym("R", 3, 3), *vectors]
 

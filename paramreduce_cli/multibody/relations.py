@@ -90,7 +90,7 @@ def format_regrouping(
 
 
 def approximate_expressions(
-    names: Sequence[str], kept: IntArray, beta: FloatArray, known: FloatArray | None = None
+    names: Sequence[str], kept: IntArray, beta: FloatArray, known_values: FloatArray | None = None
 ) -> list[str]:
     """Approximate base parameters in terms of standard ones, with plain numbers.
 
@@ -101,17 +101,17 @@ def approximate_expressions(
         names: Of all parameters, (n,).
         kept: Columns of the approximate base parameters, (n_kept,).
         beta: Coefficients of the others in ascending order, (n_kept, n - n_kept).
-        known: Values of all parameters; without them all terms are printed, in the order of the names.
+        known_values: Values of all parameters; without them all terms are printed, in the order of the names.
     """
 
     def term(i: int, j: int) -> str:
         return format_signed(float(beta[i, j]))
 
-    if known is None:
+    if known_values is None:
         return _format_expressions(names, kept, beta, term)
     others = np.setdiff1d(np.arange(len(names)), kept)
-    parts = np.abs(beta * known[others])
-    wholes = np.abs(known[kept]) + parts.sum(axis=1)
+    parts = np.abs(beta * known_values[others])
+    wholes = np.abs(known_values[kept]) + parts.sum(axis=1)
     shares = parts / np.maximum(wholes, np.finfo(float).tiny)[:, None]
     return [
         _format_sum([f"{term(i, j)} {names[k]}" for j, k in enumerate(others)], own, names[column])
@@ -119,19 +119,19 @@ def approximate_expressions(
     ]
 
 
-def _format_sum(terms: Sequence[str], shares: FloatArray, first: str) -> str:
+def _format_sum(terms: Sequence[str], coefficients: FloatArray, first: str) -> str:
     """Return a sum with its largest terms first, whose smallest terms are only counted.
 
     Args:
         terms: With their signs.
-        shares: Of the whole that they are, (n_terms,).
+        coefficients: Of the whole that they are, (n_terms,).
         first: What they are added to.
     """
-    order = np.argsort(-shares, kind="stable")
-    remaining = shares[order][::-1].cumsum()[::-1]
+    order = np.argsort(-coefficients, kind="stable")
+    remaining = coefficients[order][::-1].cumsum()[::-1]
     printed = min(int((remaining >= _COUNTED).sum()), _MOST_PRINTED)
     text = " ".join([first, *(terms[k] for k in order[:printed])])
-    small = int((shares[order[printed:]] > _IGNORED).sum())
+    small = int((coefficients[order[printed:]] > _IGNORED).sum())
     if not small:
         return text
     them = "1 smaller term" if small == 1 else f"{small} smaller terms, together"

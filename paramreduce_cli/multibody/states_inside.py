@@ -33,7 +33,7 @@ class StatesInside:
         lower: Least coordinates, velocities and accelerations, (3, n_q).
         upper: The largest.
         constraints: That positions keep to besides.
-        known: Generalised coordinates of some states, (n_known, n_q).
+        known_positions: Generalised coordinates of some states, (n_known, n_q).
     """
 
     def __init__(
@@ -42,9 +42,9 @@ class StatesInside:
         lower: FloatArray,
         upper: FloatArray,
         constraints: Sequence[Constraint],
-        known: FloatArray,
+        known_positions: FloatArray,
     ) -> None:
-        self._mechanism, self._known = mechanism, known
+        self._mechanism, self._known = mechanism, known_positions
         self._lower, self._upper = lower, upper
         self._independent = list(mechanism.independent)
         self._quantities = Quantities(mechanism, constraints)
@@ -113,16 +113,16 @@ class StatesInside:
         rates, (_, dz, ddz) = self._coordinates.compute_rates, np.moveaxis(drawn, 1, 0)
         still = np.zeros_like(dz)
         dq, _ = rates(q, dz, still)
-        dz = dz * _compute_shares(dq, self._lower[1], self._upper[1])
+        dz = dz * _compute_ratios(dq, self._lower[1], self._upper[1])
         _, drift = rates(q, dz, still)  # grows with the square of the velocities
-        dz = dz * np.sqrt(_compute_shares(drift, _DRIFT * self._lower[2], _DRIFT * self._upper[2]))
+        dz = dz * np.sqrt(_compute_ratios(drift, _DRIFT * self._lower[2], _DRIFT * self._upper[2]))
         _, drift = rates(q, dz, still)
         _, ddq = rates(q, dz, ddz)
-        ddz = ddz * _compute_shares(ddq - drift, self._lower[2] - drift, self._upper[2] - drift)
+        ddz = ddz * _compute_ratios(ddq - drift, self._lower[2] - drift, self._upper[2] - drift)
         return (q, *rates(q, dz, ddz))
 
 
-def _compute_shares(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+def _compute_ratios(rates: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
     """Return the shares of rates, (n_samples, n_q), that are inside limits around zero, one at most, (n_samples, 1)."""
     bound = np.where(rates > 0, upper, lower)
     shares = np.divide(bound, rates, out=np.ones_like(rates), where=rates != 0)

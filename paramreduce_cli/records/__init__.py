@@ -71,7 +71,7 @@ from paramreduce_cli.records.reduction import (
     SelectionMethod,
     Subsets,
 )
-from paramreduce_cli.records.run import Progress, Provenance, Report, Run, Stored, Tell
+from paramreduce_cli.records.run import Progress, ProgressCallback, Provenance, Report, Run, Stored
 from paramreduce_cli.records.samples import SETS, Block, Recording, Recordings, Samples, SampleSet
 from paramreduce_cli.records.terms import (
     NO_OPERAND,

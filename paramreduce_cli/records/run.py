@@ -30,7 +30,7 @@ class Progress:
     detail: str = ""
 
 
-Tell = Callable[[Progress], None]
+ProgressCallback = Callable[[Progress], None]
 """An audience of long work."""
 
 
@@ -56,7 +56,7 @@ class Run:
 
     jobs: int = 1
     """Worker processes; 0 for doing all in this one."""
-    progress: Tell = lambda _: None
+    progress: ProgressCallback = lambda _: None
     interrupted: Callable[[], None] = lambda: None
     """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""
     unchanged: frozenset[str] = frozenset()

@@ -83,7 +83,7 @@ def _make_model(
 
 
 def make_reduced_model(
-    reduction: Reduction, heuristic: str, row: int, known: FloatArray | None = None
+    reduction: Reduction, heuristic: str, row: int, known_values: FloatArray | None = None
 ) -> ReducedModel:
     """Return a subset as a model with expressions.
 
@@ -91,11 +91,11 @@ def make_reduced_model(
         reduction: Reduction that holds the subset.
         heuristic: Heuristic that found the subset.
         row: Row of the subset.
-        known: Standard parameters, (n_standard,), by which the terms of expressions are ordered and small terms are
+        known_values: Standard parameters, (n_standard,), by which the terms of expressions are ordered and small terms are
             counted.
     """
     found, columns = reduction.heuristics[heuristic], reduction.columns
-    whole = None if known is None else np.linalg.pinv(columns.expansion) @ known
+    whole = None if known_values is None else np.linalg.pinv(columns.expansion) @ known_values
     order = np.argsort(found.subsets[row])
     kept, beta = found.subsets[row][order], found.beta[row][order]
     expressions = approximate_expressions(columns.names, kept, beta, whole)

@@ -13,22 +13,22 @@ from paramreduce_cli.reduction.problem import SelectionProblem
 from paramreduce_cli.reduction.task import Effort
 
 
-def make_columns(wanted: ReductionSection, samples: Samples) -> GroupedColumns:
+def make_columns(section: ReductionSection, samples: Samples) -> GroupedColumns:
     """Return the columns that the selection chooses among."""
     groups = [
-        Group(name, tuple(members), section.tied)
-        for section in wanted.groups
-        for name, members in section.list_groups().items()
+        Group(name, tuple(members), entry.tied)
+        for entry in section.groups
+        for name, members in entry.list_groups().items()
     ]
     return group_columns(samples.names, samples.preference, groups)
 
 
-def make_effort(wanted: ReductionSection, run: Run) -> Effort:
+def make_effort(section: ReductionSection, run: Run) -> Effort:
     """Return the effort that the config asks for."""
     return Effort(
-        time_limit=wanted.best_subset.time_limit,
-        node_limit=wanted.best_subset.node_limit,
-        subtrees=wanted.best_subset.parts == "subtrees",
+        time_limit=section.best_subset.time_limit,
+        node_limit=section.best_subset.node_limit,
+        subtrees=section.best_subset.parts == "subtrees",
         jobs=max(1, run.jobs),
     )
 

@@ -49,14 +49,14 @@ class Answer:
     """That writes the model as code."""
 
 
-def gather_answer(data: ReportData, asked: str) -> Answer:
+def gather_answer(data: ReportData, options: str) -> Answer:
     """Gather what the page begins with.
 
     Args:
         data: Records that the report shows.
-        asked: Config and options that name the run at the shell.
+        options: Config and options that name the run at the shell.
     """
-    export = "paramreduce export" + (f" {asked}" if asked else "")
+    export = "paramreduce export" + (f" {options}" if options else "")
     return Answer(
         parameters=_list_parameters(data, data.validation.selected.model),
         kinds=_list_kinds(data),

@@ -67,11 +67,11 @@ _Values = dict[int, float] | None
 
 
 def _find_same_curve(
-    own: list[_Values], sizes: list[int], found: list[Curve], models: list[list[_Values]]
+    values: list[_Values], sizes: list[int], curves: list[Curve], models: list[list[_Values]]
 ) -> int | None:
     """Return the position of the curve with the same models; None if there is none."""
-    for place, (curve, others) in enumerate(zip(found, models, strict=True)):
-        if curve.result.n.tolist() == sizes and all(map(_is_same, own, others)):
+    for place, (curve, others) in enumerate(zip(curves, models, strict=True)):
+        if curve.result.n.tolist() == sizes and all(map(_is_same, values, others)):
             return place
     return None
 
@@ -93,10 +93,10 @@ def _find_values(data: ReportData, choice: ModelChoice) -> _Values:
     return dict(zip(found.subsets[row].tolist(), found.parameters[row].tolist(), strict=True))
 
 
-def _is_same(one: _Values, other: _Values) -> bool:
+def _is_same(first: _Values, second: _Values) -> bool:
     """Return whether two models have the same parameters and values."""
-    if one is None or other is None:
-        return one is other
-    return set(one) == set(other) and bool(
-        np.allclose([other[k] for k in one], list(one.values()), rtol=EQUAL, atol=0)
+    if first is None or second is None:
+        return first is second
+    return set(first) == set(second) and bool(
+        np.allclose([second[k] for k in first], list(first.values()), rtol=EQUAL, atol=0)
     )

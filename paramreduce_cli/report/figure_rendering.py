@@ -22,7 +22,7 @@ def render_figures(
     formats: list[str],
     *,
     jobs: int = 1,
-    told: Callable[[int, str], None] = lambda *_: None,
+    on_figure: Callable[[int, str], None] = lambda *_: None,
 ) -> dict[str, Encoded]:
     """Return figures by name, in the given order, without those that have nothing to draw.
 
@@ -31,7 +31,7 @@ def render_figures(
         data: Records that the figures show.
         formats: Formats in which the figures are encoded.
         jobs: Processes at most; a few figures are drawn in this one.
-        told: Progress callback with the number of finished figures and the name of the last one.
+        on_figure: Progress callback with the number of finished figures and the name of the last one.
 
     Raises:
         DataError: A process died.
@@ -42,7 +42,7 @@ def render_figures(
     with start_workers(jobs, partial(_DrawingTask, shown, formats)) as pool:
         for name, encoded in pool.map_unordered(_draw, names):
             found[name] = encoded
-            told(len(found), name)
+            on_figure(len(found), name)
     return {name: found[name] for name in names if found[name]}
 
 

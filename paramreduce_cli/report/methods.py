@@ -124,22 +124,24 @@ def _write_log(log: MeasuredLog) -> str:
     )
 
 
-def _write_trajectories(found: Trajectories) -> str:
+def _write_trajectories(trajectories: Trajectories) -> str:
     """Return the sentences on optimised trajectories."""
-    count = f"{len(found.estimation)} estimation, {len(found.validation)} validation and {len(found.test)} test trajectories"
-    if found.source:
-        return (
-            f"Finite Fourier series [Swevers1996] were given for {count} of {found.period:.4g} s."
-        )
-    limits = found.limits
+    count = f"{len(trajectories.estimation)} estimation, {len(trajectories.validation)} validation and {len(trajectories.test)} test trajectories"
+    if trajectories.source:
+        return f"Finite Fourier series [Swevers1996] were given for {count} of {trajectories.period:.4g} s."
+    limits = trajectories.limits
     kinds = {"velocity": limits.velocity, "acceleration": limits.acceleration,
              "torque": limits.torque, "power": limits.power}  # fmt: skip
     kept = ["position", *(kind for kind, values in kinds.items() if np.isfinite(values).any())]
-    bounded = f" and {len(found.constraints)} bounded quantities" if found.constraints else ""
-    kappas = [t.kappa for t in found.estimation]
+    bounded = (
+        f" and {len(trajectories.constraints)} bounded quantities"
+        if trajectories.constraints
+        else ""
+    )
+    kappas = [t.kappa for t in trajectories.estimation]
     return (
-        f"{count[0].upper()}{count[1:]} of {found.period:.4g} s, finite Fourier series [Swevers1996] within limits of "
-        f"{', '.join(kept)}{bounded}, were optimised by the {found.criterion} criterion of the {found.scaling} observation "
+        f"{count[0].upper()}{count[1:]} of {trajectories.period:.4g} s, finite Fourier series [Swevers1996] within limits of "
+        f"{', '.join(kept)}{bounded}, were optimised by the {trajectories.criterion} criterion of the {trajectories.scaling} observation "
         f"matrix; condition numbers of single estimation trajectories are {min(kappas):.3g} to {max(kappas):.3g}."
     )
 
@@ -208,18 +210,18 @@ _COUNTED = {
 """What is counted, by the function."""
 
 
-def _write_terms(found: TermReduction) -> Iterator[str]:
+def _write_terms(terms: TermReduction) -> Iterator[str]:
     """Yield the sentences on pruned functions."""
-    for name, term in found.functions.items():
+    for name, term in terms.functions.items():
         acceleration = ""
-        if name == "direct" and isfinite(found.acceleration_budget):
+        if name == "direct" and isfinite(terms.acceleration_budget):
             acceleration = (
-                f" and an acceleration error of {format_percent(found.acceleration_budget)}"
+                f" and an acceleration error of {format_percent(terms.acceleration_budget)}"
             )
         yield (
             f"Terms of the {name} dynamics that hardly matter were left out or replaced by multiples of others, and the "
             f"{term.values.size} parameters fitted again "
-            f"within a torque error of {format_percent(found.torque_budget)}{acceleration}: {term.operations} operations instead of "
+            f"within a torque error of {format_percent(terms.torque_budget)}{acceleration}: {term.operations} operations instead of "
             f"the {term.operations_start} of {term.heuristic} with {term.n_start} parameters, from which it began."
         )
 
@@ -231,17 +233,17 @@ _ESTIMATORS = {
 }
 
 
-def _write_identification(found: Identification) -> Iterator[str]:
+def _write_identification(identification: Identification) -> Iterator[str]:
     """Yield the sentences on identified values."""
     yield (
-        f"Values were identified from the measured torques by {_ESTIMATORS[found.estimator]}, with standard deviations for "
-        f"noise as coloured as the residuals; {format_percent(found.reduced.held_out)} of the torques held out stay unexplained, "
-        f"{format_percent(found.full.held_out)} with all base parameters."
+        f"Values were identified from the measured torques by {_ESTIMATORS[identification.estimator]}, with standard deviations for "
+        f"noise as coloured as the residuals; {format_percent(identification.reduced.held_out)} of the torques held out stay unexplained, "
+        f"{format_percent(identification.full.held_out)} with all base parameters."
     )
-    if found.consistency is not None:
+    if identification.consistency is not None:
         yield (
             "Standard parameters that a machine can have were found under constraints on the bodies' pseudo-inertia "
-            f"matrices and leave {format_percent(found.consistency.held_out)}."
+            f"matrices and leave {format_percent(identification.consistency.held_out)}."
         )
 
 

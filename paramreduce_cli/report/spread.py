@@ -133,5 +133,6 @@ def _number(value: float) -> str:
 
 
 def _list_names(names: Sequence[str]) -> str:
+    """Return the first names and the number of the others."""
     more = len(names) - _LISTED
     return " ".join(names[:_LISTED]) + (f" and {more} more" if more > 0 else "") or "-"

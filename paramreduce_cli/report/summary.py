@@ -82,7 +82,7 @@ def gather_summary(
     return plain
 
 
-def _summarise_leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
+def _summarise_leanest(leanest: Mapping[str, Leanest]) -> dict[str, Any]:
     """Return the leanest models within the limits, by function."""
     return {
         name: {
@@ -93,7 +93,7 @@ def _summarise_leanest(found: Mapping[str, Leanest]) -> dict[str, Any]:
                 "test": _summarise_range(ErrorRange.summarise(one.torque_error.test)),
             },
         }
-        for name, one in found.items()
+        for name, one in leanest.items()
     }
 
 
@@ -123,21 +123,21 @@ def _summarise_columns(reduction: Reduction) -> dict[str, Any]:
     }
 
 
-def _summarise_subsets(reduction: Reduction, found: Subsets) -> dict[str, Any]:
+def _summarise_subsets(reduction: Reduction, subsets: Subsets) -> dict[str, Any]:
     """Return the subsets of a heuristic."""
 
     def named(columns: IntArray) -> list[str]:
         return [reduction.columns.names[k] for k in columns]
 
-    nested = found.order is not None
+    nested = subsets.order is not None
     return {
-        "order": named(found.order) if found.order is not None else None,
-        "subsets": None if nested else [named(subset) for subset in found.subsets],
-        "n": found.n,
-        "torque_error_1": found.torque_error_1,
-        "torque_error_inf": found.torque_error_inf,
-        "minimum_norm_from": _find_first_beyond_rank(found),
-        "seconds": found.seconds,
+        "order": named(subsets.order) if subsets.order is not None else None,
+        "subsets": None if nested else [named(subset) for subset in subsets.subsets],
+        "n": subsets.n,
+        "torque_error_1": subsets.torque_error_1,
+        "torque_error_inf": subsets.torque_error_inf,
+        "minimum_norm_from": _find_first_beyond_rank(subsets),
+        "seconds": subsets.seconds,
     }
 
 
@@ -184,11 +184,11 @@ def _summarise_stability(reduction: Reduction, validation: Validation) -> dict[s
     }
 
 
-def _summarise_identification(found: Identification | None) -> dict[str, Any] | None:
+def _summarise_identification(identification: Identification | None) -> dict[str, Any] | None:
     """Return the identified values; None where there are none."""
-    if found is None:
+    if identification is None:
         return None
-    consistency = found.consistency
+    consistency = identification.consistency
     full, reduced = (
         {
             "n": len(estimate.names),
@@ -199,7 +199,7 @@ def _summarise_identification(found: Identification | None) -> dict[str, Any] | 
             "values": dict(zip(estimate.names, estimate.values, strict=True)),
             "deviations": dict(zip(estimate.names, estimate.deviations, strict=True)),
         }
-        for estimate in (found.full, found.reduced)
+        for estimate in (identification.full, identification.reduced)
     )
     physical = consistency and {
         "train": consistency.train,
@@ -207,26 +207,26 @@ def _summarise_identification(found: Identification | None) -> dict[str, Any] | 
         "bodies_positive": consistency.positive,
     }
     return {
-        "estimator": found.estimator,
+        "estimator": identification.estimator,
         "full": full,
         "reduced": reduced,
         "consistent": physical,
-        "comparison": found.comparison,
-        "hints": list(found.hints),
+        "comparison": identification.comparison,
+        "hints": list(identification.hints),
     }
 
 
-def _summarise_terms(model: Model | None, found: TermReduction | None) -> list[dict[str, Any]]:
+def _summarise_terms(model: Model | None, terms: TermReduction | None) -> list[dict[str, Any]]:
     """Return the pruned functions; empty where there are none."""
-    if model is None or found is None:
+    if model is None or terms is None:
         return []
     return [
         {
             "function": name,
             "heuristic": one.heuristic,
             "n_start": one.n_start,
-            "budget": {"torque": found.torque_budget, "acceleration": found.acceleration_budget},
-            "held_out": found.held_out,
+            "budget": {"torque": terms.torque_budget, "acceleration": terms.acceleration_budget},
+            "held_out": terms.held_out,
             "operations": one.operations,
             "operations_start": one.operations_start,
             **_summarise_errors(one),
@@ -247,7 +247,7 @@ def _summarise_terms(model: Model | None, found: TermReduction | None) -> list[d
                 for k, count in enumerate(one.front.operations)
             ],
         }
-        for name, one in found.functions.items()
+        for name, one in terms.functions.items()
     ]
 
 
@@ -288,25 +288,27 @@ def _summarise_trajectory(t: Trajectory) -> dict[str, Any]:
     return {**vars(t), "kappa_variants": dict(t.kappa_variants)}
 
 
-def _find_first_beyond_rank(found: Subsets) -> int | None:
+def _find_first_beyond_rank(subsets: Subsets) -> int | None:
     """Return the smallest size that is fitted with minimum norm."""
-    beyond = found.n[found.minimum_norm]
+    beyond = subsets.n[subsets.minimum_norm]
     return int(beyond[0]) if beyond.size else None
 
 
-def _summarise_rows(found: HeuristicValidation) -> list[dict[str, Any]]:
+def _summarise_rows(validation: HeuristicValidation) -> list[dict[str, Any]]:
     """Return errors and costs of all models of a heuristic, a row for every size."""
     parts = {
-        "torque_error": _add_joints(found.torque_error, found.joint_torque_error),
-        "acceleration_error": _add_joints(found.acceleration_error, found.joint_acceleration_error),
-        "operations": vars(found.operations),
-        "mass_matrix": vars(found.mass_matrix),
+        "torque_error": _add_joints(validation.torque_error, validation.joint_torque_error),
+        "acceleration_error": _add_joints(
+            validation.acceleration_error, validation.joint_acceleration_error
+        ),
+        "operations": vars(validation.operations),
+        "mass_matrix": vars(validation.mass_matrix),
     }
 
-    def entry(part: str, key: str, own: Any) -> Any:
+    def entry(part: str, key: str, values: Any) -> Any:
         if part == "operations":
-            return _convert_count(own)
-        return _summarise_range(ErrorRange.summarise(own)) if key == "test" else own
+            return _convert_count(values)
+        return _summarise_range(ErrorRange.summarise(values)) if key == "test" else values
 
     return [
         {"n": n}
@@ -314,7 +316,7 @@ def _summarise_rows(found: HeuristicValidation) -> list[dict[str, Any]]:
             part: {key: entry(part, key, column[k]) for key, column in columns.items()}
             for part, columns in parts.items()
         }
-        for k, n in enumerate(found.n)
+        for k, n in enumerate(validation.n)
     ]
 
 

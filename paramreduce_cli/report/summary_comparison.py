@@ -92,11 +92,13 @@ def _compare_kappa(
 
 
 def _list_kappas(summary: Summary) -> list[float]:
+    """Return the condition numbers of the estimation trajectories; unknown ones are infinite."""
     found = [t["kappa"] for t in summary["trajectories"]["estimation"]]
     return [math.inf if kappa is None else kappa for kappa in found] or [math.inf]
 
 
 def _find_median(values: list[float]) -> float:
+    """Return the median."""
     ordered = sorted(values)
     middle = len(ordered) // 2
     return (ordered[middle] + ordered[~middle]) / 2
@@ -145,6 +147,7 @@ def _compare_rows(
 
 
 def _list_values(value: Any) -> list[Any]:
+    """Return the entries of a mapping or a list; of a number the number alone."""
     if isinstance(value, dict):
         return list(value.values())
     return value if isinstance(value, list) else [value]
@@ -211,10 +214,10 @@ def _find_open_sizes(a: Summary, b: Summary, name: str) -> set[int]:
     return {n for n, status in first.items() if second.get(n, status) != status}
 
 
-def _iterate_subsets(found: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
+def _iterate_subsets(heuristic: Mapping[str, Any]) -> Iterator[tuple[int, list[str]]]:
     """Yield each size of a heuristic with the names of its parameters."""
-    for k, n in enumerate(found["n"]):
-        yield n, found["subsets"][k] if found["order"] is None else found["order"][:n]
+    for k, n in enumerate(heuristic["n"]):
+        yield n, heuristic["subsets"][k] if heuristic["order"] is None else heuristic["order"][:n]
 
 
 def _compare_proofs(

@@ -37,7 +37,8 @@ class Description(Section):
     """Acceleration of gravity in the base frame, m/s^2."""
 
     @model_validator(mode="after")
-    def _check_one_way(self) -> Description:
+    def _check_alternatives(self) -> Description:
+        """Raise ValueError unless either dh or tree is given."""
         if len(self._list_given()) != 1:
             raise ValueError("give dh or tree, one of them")
         return self
@@ -48,14 +49,14 @@ class Description(Section):
         return {name: value for name, value in values if isinstance(value, BodiesDescription)}
 
     @property
-    def way(self) -> str:
-        """Key of the way in which the bodies are described."""
+    def kind(self) -> str:
+        """Key of the description that is given: dh or tree."""
         return next(iter(self._list_given()))
 
     @property
     def bodies(self) -> BodiesDescription:
         """Bodies, as the way of description gives them."""
-        return self._list_given()[self.way]
+        return self._list_given()[self.kind]
 
 
 class Robot(Section):
@@ -109,7 +110,7 @@ class Robot(Section):
     def stretch(self, stretch: Callable[[float], float]) -> Robot:
         """Return the robot with other lengths, as far as lengths have names."""
         old = self.description
-        changed = old.model_copy(update={old.way: old.bodies.stretch(stretch)})
+        changed = old.model_copy(update={old.kind: old.bodies.stretch(stretch)})
         return self.model_copy(update={"description": changed})
 
     def list_drives(self) -> dict[str, DriveSection]:

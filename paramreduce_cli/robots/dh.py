@@ -10,7 +10,7 @@ from paramreduce_cli.fields.numbers import Number
 from paramreduce_cli.fields.section import Name, Section
 from paramreduce_cli.records import BASE, Body, FloatArray, Length
 from paramreduce_cli.robots.bodies import BodiesDescription
-from paramreduce_cli.robots.frames import rotate_x, rotate_z, round_to_quarter_turns, translate
+from paramreduce_cli.robots.frames import rotate_x, rotate_z, round_to_right_angles, translate
 
 
 class DHJoint(Section):
@@ -56,7 +56,7 @@ class DHJoint(Section):
     @property
     def offset(self) -> float:
         """Added to the coordinate, rad or m."""
-        return round_to_quarter_turns(self.theta) if self.type == "revolute" else self.d
+        return round_to_right_angles(self.theta) if self.type == "revolute" else self.d
 
 
 class DHDescription(BodiesDescription):

@@ -59,13 +59,13 @@ def _remove_rounding(value: float) -> float:
     return value
 
 
-def round_to_quarter_turns(angle: float) -> float:
+def round_to_right_angles(angle: float) -> float:
     """Return an angle, rad, with whole quarter turns made exact."""
     quarters = round(angle / (np.pi / 2))
     return quarters * np.pi / 2 if abs(angle - quarters * np.pi / 2) <= _WRITTEN else angle
 
 
-def count_quarter_turns(angle: float) -> int | None:
+def count_right_angles(angle: float) -> int | None:
     """Return the number of quarter turns in an angle, or None if it is not a whole number."""
     quarters = round(angle / (np.pi / 2))
     return quarters if abs(angle - quarters * np.pi / 2) <= _ROUNDING else None

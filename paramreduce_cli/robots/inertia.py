@@ -59,7 +59,8 @@ class BodyParameters(Section):
     """[Ixx, Ixy, Ixz, Iyy, Iyz, Izz] or all three rows, about the centre of mass, kg m^2; instead of Ixx ... Izz, needs com."""
 
     @model_validator(mode="after")
-    def _check_one_way(self) -> BodyParameters:
+    def _check_alternatives(self) -> BodyParameters:
+        """Raise ValueError if centre of mass or inertia is given twice, in different forms."""
         if self.com is not None and self._has_any(_FIRST_MOMENTS):
             raise ValueError("give com or mx, my, mz, not both")
         if self.inertia_com is not None and self.com is None:

@@ -27,7 +27,8 @@ class Step(Section):
     """Turn about z, rad."""
 
     @model_validator(mode="after")
-    def _check_one_step(self) -> Step:
+    def _check_single_step(self) -> Step:
+        """Raise ValueError unless the step has one key."""
         if len(self.model_fields_set) != 1:
             raise ValueError("a step is one of xyz, rx, ry, rz; write one step per item")
         return self

@@ -236,6 +236,7 @@ class TreeDescription(BodiesDescription):
 
     @model_validator(mode="after")
     def _check_closures(self) -> TreeDescription:
+        """Raise ValueError unless closures and independent coordinates are given together."""
         if bool(self.closures) != bool(self.independent):
             raise ValueError("closures and independent belong together; give both or neither")
         if self.guess and not self.closures:

@@ -6,7 +6,7 @@ from typing import Any
 from paramreduce_cli.config import Config
 from paramreduce_cli.config.schema import Settings
 from paramreduce_cli.config.sections import get_section, is_section
-from paramreduce_cli.records import Items, Run, Tell
+from paramreduce_cli.records import Items, ProgressCallback, Run
 from paramreduce_cli.running.pipeline import Stage, find_maker
 from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, call_stage
 
@@ -27,7 +27,7 @@ def run_in_memory(
         ParamreduceError: It fails.
     """
     inputs = Inputs(config if isinstance(config, Config) else None)
-    lent: dict[Any, Any] = {Run: run, Tell: run.progress, Items: Items(), **records}
+    lent: dict[Any, Any] = {Run: run, ProgressCallback: run.progress, Items: Items(), **records}
     arguments: dict[str, Any] = {}
     for entry in stage.inputs:
         if is_section(entry.type):

@@ -18,13 +18,13 @@ from paramreduce_cli.records import (
     Identification,
     Items,
     MeasuredLog,
+    ProgressCallback,
     RawLogs,
     Recordings,
     Reduction,
     Report,
     Run,
     Samples,
-    Tell,
     TermReduction,
     Trajectories,
     Validation,
@@ -33,7 +33,7 @@ from paramreduce_cli.stages import stages
 from paramreduce_cli.stages.process_log import make_no_log_error
 
 ARTIFACTS: tuple[type, ...] = (*LAYOUTS, Report)
-LENT: tuple[Any, ...] = (Run, Tell, Items)
+LENT: tuple[Any, ...] = (Run, ProgressCallback, Items)
 """Types of what the caller lends a stage, beside what the stage has made before."""
 
 
@@ -190,7 +190,7 @@ def _is_recorded(config: Config) -> bool:
     return {"estimation", "validation"} <= list_user_files(config, Recordings).keys()
 
 
-def check_is_asked_for(stage: Stage, config: Config) -> None:
+def check_is_part(stage: Stage, config: Config) -> None:
     """Refuse a stage that has nothing to work on, before others are run for it.
 
     Raises:

@@ -30,11 +30,11 @@ from paramreduce_cli.records import (
     Part,
     PartFinished,
     Progress,
+    ProgressCallback,
     Provenance,
     Report,
     Run,
     Samples,
-    Tell,
 )
 from paramreduce_cli.running.pipeline import (
     LENT,
@@ -48,27 +48,27 @@ from paramreduce_cli.running.stage_inputs import OUTSIDE, Inputs, call_stage, no
 
 
 def make_provenance(
-    wanted: Config | Settings,
+    config: Config | Settings,
     robot: str,
     seconds: Mapping[str, float],
     warnings: Mapping[str, Sequence[str]],
-    asked: str,
+    arguments: str,
 ) -> Provenance:
     """Return the provenance of results, whatever has run the stages.
 
     Args:
-        wanted: Config or settings.
+        config: Config or settings.
         robot: Name of the robot.
         seconds: Times of the stages by name, s.
         warnings: Warnings of the stages by name.
-        asked: Config and options of the call, as in :class:`Provenance`.
+        arguments: Config and options of the call, as in :class:`Provenance`.
     """
-    text = json.dumps(wanted.model_dump(mode="json"), sort_keys=True)
+    text = json.dumps(config.model_dump(mode="json"), sort_keys=True)
     digest = hashlib.sha256(text.encode()).hexdigest()
-    changed = wanted.model_dump(mode="json", exclude_defaults=True)
-    if isinstance(wanted, Config):
-        warnings = {"config": find_warnings(wanted), **warnings}
-    return Provenance(robot, digest, get_versions(), seconds, warnings, asked, changed)
+    changed = config.model_dump(mode="json", exclude_defaults=True)
+    if isinstance(config, Config):
+        warnings = {"config": find_warnings(config), **warnings}
+    return Provenance(robot, digest, get_versions(), seconds, warnings, arguments, changed)
 
 
 @cache
@@ -153,7 +153,7 @@ class Runner:
         """
         path = self.store.get_path(stage.output)
         self._cut_short = False
-        self.store.refuse_to_replace(stage.output, self._robot)
+        self.store.reject_replacement(stage.output, self._robot)
         self._look_at_inputs(stage)
         previous = self._load_previous(stage)
         better = go_on and getattr(previous, "unfinished", False)
@@ -181,7 +181,7 @@ class Runner:
             run = Run(self.jobs, self.callbacks.progress, self._mark_cut_short, unchanged)
             lent = {
                 Run: run,
-                Tell: self.callbacks.progress,
+                ProgressCallback: self.callbacks.progress,
                 Items: Items(kept, part),
                 stage.output: previous,
             }
@@ -245,6 +245,7 @@ class Runner:
         )
 
     def _find_changed_sections(self, stamp: Stamp) -> list[str]:
+        """Return the sections of the config that have changed since the artifact was made."""
         assert self.config is not None
         return [
             name

@@ -16,11 +16,11 @@ from paramreduce_cli.records import (
     SETS,
     Coefficients,
     Progress,
+    ProgressCallback,
     RawLog,
     RawLogs,
     Recording,
     Recordings,
-    Tell,
 )
 from paramreduce_cli.running.pipeline import Stage, list_user_files
 
@@ -33,11 +33,13 @@ class Inputs:
 
     Args:
         config: Config that names the files; None if there is none.
-        tell: Called with the progress of long reading.
+        report_progress: Called with the progress of long reading.
     """
 
-    def __init__(self, config: Config | None, tell: Tell = lambda _: None) -> None:
-        self.config, self.tell = config, tell
+    def __init__(
+        self, config: Config | None, report_progress: ProgressCallback = lambda _: None
+    ) -> None:
+        self.config, self.tell = config, report_progress
         self.digests: dict[str, str] = {}
 
     def note_files(self, kind: type) -> dict[str, Path]:
@@ -79,8 +81,8 @@ def note_warnings() -> Iterator[list[str]]:
 class _LogFiles:
     """The logs of one kind, read one at a time when they are iterated over, as each may take gigabytes."""
 
-    def __init__(self, kind: str, paths: Sequence[Path], tell: Tell) -> None:
-        self._task, self._paths, self._tell = f"read {kind} logs", paths, tell
+    def __init__(self, kind: str, paths: Sequence[Path], report_progress: ProgressCallback) -> None:
+        self._task, self._paths, self._tell = f"read {kind} logs", paths, report_progress
 
     def __iter__(self) -> Iterator[RawLog]:
         for k, path in enumerate(self._paths):

@@ -30,6 +30,7 @@ _VARIANT = re.compile(r"\w[\w.-]*")
 
 
 def _check_seeds(seeds: list[int]) -> list[int]:
+    """Raise ValueError if a seed is listed twice."""
     twice = sorted({seed for seed in seeds if seeds.count(seed) > 1})
     if twice:
         raise ValueError(f"the seed {twice[0]} stands there twice")
@@ -37,6 +38,7 @@ def _check_seeds(seeds: list[int]) -> list[int]:
 
 
 def _check_variants(variants: dict[str, list[str]]) -> dict[str, list[str]]:
+    """Raise ValueError if the name of a variant cannot be part of a folder's name."""
     for name in variants:
         if not _VARIANT.fullmatch(name):
             raise ValueError(
@@ -110,7 +112,7 @@ class SweepRun:
         """Return the path of the file that a stage of the run makes."""
         return str(self.folder / get_file(stage.output))
 
-    def list_needed_files(self, stage: Stage) -> list[str]:
+    def list_required_files(self, stage: Stage) -> list[str]:
         """Return the files that a stage of the run reads: its config and the artifacts of other stages."""
         read = {entry.type for entry in stage.artifacts}
         return [str(self.path), *(self.get_file(s) for s in self.stages if s.output in read)]
@@ -230,11 +232,11 @@ def _check_config(path: Path, run: SweepRun) -> None:
         raise ConfigError(f"{path}: {place}: {error}") from error
 
 
-def _iterate_runs(path: Path, wanted: SweepSection, folder: Path) -> Iterator[SweepRun]:
+def _iterate_runs(path: Path, section: SweepSection, folder: Path) -> Iterator[SweepRun]:
     """Yield the runs of a list."""
-    seeds: list[int | None] = [None] if wanted.seeds is None else [*wanted.seeds]
+    seeds: list[int | None] = [None] if section.seeds is None else [*section.seeds]
     for robot, seed, (variant, changes) in itertools.product(
-        wanted.robots, seeds, (wanted.variants or {"": []}).items()
+        section.robots, seeds, (section.variants or {"": []}).items()
     ):
         name = "-".join(
             [robot.stem, *([] if seed is None else [str(seed)]), *filter(None, [variant])]

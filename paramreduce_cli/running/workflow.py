@@ -45,6 +45,7 @@ def format_outline() -> str:
 
 
 def _format_stage(stage: Stage) -> str:
+    """Return a stage with its inputs and its output as one line."""
     needs = ", ".join(get_file(entry.type) for entry in stage.artifacts)
     return f"{stage.name}: {needs or 'the config'} -> {get_file(stage.output)}"
 

@@ -21,10 +21,10 @@ from paramreduce_cli.records import (
     MeasuredLog,
     Model,
     Progress,
+    ProgressCallback,
     ReducedModel,
     Samples,
     SampleSet,
-    Tell,
     Validation,
 )
 from paramreduce_cli.reduction.models import make_base_model
@@ -41,7 +41,7 @@ def identify(
     model: Model,
     samples: Samples,
     validation: Validation,
-    tell: Tell = lambda _: None,
+    report_progress: ProgressCallback = lambda _: None,
 ) -> Identification:
     """Identify base parameters and those of the selected model, with standard deviations.
 
@@ -56,16 +56,16 @@ def identify(
     if identification.estimator != "ordinary":
         deviation = estimate_joint_noise(factors, scale, n_samples)
     full, full_fit = _estimate_model(identification, make_base_model(model), samples, deviation)
-    tell(Progress("identification", 1, _STEPS, "base parameters"))
+    report_progress(Progress("identification", 1, _STEPS, "base parameters"))
     reduced, _ = _estimate_model(identification, validation.selected.model, samples, deviation)
-    tell(Progress("identification", 2, _STEPS, "selected parameters"))
+    report_progress(Progress("identification", 2, _STEPS, "selected parameters"))
     consistency = _fit_consistent(identification, model, samples, deviation)
     delay = 0.0 if log is None else log.delay
     hints = find_hints(model, training, full, full_fit, consistency, delay)
     for text in hints:
         warnings.warn(text.rstrip("."), ParamreduceWarning, stacklevel=2)
     shown = _take_first_samples(held_out)
-    tell(Progress("identification", _STEPS, _STEPS))
+    report_progress(Progress("identification", _STEPS, _STEPS))
     return Identification(
         estimator=identification.estimator,
         torque_deviation=deviation,
@@ -96,7 +96,7 @@ def _merge_factors(factors: FloatArray, columns: FloatArray) -> FloatArray:
 
 
 def _estimate_model(
-    wanted: IdentificationSection, chosen: ReducedModel, samples: Samples, deviation: FloatArray
+    section: IdentificationSection, chosen: ReducedModel, samples: Samples, deviation: FloatArray
 ) -> tuple[Estimate, LinearFit]:
     """Return the identified parameters of a model, and their fit."""
     training, held_out = samples.estimation, samples.validation
@@ -104,7 +104,7 @@ def _estimate_model(
     columns = _make_expansion(chosen)
     factors = _merge_factors(training.compute_factors(), columns)
     values = solve_least_squares(combine_factors(factors, deviation))
-    if wanted.estimator == "robust":
+    if section.estimator == "robust":
         values, deviation = fit_robustly(
             lambda: (
                 ((b.W @ columns).reshape(*b.tau.shape, -1), b.tau)
@@ -165,17 +165,17 @@ def _compute_torque_rms(part: SampleSet) -> FloatArray:
 
 
 def _fit_consistent(
-    wanted: IdentificationSection, model: Model, samples: Samples, deviation: FloatArray
+    section: IdentificationSection, model: Model, samples: Samples, deviation: FloatArray
 ) -> Consistency | None:
     """Return the physically consistent parameters, or None if the config asks for none."""
-    if wanted.consistency == "none":
+    if section.consistency == "none":
         return None
     held_out = samples.validation
     assert held_out is not None
     factor = combine_factors(samples.estimation.compute_factors(), deviation)
     known = physics.list_constraints(model.mechanism, model.values, factor)
     try:
-        standard = physics.fit_consistent(factor, known, wanted.consistency)
+        standard = physics.fit_consistent(factor, known, section.consistency)
     except DataError as error:
         warnings.warn(
             f"{str(error).rstrip('.')}; going on without", ParamreduceWarning, stacklevel=2

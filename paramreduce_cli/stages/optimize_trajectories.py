@@ -65,57 +65,57 @@ def optimize_trajectories(
 
 
 def make_task(
-    wanted: TrajectoriesSection, model: Model, period: float | None = None
+    section: TrajectoriesSection, model: Model, period: float | None = None
 ) -> ExcitationTask:
     """Return the settings that all trajectories share."""
     return ExcitationTask(
         mechanism=model.mechanism,
         base=model.base,
         base_values=model.base_values,
-        torque_scale=_choose_torque_scale(wanted, model.nominal_torque),
-        criterion=wanted.criterion,
-        constraints=wanted.build_constraints(model.mechanism),
-        settings=_make_settings(wanted, model, period or wanted.period, wanted.harmonics),
-        seed=wanted.seed,
+        torque_scale=_choose_torque_scale(section, model.nominal_torque),
+        criterion=section.criterion,
+        constraints=section.build_constraints(model.mechanism),
+        settings=_make_settings(section, model, period or section.period, section.harmonics),
+        seed=section.seed,
     )
 
 
-def _choose_torque_scale(wanted: TrajectoriesSection, nominal_torque: FloatArray) -> FloatArray:
+def _choose_torque_scale(section: TrajectoriesSection, nominal_torque: FloatArray) -> FloatArray:
     """Return the noise of the torques if it is given, else nominal torques; infinite where nothing is measured."""
-    if wanted.torque_noise is None:
+    if section.torque_noise is None:
         return nominal_torque
-    noise = expand_per_joint(wanted.torque_noise, nominal_torque.size)
+    noise = expand_per_joint(section.torque_noise, nominal_torque.size)
     return np.where(np.isfinite(nominal_torque), noise, np.inf)
 
 
 def _make_settings(
-    wanted: TrajectoriesSection, model: Model, period: float, harmonics: int
+    section: TrajectoriesSection, model: Model, period: float, harmonics: int
 ) -> TrajectorySettings:
     """Return the settings of every trajectory."""
     return TrajectorySettings(
         period=period,
         harmonics=harmonics,
-        points=max(wanted.points, 2 * harmonics + 1),
-        limits=wanted.build_limits(model.mechanism.n_dof),
-        mapping="gauge" if wanted.use_full_range else "ball",
-        rest_to_rest=wanted.rest_to_rest,
+        points=max(section.points, 2 * harmonics + 1),
+        limits=section.build_limits(model.mechanism.n_dof),
+        mapping="gauge" if section.use_full_range else "ball",
+        rest_to_rest=section.rest_to_rest,
         start_pose=(
             None
-            if wanted.start_pose is None
-            else expand_per_joint(wanted.start_pose, model.mechanism.n_dof)
+            if section.start_pose is None
+            else expand_per_joint(section.start_pose, model.mechanism.n_dof)
         ),
-        starts=wanted.starts,
-        polished=wanted.polished,
-        max_iterations=wanted.max_iterations,
-        scaling=wanted.scaling,
+        starts=section.starts,
+        polished=section.polished,
+        max_iterations=section.max_iterations,
+        scaling=section.scaling,
     )
 
 
 def _optimise_sets(
-    wanted: TrajectoriesSection, task: ExcitationTask, items: Items, run: Run
+    section: TrajectoriesSection, task: ExcitationTask, items: Items, run: Run
 ) -> dict[str, tuple[Trajectory, ...]]:
     """Return optimised trajectories by set."""
-    counts = (wanted.count, wanted.validation_count, wanted.test_count)
+    counts = (section.count, section.validation_count, section.test_count)
     keys = {
         name: [f"{name}-{k:04d}" for k in range(count)]
         for name, count in zip(SETS, counts, strict=True)
@@ -125,7 +125,7 @@ def _optimise_sets(
 
 
 def _find_point_to_point(
-    wanted: TrajectoriesSection,
+    section: TrajectoriesSection,
     task: ExcitationTask,
     model: Model,
     period: float,
@@ -133,7 +133,7 @@ def _find_point_to_point(
 ) -> tuple[PointToPoint, ...]:
     """Find motions between positions that trajectories of the test set pass, or of another one where it has none."""
     passed = sets["test"] or sets["validation"] or sets["estimation"]
-    times = sample_times(period, wanted.points)
+    times = sample_times(period, section.points)
     positions = [
         evaluate_basis(period, (t.coefficients.shape[1] - 1) // 2, times).evaluate(t.coefficients)[
             0
@@ -146,13 +146,13 @@ def _find_point_to_point(
         task.constraints,
         period,
         np.concatenate(positions),
-        wanted.test_point_to_point_count,
-        FINER * wanted.points,
-        np.random.default_rng([wanted.seed, zlib.crc32(b"point-to-point")]),
+        section.test_point_to_point_count,
+        FINER * section.points,
+        np.random.default_rng([section.seed, zlib.crc32(b"point-to-point")]),
     )
-    if len(found) < wanted.test_point_to_point_count:
+    if len(found) < section.test_point_to_point_count:
         warnings.warn(
-            f"{len(found)} of {wanted.test_point_to_point_count} point-to-point motions of the test set were found: "
+            f"{len(found)} of {section.test_point_to_point_count} point-to-point motions of the test set were found: "
             "straight lines between positions leave the constraints, or need more torque than there is",
             ParamreduceWarning,
             stacklevel=2,
@@ -161,17 +161,17 @@ def _find_point_to_point(
 
 
 def _evaluate_coefficients(
-    wanted: TrajectoriesSection, model: Model, task: ExcitationTask, brought: Coefficients
+    section: TrajectoriesSection, model: Model, task: ExcitationTask, coefficients: Coefficients
 ) -> dict[str, tuple[Trajectory, ...]]:
     """Return the trajectories of user-supplied coefficients, evaluated but not changed."""
     excitation = build_excitation(task)
 
-    def measure(coefficients: FloatArray) -> Trajectory:
-        harmonics = (coefficients.shape[1] - 1) // 2
+    def measure(entry: FloatArray) -> Trajectory:
+        harmonics = (entry.shape[1] - 1) // 2
         return describe(
             excitation,
-            _make_settings(wanted, model, brought.period, harmonics),
-            coefficients,
+            _make_settings(section, model, coefficients.period, harmonics),
+            entry,
             kappa_start=np.nan,
             cpu_seconds=0.0,
             iterations=0,
@@ -180,17 +180,17 @@ def _evaluate_coefficients(
 
     sets = {}
     for name in SETS:
-        values, n_dof = getattr(brought, name), model.mechanism.n_dof
+        values, n_dof = getattr(coefficients, name), model.mechanism.n_dof
         if values.shape[1] != n_dof:
             raise DataError(
-                f"{brought.source}: the {name} coefficients are for {values.shape[1]} joints, but "
+                f"{coefficients.source}: the {name} coefficients are for {values.shape[1]} joints, but "
                 f"{model.mechanism.robot} has {n_dof}."
             )
         sets[name] = tuple(measure(entry) for entry in values)
         if not sets[name]:
             continue
-        _check_motion(brought.source, name, sets[name], task.settings.limits)
-        _check_bounds(brought.source, name, sets[name], task.constraints)
+        _check_motion(coefficients.source, name, sets[name], task.settings.limits)
+        _check_bounds(coefficients.source, name, sets[name], task.constraints)
     return sets
 
 

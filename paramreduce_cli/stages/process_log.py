@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.config.log_settings import LogSection
 from paramreduce_cli.errors import ConfigError, ParamreduceWarning
 from paramreduce_cli.identification.processing import process_logs
-from paramreduce_cli.records import MeasuredLog, Model, RawLogs, Tell
+from paramreduce_cli.records import MeasuredLog, Model, ProgressCallback, RawLogs
 
 
 def make_no_log_error() -> ConfigError:
@@ -20,7 +20,10 @@ def make_no_log_error() -> ConfigError:
 
 
 def process_log(
-    log: LogSection | None, model: Model, logs: RawLogs, tell: Tell = lambda _: None
+    log: LogSection | None,
+    model: Model,
+    logs: RawLogs,
+    report_progress: ProgressCallback = lambda _: None,
 ) -> MeasuredLog:
     """Make logs ready: clean, low-pass, differentiate, and split them.
 
@@ -32,7 +35,7 @@ def process_log(
     unmeasured = [
         name for name, size in zip(names, model.nominal_torque, strict=True) if np.isinf(size)
     ]
-    found = process_logs(logs, log, names, tell, unmeasured)
+    found = process_logs(logs, log, names, report_progress, unmeasured)
     for text in found.warnings:
         warnings.warn(f"log: {text.rstrip('.')}", ParamreduceWarning, stacklevel=2)
     return found

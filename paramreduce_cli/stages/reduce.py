@@ -146,17 +146,17 @@ def _prove_part(task: SelectionTask, kept: KeptProofs, sizes: Sequence[int]) -> 
     raise PartFinished
 
 
-def _choose_weights(wanted: ReductionSection, samples: Samples) -> FloatArray:
+def _choose_weights(section: ReductionSection, samples: Samples) -> FloatArray:
     """Return the size that each joint's errors are divided by, (n_dof,), or raise DataError if it is unusable."""
     weights = samples.nominal_torque
-    if wanted.weighting == "none":
+    if section.weighting == "none":
         n_dof = next(iter(samples.estimation.iterate_blocks())).tau.shape[1]
         return np.where(np.isinf(weights), np.inf, 1.0) if weights is not None else np.ones(n_dof)
     if weights is None:
         weights = compute_standard_deviation(
             block.tau for block in samples.estimation.iterate_blocks()
         )
-    if wanted.weighting == "noise":
+    if section.weighting == "noise":
         found = samples.estimation
         weights = estimate_joint_noise(found.compute_factors(), weights, found.n_samples)
     small, large = SIZES
@@ -181,7 +181,7 @@ def _warn_of_rank(rank: int, model: Model | None, columns: Columns) -> None:
 
 
 def _make_criterion_inputs(
-    wanted: ReductionSection,
+    section: ReductionSection,
     counted: CountedDynamics,
     model: Model | None,
     samples: Samples,
@@ -221,7 +221,7 @@ def _make_criterion_inputs(
         """Operations of the lean inverse dynamics, nearly."""
         return counts().estimate(np.isin(columns.column, kept))
 
-    return CriterionInputs(wanted.operations.torque_error, accelerations, cost)
+    return CriterionInputs(section.operations.torque_error, accelerations, cost)
 
 
 def _warn_of_open_proofs(proofs: Proofs | None) -> None:
@@ -254,7 +254,7 @@ class _Selected:
 
 def _make_task(
     objective: Objective,
-    wanted: ReductionSection,
+    section: ReductionSection,
     proven: Proofs | None,
     items: Items,
     kept: KeptProofs,
@@ -263,8 +263,8 @@ def _make_task(
     """Return the task that every heuristic of a criterion gets."""
     return SelectionTask(
         objective=objective,
-        largest=wanted.stop.parameters,
-        effort=make_effort(wanted, run),
+        largest=section.stop.parameters,
+        effort=make_effort(section, run),
         previous=proven,
         part=items.part,
         incumbents={} if items.part.is_whole else items.kept,
@@ -302,12 +302,12 @@ def _count_kept(fits: list[Fit], stop: Stop) -> int:
 
 
 def _add_norms(
-    found: dict[str, _Selected], samples: Samples, columns: Columns, weights: FloatArray
+    selected: dict[str, _Selected], samples: Samples, columns: Columns, weights: FloatArray
 ) -> dict[str, Subsets]:
     """Return the subsets with the 1- and infinity norms of their errors, from one pass over the samples."""
     models = [
         columns.make_model(subset, f.parameters).standard
-        for entry in found.values()
+        for entry in selected.values()
         for subset, f in zip(entry.subsets, entry.fits, strict=True)
     ]
     errors = compute_torque_errors(
@@ -315,23 +315,23 @@ def _add_norms(
     )
     heuristics = {}
     start = 0
-    for name, entry in found.items():
+    for name, entry in selected.items():
         part = slice(start, start + len(entry.subsets))
         heuristics[name] = _make_subsets(name, entry, errors, part)
         start = part.stop
     return heuristics
 
 
-def _make_subsets(name: str, found: _Selected, errors: NormErrors, part: slice) -> Subsets:
+def _make_subsets(name: str, selected: _Selected, errors: NormErrors, part: slice) -> Subsets:
     return Subsets(
         heuristic=name,
-        subsets=found.subsets,
-        n=np.array([subset.size for subset in found.subsets]),
-        torque_error=np.array([f.torque_error for f in found.fits]),
+        subsets=selected.subsets,
+        n=np.array([subset.size for subset in selected.subsets]),
+        torque_error=np.array([f.torque_error for f in selected.fits]),
         torque_error_1=errors.one[part],
         torque_error_inf=errors.infinity[part],
-        parameters=tuple(f.parameters for f in found.fits),
-        beta=tuple(f.beta for f in found.fits),
-        minimum_norm=np.array([f.minimum_norm for f in found.fits]),
-        seconds=found.seconds,
+        parameters=tuple(f.parameters for f in selected.fits),
+        beta=tuple(f.beta for f in selected.fits),
+        minimum_norm=np.array([f.minimum_norm for f in selected.fits]),
+        seconds=selected.seconds,
     )

@@ -125,15 +125,15 @@ def _search(task: _Task, name: str) -> TermModel | None:
         direct=direct, projected=projected, measured=sampling.measured,
     )  # fmt: skip
 
-    def progress(share: float, detail: str) -> None:
-        run.progress(Progress(f"terms of the {name} dynamics", share, 1.0, detail))
+    def progress(fraction: float, detail: str) -> None:
+        run.progress(Progress(f"terms of the {name} dynamics", fraction, 1.0, detail))
 
     searcher = Searcher(
         lean, _choose_samples(judge, samples, *_FIRST), _choose_samples(judge, samples, *_CLOSELY),
         judge.sample_poses(_POSES), budget, direct,
     )  # fmt: skip
     found = simplify(
-        searcher, starts, rounds=section.rounds, seconds=section.time_limit or np.inf,
+        searcher, starts, max_rounds=section.rounds, seconds=section.time_limit or np.inf,
         jobs=run.jobs, progress=progress,
     )  # fmt: skip
     if found.cut_short:
@@ -247,10 +247,10 @@ def _warn_of_missing(names: list[str], others: bool, part: str) -> None:
 
 
 def _make_record(
-    judged: Judged, judge: Evaluator, way: list[Judged], lean: LeanModels
+    best: Judged, judge: Evaluator, front: list[Judged], lean: LeanModels
 ) -> TermModel | None:
     """Return a program with its errors and front, or None if one of its M is not positive definite."""
-    one, (estimation, validation) = judged.program, judged.errors
+    one, (estimation, validation) = best.program, best.errors
     smallest, states = judge.find_smallest_eigenvalue(one) if judge.direct else (np.nan, 0)
     if judge.direct and not smallest > 0:
         return None
@@ -281,7 +281,7 @@ def _make_record(
         lower=judge.lower,
         upper=judge.upper,
         drawn=judge.drawn,
-        front=_make_front([*way, judged], judge),
+        front=_make_front([*front, best], judge),
     )
 
 

@@ -63,7 +63,7 @@ def report(
     section: ReportSection,
     sampling: SamplingSection,
     search: ReductionSection,
-    wanted: SelectedSection,
+    limits: SelectedSection,
     counted: CountedDynamics,
     artifacts: Artifacts,
     samples: Samples,
@@ -104,7 +104,7 @@ def report(
     lean = {
         name: found
         for name in (("inverse", "direct") if model is not None else ())
-        if (found := find_leanest(name, wanted, validation.heuristics, artifacts.terms)) is not None
+        if (found := find_leanest(name, limits, validation.heuristics, artifacts.terms)) is not None
     }
     summary = gather_summary(artifacts, lean, provenance)
     formats = [str(name) for name in section.formats]
@@ -114,7 +114,7 @@ def report(
         run.progress(Progress("figures, tables and page", done, len(drawn) + 1, name))
 
     tell(0)
-    encoded = render_figures(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, told=tell)
+    encoded = render_figures(drawn, data, sorted({*formats, "svg"}), jobs=run.jobs, on_figure=tell)
     images = {name: one["svg"] for name, one in encoded.items()}
     files = {
         f"figures/{name}.{kind}": one[kind] for name, one in encoded.items() for kind in formats

@@ -46,12 +46,12 @@ from paramreduce_cli.records import (
     MeasuredLog,
     Model,
     Progress,
+    ProgressCallback,
     Recording,
     Recordings,
     Run,
     Samples,
     SampleSet,
-    Tell,
     Trajectories,
 )
 from paramreduce_cli.resources.item_completion import complete_items
@@ -68,7 +68,7 @@ def sample(
     trajectories: Trajectories | None,
     recordings: Recordings,
     log: MeasuredLog | None = None,
-    tell: Tell = lambda _: None,
+    report_progress: ProgressCallback = lambda _: None,
     items: Items | None = None,
 ) -> Samples:
     """Sample the estimation, the validation and the test set: states, torques and observation matrices.
@@ -89,7 +89,7 @@ def sample(
         if sampling.log is not None:
             return _sample_log(model, dynamics, log, name)
         if sampling.simulation is not None:
-            return _sample_simulation(sampling.simulation, model, dynamics, name, tell)
+            return _sample_simulation(sampling.simulation, model, dynamics, name, report_progress)
         if recording is not None:
             return _sample_recording(sampling, model, dynamics, recording)
         if trajectories is None:
@@ -103,15 +103,15 @@ def sample(
     tested = _is_tested(sampling, trajectories, recordings)
     names = SETS if tested else SETS[:2]
     computed = {name: observed(name, points.get(name)) for name in names}
-    stored = _combine_items(computed, items, tell)
+    stored = _combine_items(computed, items, report_progress)
     if stored is not None:
         return _make_samples(sampling, model, stored["estimation"], stored)
-    told = {name: ToldSet(one, f"{name} set", tell) for name, one in computed.items()}
+    told = {name: ToldSet(one, f"{name} set", report_progress) for name, one in computed.items()}
     return _make_samples(sampling, model, computed["estimation"], told)
 
 
 def _combine_items(
-    computed: Mapping[str, ComputedSet], items: Items, tell: Tell
+    computed: Mapping[str, ComputedSet], items: Items, report_progress: ProgressCallback
 ) -> dict[str, JoinedSet] | None:
     """Return the sets as their items, all of them kept; None where no item is kept and none has to be.
 
@@ -125,7 +125,7 @@ def _combine_items(
     if items.part.is_whole and not any(key in items.kept for key in pieces):
         return None
 
-    run = Run(progress=tell)
+    run = Run(progress=report_progress)
     found: dict[str, Any] = complete_items(
         run, items, list(pieces), lambda: pieces, _get_piece, task="samples"
     )
@@ -243,7 +243,9 @@ def _sample_recording(
             ("sampling", "torques"),
         )
     if recording.tau is not None:
-        recording = replace(recording, tau=_measured(model, recording.source, recording.tau))
+        recording = replace(
+            recording, tau=_compute_measured_torques(model, recording.source, recording.tau)
+        )
     begun = np.flatnonzero(np.diff(recording.time) < 0) + 1
     starts = np.concatenate([[0], begun, [recording.time.size]])
     return ObservedSet(
@@ -273,28 +275,32 @@ def _sample_log(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name:
 
 
 def _sample_simulation(
-    wanted: SimulationSection, model: Model, dynamics: Dynamics, name: str, tell: Tell
+    section: SimulationSection,
+    model: Model,
+    dynamics: Dynamics,
+    name: str,
+    report_progress: ProgressCallback,
 ) -> ObservedSet:
     """Return the samples of simulated motions of the full model under the config's inputs."""
     mechanism = model.mechanism
     rng = np.random.default_rng([0, zlib.crc32(name.encode())])
-    time = np.arange(0.0, wanted.duration, wanted.step)
+    time = np.arange(0.0, section.duration, section.step)
     z = np.zeros(mechanism.n_dof)
     if mechanism.loops is not None:
         z = mechanism.loops.assembly[list(mechanism.independent)]
     motions: list[SimulatedMotion] = []
-    counts = (wanted.runs, wanted.validation_runs, wanted.test_runs)
+    counts = (section.runs, section.validation_runs, section.test_runs)
     runs = dict(zip(SETS, counts, strict=True))[name]
     for done in range(runs):
-        inputs = [_make_input(wanted.inputs.get(c), rng) for c in mechanism.coordinate_names]
+        inputs = [_make_input(section.inputs.get(c), rng) for c in mechanism.coordinate_names]
         start = z.copy()
-        for coordinate, (lower, upper) in wanted.start.items():
+        for coordinate, (lower, upper) in section.start.items():
             start[mechanism.coordinate_names.index(coordinate)] = rng.uniform(lower, upper)
         try:
             motions.append(simulate(dynamics, model.values, inputs, start, time))
         except DataError as error:
             raise ConfigError(f"{name} set: {error}", ("sampling", "simulation")) from error
-        tell(Progress(f"simulate motions of the {name} set", done + 1, runs))
+        report_progress(Progress(f"simulate motions of the {name} set", done + 1, runs))
     return ObservedSet(
         make_spans([time.size] * len(motions)),
         _read_motion_states(motions),
@@ -324,7 +330,7 @@ def _read_motion_states(motions: list[SimulatedMotion]) -> StatesAt:
     return at
 
 
-def _measured(model: Model, source: str, tau: FloatArray) -> FloatArray:
+def _compute_measured_torques(model: Model, source: str, tau: FloatArray) -> FloatArray:
     """Recorded torques, zero where none are measured."""
     wanted = np.isfinite(model.nominal_torque)
     for j in np.flatnonzero(wanted & np.isnan(tau).any(axis=0)).tolist():
@@ -348,7 +354,7 @@ def _series_states(series: list[FloatArray], period: float, points: int, finer: 
 
     @lru_cache
     def basis(harmonics: int, count: int) -> tuple[FourierBasis, FourierBasis | None]:
-        """Of the first samples: what comes later is the same functions with other coefficients."""
+        """Return the series at the first samples; later samples differ in their coefficients alone."""
         return (
             evaluate_basis(period, harmonics, times[:count]),
             evaluate_basis(period, harmonics, finer_times[: finer * count]) if finer > 1 else None,
@@ -402,12 +408,12 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
         )
 
 
-def _iterate_torques(found: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
+def _iterate_torques(samples: ComputedSet | JoinedSet) -> Iterator[FloatArray]:
     """Yield the torques, without observation matrices if torques were measured."""
-    states: Iterator[StateBlock | Block] = iter(found.iterate_states())
+    states: Iterator[StateBlock | Block] = iter(samples.iterate_states())
     first = next(states, None)
     if first is None or first.tau is None:
-        return (block.tau for block in found.iterate_blocks())
+        return (block.tau for block in samples.iterate_blocks())
     return (block.tau for block in itertools.chain([first], states) if block.tau is not None)
 
 

@@ -34,7 +34,7 @@ from paramreduce_cli.multibody.observation import (
     compute_joint_factors,
     decimate_blocks,
 )
-from paramreduce_cli.multibody.progress_samples import told
+from paramreduce_cli.multibody.progress_samples import add_progress
 from paramreduce_cli.records import (
     Block,
     CountedDynamics,
@@ -88,7 +88,7 @@ _NODES = 50_000
 def validate(
     judging: ValidationSection,
     counted: CountedDynamics,
-    wanted: SelectedSection,
+    section: SelectedSection,
     search: ReductionSection,
     model: Model | None,
     samples: Samples,
@@ -105,9 +105,9 @@ def validate(
     Exit code 0: the selected model is accepted; 1: it is not, with the sentence that says why.
     """
     if model is None:
-        _check_without_model(judging, wanted)
+        _check_without_model(judging, section)
     if samples.test is None:
-        _refuse_what_needs_a_test_set(judging)
+        _reject_test_limits(judging)
     known = previous if run.unchanged >= _MEASURED_ON else None
     if known:
         measured = _Measured(
@@ -119,16 +119,16 @@ def validate(
         measured = _measure(model, samples, reduction, counted, run)
     heuristics, full = measured.heuristics, dict(measured.full)
     costs = None if model is None else OperationCounts(model, counted, reduction, run)
-    if costs is not None and (costs.are_few or "operations" in wanted.get_tolerances()):
+    if costs is not None and (costs.are_few or "operations" in section.get_tolerances()):
         heuristics = costs.count(heuristics, list_models(heuristics))
     crossed = None
-    if wanted.cross_validation:
-        methods = _list_cross_validated(wanted, reduction)
+    if section.cross_validation:
+        methods = _list_cross_validated(section, reduction)
         crossed = known.cross_validation if known else None
         if crossed is None or set(crossed) != set(methods):
             crossed = _cross_validate(search, methods, model, samples, reduction, run)
     values = samples.values if model is None else model.values
-    selected = select_model(wanted, values, reduction, heuristics, crossed)
+    selected = select_model(section, values, reduction, heuristics, crossed)
     if model is not None and costs is not None:
         full |= _count_operations(Counts(model, counted), "selected_", selected.model)
         estimated = find_pareto_front(costs.estimate(heuristics))
@@ -168,7 +168,7 @@ class _Measured:
     upper: FloatArray
 
 
-def _check_without_model(judging: ValidationSection, wanted: SelectedSection) -> None:
+def _check_without_model(judging: ValidationSection, section: SelectedSection) -> None:
     """Raise ConfigError if errors of accelerations or operations are asked for.
 
     Samples without a robot have torques, but no mass matrices and no functions to count.
@@ -177,8 +177,8 @@ def _check_without_model(judging: ValidationSection, wanted: SelectedSection) ->
         ConfigError: An error of accelerations, or a number of operations, is asked for.
     """
     asked: list[Key] = [
-        (*section, name)
-        for section, limits in ((("selected",), wanted), (("validation", "accept"), judging.accept))
+        (*key, name)
+        for key, limits in ((("selected",), section), (("validation", "accept"), judging.accept))
         for name in limits.model_dump(exclude_none=True)
     ]
     for key in asked:
@@ -189,7 +189,7 @@ def _check_without_model(judging: ValidationSection, wanted: SelectedSection) ->
             )
 
 
-def _refuse_what_needs_a_test_set(judging: ValidationSection) -> None:
+def _reject_test_limits(judging: ValidationSection) -> None:
     """Refuse limits of errors on a set that is not there.
 
     Raises:
@@ -222,18 +222,20 @@ def _measure(
         """Errors on a set as a whole, or on each of its motions."""
         n = sample_set.n_samples
 
-        def told_of(what: str) -> Iterator[Block]:
-            return told(sample_set.iterate_blocks(), n, f"{what} of the {name} set", run.progress)
+        def report_heuristic(what: str) -> Iterator[Block]:
+            return add_progress(
+                sample_set.iterate_blocks(), n, f"{what} of the {name} set", run.progress
+            )
 
         def parts(blocks: Iterable[Block]) -> Iterator[Iterable[Block]]:
             if not by_motion:
                 return iter([blocks])
             return (own for _, own in groupby(blocks, lambda block: block.trajectory))
 
-        spread = decimate_blocks(told_of("accelerations"), -(-n // _MOST_ACCELERATIONS))
+        spread = decimate_blocks(report_heuristic("accelerations"), -(-n // _MOST_ACCELERATIONS))
         torques = [
             compute_torque_errors(part, models.values, reduction.nominal_torque)
-            for part in parts(told_of("torques"))
+            for part in parts(report_heuristic("torques"))
         ]
         accelerations = [
             compute_acceleration_errors(
@@ -387,7 +389,7 @@ def _count_operations(counts: Counts, prefix: str, chosen: ReducedModel) -> dict
     )
 
 
-def _list_cross_validated(wanted: SelectedSection, reduction: Reduction) -> dict[str, str]:
+def _list_cross_validated(section: SelectedSection, reduction: Reduction) -> dict[str, str]:
     """Return the heuristics for cross-validation by the name of the method that ran.
 
     Raises:
@@ -397,7 +399,7 @@ def _list_cross_validated(wanted: SelectedSection, reduction: Reduction) -> dict
     found = {
         name: method.heuristic
         for name, method in methods.items()
-        if method.by_torque and wanted.heuristic in (None, name)
+        if method.by_torque and section.heuristic in (None, name)
     }
     if not found:
         raise ConfigError(

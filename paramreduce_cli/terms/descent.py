@@ -52,14 +52,14 @@ class Simplified:
         """Return the program with its parameters fitted to more samples."""
         tape = Tape(self.program)
         fitting = Fitting(tape, self.beta.size, samples, budget)
-        return replace(self, beta=fitting.fit(tape.everything(), self.beta, looks=_LOOKS).beta)
+        return replace(self, beta=fitting.fit(tape.keep_all(), self.beta, checks=_LOOKS).beta)
 
     def evaluate(self, states: FloatArray) -> Outputs:
         """Return the outputs of the program for states, (n_states, n_samples)."""
         m = states.shape[1]
         values = np.broadcast_to(self.beta[:, None], (self.beta.size, m))
         given = self.program.evaluate([*values, *states])
-        return Outputs.of(np.array([np.broadcast_to(value, m) for value in given]))
+        return Outputs.drop_zero(np.array([np.broadcast_to(value, m) for value in given]))
 
     def drop_unused(self) -> tuple[ReducedModel, Program]:
         """Return the model and the program without the parameters that the program does not use."""
@@ -113,12 +113,12 @@ class SearchHistory:
         """Fewest operations, then worst ratio to the budget; less is better, and equal ends have equal ranks."""
         return self.fewest, round(self.strain, _SAME)
 
-    def rebuild(self, passed: Candidate, dice: int = 0) -> Simplified:
+    def rebuild(self, passed: Candidate, seed: int = 0) -> Simplified:
         """Return the program of a candidate, with its sums and products rearranged as a seed says."""
-        program, sizes = rescale(passed.tape.rebuilt(passed.pruning), passed.beta.size)
+        program, sizes = rescale(passed.tape.rebuild(passed.pruning), passed.beta.size)
         graph = Graph()
         program = Program.from_graph(
-            *minimise_operations([Values(graph, program.rebuild(graph))], dice)
+            *minimise_operations([Values(graph, program.rebuild(graph))], seed)
         )
         return Simplified(self.start, program, passed.beta / sizes, passed.units * sizes)
 
@@ -151,7 +151,10 @@ class Descent:
 
     @classmethod
     def restart(
-        cls, way: SearchHistory, rng: np.random.Generator, searching: Callable[[Tape], TermSearch]
+        cls,
+        history: SearchHistory,
+        rng: np.random.Generator,
+        searching: Callable[[Tape], TermSearch],
     ) -> Descent:
         """Return a descent from a program shortly before the end of another descent, written in another way.
 
@@ -159,14 +162,14 @@ class Descent:
         kept, as on other samples a costlier program may be the better one to continue from.
 
         Args:
-            way: What the descent has come by.
+            history: What the descent has come by.
             rng: Which program it is, and the dice.
             searching: Makes searches.
         """
-        near = [count for count in sorted(way.visited) if count <= way.fewest / _LEG]
+        near = [count for count in sorted(history.visited) if count <= history.fewest / _LEG]
         count = int(rng.choice(near))
-        dearer = {known: passed for known, passed in way.visited.items() if known > count}
-        whole = way.rebuild(way.visited[count], int(rng.integers(_DICE)))
+        dearer = {known: passed for known, passed in history.visited.items() if known > count}
+        whole = history.rebuild(history.visited[count], int(rng.integers(_DICE)))
         return cls._make(whole, searching, dearer)
 
     @classmethod
@@ -234,24 +237,24 @@ class Descent:
 
 
 def continue_on_samples(
-    way: SearchHistory, searching: Callable[[Tape], TermSearch]
+    history: SearchHistory, searching: Callable[[Tape], TermSearch]
 ) -> SearchHistory | None:
     """Continue a descent on other samples, from the leanest program that is within the budget there.
 
     Args:
-        way: History of a descent on some samples.
+        history: History of a descent on some samples.
         searching: Makes searches on others.
 
     Returns:
         None where no program is within the budget there.
     """
     tried: list[SearchHistory] = []
-    for count, passed in sorted(way.visited.items()):
+    for count, passed in sorted(history.visited.items()):
         search = searching(passed.tape)
         end = search.restore_budget(passed.pruning, passed.beta)
         if not end.fit.within:
             continue
-        descent = Descent(way.start, searching, search, end, passed.units, {})
+        descent = Descent(history.start, searching, search, end, passed.units, {})
         descent._note(end)
         tried.append(descent.descend())
         if end.count <= count or len(tried) == _MENDED:
@@ -259,48 +262,48 @@ def continue_on_samples(
     return min(tried, key=lambda one: one.rank, default=None)
 
 
-def find_leanest_histories(ways: Iterable[SearchHistory], number: int) -> list[SearchHistory]:
+def find_leanest_histories(histories: Iterable[SearchHistory], number: int) -> list[SearchHistory]:
     """Return the histories with the leanest different ends, so many at most."""
     different: dict[tuple[int, float], SearchHistory] = {}
-    for way in ways:
+    for way in histories:
         different.setdefault(way.rank, way)
     return [different[rank] for rank in sorted(different)[:number]]
 
 
-def draw_history(ways: Sequence[SearchHistory], rng: np.random.Generator) -> SearchHistory:
+def draw_history(histories: Sequence[SearchHistory], rng: np.random.Generator) -> SearchHistory:
     """Return a random history; leaner ends are likelier."""
-    fewest = np.array([one.fewest for one in ways])
+    fewest = np.array([one.fewest for one in histories])
     weights = np.exp((fewest.min() - fewest) / _LIKELY)
-    return ways[int(rng.choice(len(ways), p=weights / weights.sum()))]
+    return histories[int(rng.choice(len(histories), p=weights / weights.sum()))]
 
 
-def drop_candidates(ways: Sequence[SearchHistory], number: int) -> list[SearchHistory]:
+def drop_candidates(histories: Sequence[SearchHistory], number: int) -> list[SearchHistory]:
     """Return the histories, of which all but the leanest keep only the best candidate for each number of operations.
 
     Hundreds of whole histories would fill the memory.
 
     Args:
-        ways: Histories in any order, which is kept.
+        histories: Histories in any order, which is kept.
         number: How many of the leanest stay whole.
     """
-    whole = {id(way) for way in find_leanest_histories(ways, number)}
+    whole = {id(way) for way in find_leanest_histories(histories, number)}
     costs: dict[int, float] = {}
-    for way in ways:
+    for way in histories:
         for count, passed in way.visited.items():
             costs[count] = min(passed.cost, costs.get(count, np.inf))
 
-    def best(way: SearchHistory) -> SearchHistory:
-        some = {count: one for count, one in way.visited.items() if one.cost <= costs[count]}
-        return replace(way, visited=some)
+    def best(history: SearchHistory) -> SearchHistory:
+        some = {count: one for count, one in history.visited.items() if one.cost <= costs[count]}
+        return replace(history, visited=some)
 
-    return [way if id(way) in whole else best(way) for way in ways]
+    return [way if id(way) in whole else best(way) for way in histories]
 
 
-def list_front(ways: Iterable[SearchHistory]) -> list[Simplified]:
+def list_front(histories: Iterable[SearchHistory]) -> list[Simplified]:
     """Return programs of histories that no leaner program beats, a few of them, evenly spread."""
     entries = [
         (count, max(passed.cost, _EXACT), way)
-        for way in ways
+        for way in histories
         for count, passed in way.visited.items()
     ]
     kept: list[tuple[int, SearchHistory]] = []

@@ -57,7 +57,7 @@ class TermSamples:
             across = np.broadcast_to(np.eye(n)[:, :, None], (n, n, count))
         if not self.direct:
             return np.ascontiguousarray(across)
-        i, j = self._places
+        i, j = self._find_positions
         mirrored = np.where(i == j, 0.0, 1.0)[:, None, None]
         lower = across[i] * self.ddq[j][:, None]
         lower = lower + mirrored * across[j] * self.ddq[i][:, None]
@@ -71,13 +71,13 @@ class TermSamples:
         )
 
     @cached_property
-    def _places(self) -> tuple[IntArray, IntArray]:
+    def _find_positions(self) -> tuple[IntArray, IntArray]:
         """Rows and columns of the entries of M that a program gives, (n_entries,) each; none for torques."""
         return np.tril_indices(len(self.ddq) if self.direct else 0)
 
     def compute_residuals(self, outputs: Outputs) -> FloatArray:
         """Return the torques minus those of a program, (n_dof, n_samples)."""
-        rows, columns = self._places
+        rows, columns = self._find_positions
         torques = np.zeros(self.ddq.shape)
         for place, value in zip(outputs.places.tolist(), outputs.values, strict=True):
             if place >= rows.size:
@@ -94,7 +94,7 @@ class TermSamples:
 
     def build_mass_matrices(self, outputs: Outputs) -> FloatArray:
         """Return the mass matrices of the independent coordinates, (n_samples, n_dof, n_dof)."""
-        rows, columns = self._places
+        rows, columns = self._find_positions
         number = int(np.searchsorted(outputs.places, rows.size))
         lower, places = outputs.values[:number], outputs.places[:number]
         if self._across is None:

@@ -219,7 +219,7 @@ def compute_effects(
     pruning: Pruning,
     candidates: IntArray,
     v: FloatArray,
-    own: FloatArray,
+    kept_values: FloatArray,
     adjoints: FloatArray,
 ) -> FloatArray:
     """Return what terms contribute to quantities, (n_candidates, n_quantities n_samples)."""
@@ -234,7 +234,7 @@ def compute_effects(
         given[:] = 0.0
         if what == WHOLE:
             if source[k] == k:
-                _multiply(1.0, own[k], given)
+                _multiply(1.0, kept_values[k], given)
             elif source[k] == NUMBER:
                 given[:] = factor[k]
             else:
@@ -242,7 +242,7 @@ def compute_effects(
         elif what == ITSELF:
             if kept[k, WHOLE]:
                 for i in range(m):
-                    given[i] = own[k, i] - v[k, i]
+                    given[i] = kept_values[k, i] - v[k, i]
         elif kept[k, WHOLE] and source[k] == k:
             _multiply(-1.0 if operands[k, what] & 1 else 1.0, v[operands[k, what] >> 1], given)
         for q in range(quantities):

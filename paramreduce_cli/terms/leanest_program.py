@@ -27,7 +27,7 @@ from paramreduce_cli.terms.parallel_descents import (
     WorkerGroup,
     start_searchers,
 )
-from paramreduce_cli.terms.starts import Start, order_by_promise
+from paramreduce_cli.terms.starts import Start, order_by_estimate
 
 _LOOKED_AT = 200
 """Starts that are looked at to find the smallest one within the budget, at most."""
@@ -66,7 +66,7 @@ def simplify(
     searcher: Searcher,
     starts: list[Start],
     *,
-    rounds: int,
+    max_rounds: int,
     seconds: float = math.inf,
     jobs: int = 1,
     progress: Callable[[float, str], None] = lambda *_: None,
@@ -80,7 +80,7 @@ def simplify(
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        rounds: How many descents in a row may bring nothing, of those near the best ones and of those once more.
+        max_rounds: How many descents in a row may bring nothing, of those near the best ones and of those once more.
         seconds: After which no more descents are begun, but the last ones, with more samples; then what is found
             depends on the machine.
         jobs: Processes; what is found in time does not depend on them.
@@ -94,8 +94,8 @@ def simplify(
     smallest = next((one.start for one in every if one.end.fit.within), None)
     if smallest is None:
         return Found([], [])
-    begins = _list_first(searcher, order_by_promise(starts, smallest.model.n))
-    told = _ProgressMeter(progress, len(begins) + 2 * rounds + _CLOSELY)
+    begins = _list_first(searcher, order_by_estimate(starts, smallest.model.n))
+    told = _ProgressMeter(progress, len(begins) + 2 * max_rounds + _CLOSELY)
 
     def beside(ends: Sequence[SearchHistory], turn: int) -> Near:
         rng = np.random.default_rng([searcher.seed, turn, 1])
@@ -110,8 +110,8 @@ def simplify(
     pays = told.ahead * _estimate_work(searcher, begins) > _MANY
     with start_searchers(searcher, jobs if pays else 1, told, deadline) as working:
         ends = working.map(Searcher.descend, [one.start for one in begins])
-        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, rounds, told)
-        ends = _descend_further(working, ends, Searcher.descend_again, before, rounds, told)
+        ends = _descend_further(working, ends, Searcher.descend_nearby, beside, max_rounds, told)
+        ends = _descend_further(working, ends, Searcher.repeat_descent, before, max_rounds, told)
         best = find_leanest_histories(ends, _CLOSELY)
         told.ahead = len(best)
         close = working.map(Searcher.descend_closely, best, however_late=True)
@@ -135,10 +135,10 @@ class _ProgressMeter:
         self._progress, self.ahead = progress, ahead
         self._done, self._fewest = 0, np.inf
 
-    def __call__(self, way: SearchHistory | None) -> None:
-        """Of one more descent."""
+    def __call__(self, history: SearchHistory | None) -> None:
+        """Count one more descent."""
         self._done, self.ahead = self._done + 1, self.ahead - 1
-        self._fewest = min(self._fewest, np.inf if way is None else way.fewest)
+        self._fewest = min(self._fewest, np.inf if history is None else history.fewest)
         self._progress(self._done / (self._done + self.ahead), f"{self._fewest} operations")
 
     def expect(self, ahead: int) -> None:
@@ -152,7 +152,7 @@ def _descend_further(
     work: Callable[[Searcher, Item], SearchHistory | None],
     item: Callable[[Sequence[SearchHistory], int], Item],
     patience: int,
-    told: _ProgressMeter,
+    meter: _ProgressMeter,
 ) -> list[SearchHistory]:
     """Make further descents, while in time, until so many in a row have improved nothing.
 
@@ -162,7 +162,7 @@ def _descend_further(
         work: What they are.
         item: What one is made from, from the ends of those before and its number.
         patience: How many may bring nothing.
-        told: Of those that are still to be made, too.
+        meter: Of those that are still to be made, too.
     """
     turn = since = 0
     fewest = _find_fewest(ends)
@@ -172,7 +172,7 @@ def _descend_further(
         turn, since = turns.stop, since + len(turns)
         saved = fewest - _find_fewest(ends)
         if saved and saved * _HARDLY >= fewest:
-            told.expect(since)
+            meter.expect(since)
             since, fewest = 0, fewest - saved
     return ends
 

@@ -89,15 +89,15 @@ class Searcher:
         start = near(what.start, what.others, self.lean, rng, direct=self.direct)
         return _descend(self.start_descent(start, what.turn), rng)
 
-    def descend_again(self, what: Again) -> SearchHistory | None:
+    def repeat_descent(self, what: Again) -> SearchHistory | None:
         """Descend from a program shortly before the end of a descent, written in another way."""
         rng = np.random.default_rng([self.seed, what.turn, 2])
         searching = self._make_search(what.way.start, self.looked_at, what.turn)
         return _descend(Descent.restart(what.way, rng, searching), rng)
 
-    def descend_closely(self, way: SearchHistory) -> SearchHistory | None:
+    def descend_closely(self, history: SearchHistory) -> SearchHistory | None:
         """Continue a descent with more samples."""
-        return continue_on_samples(way, self._make_search(way.start, self.closely))
+        return continue_on_samples(history, self._make_search(history.start, self.closely))
 
     def _make_search(
         self, start: Start, some: SearchSamples, turn: int = 0
@@ -125,18 +125,18 @@ class WorkerGroup:
     """The workers of a searcher, in this process or in others.
 
     Args:
-        told: Of what is found on an item, as soon as it is.
+        on_descent: Of what is found on an item, as soon as it is.
         deadline: After which nothing is begun, on the clock of `time.monotonic`, which processes share, s.
         pool: Workers that hold the searcher.
     """
 
     def __init__(
         self,
-        told: Callable[[SearchHistory | None], None],
+        on_descent: Callable[[SearchHistory | None], None],
         deadline: float,
         pool: WorkerPool[Searcher],
     ) -> None:
-        self._told, self._deadline, self._pool = told, deadline, pool
+        self._told, self._deadline, self._pool = on_descent, deadline, pool
         self.cut_short = False
         """Whether anything was not begun for the deadline."""
 
@@ -180,12 +180,12 @@ def _work_in_time(
 def start_searchers(
     searcher: Searcher,
     jobs: int,
-    told: Callable[[SearchHistory | None], None],
+    on_descent: Callable[[SearchHistory | None], None],
     deadline: float = math.inf,
 ) -> Iterator[WorkerGroup]:
     """Start so many processes for a searcher, or none; without a deadline results do not depend on their number."""
     with start_workers(jobs, partial(_same, searcher)) as pool:
-        yield WorkerGroup(told, deadline, pool)
+        yield WorkerGroup(on_descent, deadline, pool)
 
 
 def _same(searcher: Searcher) -> Searcher:

@@ -152,8 +152,8 @@ class Fitting:
         self.tape, self.samples, self.budget = tape, samples, budget
         self.n = n_parameters
         self._watched, self._poses = watched, poses
-        self._parameters = tape.parameters(n_parameters)
-        self._made, self._in_parameters = tape.made(), tape.linear(n_parameters)
+        self._parameters = tape.find_parameters(n_parameters)
+        self._made, self._in_parameters = tape.mark_computed(), tape.mark_dependent(n_parameters)
         chi = samples.tau / samples.nominal_torque[:, None]
         self._torque_scale = 1 / (samples.nominal_torque * np.linalg.norm(chi))
         nominal = samples.nominal_acceleration
@@ -167,25 +167,25 @@ class Fitting:
         inputs[: self.n], inputs[self.n :] = beta[:, None], samples.states
         return inputs
 
-    def fit(self, pruning: Pruning, beta: FloatArray, looks: int = 1) -> TermFit:
+    def fit(self, pruning: Pruning, beta: FloatArray, checks: int = 1) -> TermFit:
         """Fit the parameters.
 
         Args:
             pruning: Pruning of the program.
             beta: Values to start from, for the mass matrices that accelerations are found with.
-            looks: How often these are found anew.
+            checks: How often these are found anew.
         """
         samples = self.samples
-        needed = self.tape.needed(pruning)
-        values = self.tape.values(pruning, self._stack_inputs(beta, samples), needed)
+        needed = self.tape.mark_live(pruning)
+        values = self.tape.evaluate(pruning, self._stack_inputs(beta, samples), needed)
         present = self._parameters >= 0
         present[present] = pruning.kept[self._parameters[present], WHOLE]
         W = np.zeros((self.n, *samples.tau.shape))
-        W[present] = self.tape.adjoints_of(
+        W[present] = self.tape.compute_adjoints_of(
             pruning, values, samples.seeds, self._in_parameters, self._parameters[present]
         )
-        inverse = samples.invert_mass_matrices(self.tape.outputs(values))
-        for _ in range(looks):
+        inverse = samples.invert_mass_matrices(self.tape.get_outputs(values))
+        for _ in range(checks):
             metric = self._compute_metric(inverse)
             rows = self._weigh(W, metric)
             target = self._weigh(samples.tau[None], metric)[0]
@@ -194,8 +194,8 @@ class Fitting:
             if not samples.direct:
                 break
             # Accelerations go with the mass matrices of the fitted values.
-            values = self.tape.values(pruning, self._stack_inputs(beta, samples), needed)
-            inverse = samples.invert_mass_matrices(self.tape.outputs(values))
+            values = self.tape.evaluate(pruning, self._stack_inputs(beta, samples), needed)
+            inverse = samples.invert_mass_matrices(self.tape.get_outputs(values))
         residual = self._weigh(off[None], metric)[0]
         errors = self._compute_errors(off, inverse)
         return self._evaluate(pruning, beta, errors, Linear(rows, factor, residual, metric))
@@ -246,15 +246,15 @@ class Fitting:
 
     def _compute_outputs(self, pruning: Pruning, beta: FloatArray, samples: TermSamples) -> Outputs:
         """Return the outputs of the program."""
-        values = self.tape.values(
-            pruning, self._stack_inputs(beta, samples), self.tape.needed(pruning)
+        values = self.tape.evaluate(
+            pruning, self._stack_inputs(beta, samples), self.tape.mark_live(pruning)
         )
-        return self.tape.outputs(values)
+        return self.tape.get_outputs(values)
 
     def compute_effects(self, fit: TermFit, candidates: IntArray) -> FloatArray:
         """Return what the rows of a fit lose with each term, (n_candidates, n_rows)."""
         values, own, adjoints = self._differentiate(fit)
-        found = self.tape.effects(fit.pruning, candidates, values, own, adjoints)
+        found = self.tape.estimate_effects(fit.pruning, candidates, values, own, adjoints)
         return self._weigh(found.reshape(-1, *self.samples.tau.shape), fit.linear.metric)
 
     def list_substitutions(self, fit: TermFit) -> tuple[Substitutions, FloatArray, FloatArray]:
@@ -266,7 +266,7 @@ class Fitting:
         itself = fit.pruning.kept[:, WHOLE] & (fit.pruning.source == np.arange(self.tape.size))
         residual = fit.linear.residual.reshape(pulls.shape[1:])
         ways = find_substitutions(values, pulls, residual, self._made & itself, self._in_parameters)
-        constants = self.tape.constants()
+        constants = self.tape.find_constants()
         return ways.add_ones(constants[itself[constants]]), values, pulls
 
     def _differentiate(self, fit: TermFit) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -275,9 +275,9 @@ class Fitting:
             self._stack_inputs(fit.beta, self.samples),
             np.ones(self.tape.size, np.bool_),
         )
-        values = self.tape.values(fit.pruning, inputs, everywhere)
-        adjoints = self.tape.adjoints(fit.pruning, values, self.samples.seeds, everywhere)
-        return values, self.tape.own_values(fit.pruning, inputs, values), adjoints
+        values = self.tape.evaluate(fit.pruning, inputs, everywhere)
+        adjoints = self.tape.compute_adjoints(fit.pruning, values, self.samples.seeds, everywhere)
+        return values, self.tape.evaluate_unreplaced(fit.pruning, inputs, values), adjoints
 
     def _compute_metric(self, inverse: FloatArray | None) -> FloatArray | None:
         """Return square roots of the quadratic forms that take differences of torques to the cost, (n_dof, n_dof,

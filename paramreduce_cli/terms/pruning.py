@@ -44,7 +44,7 @@ class Pruning(NamedTuple):
         return cls(np.ones((size, 3), dtype=np.bool_), np.arange(size), np.ones(size))
 
     def has(self, terms: IntArray) -> BoolArray:
-        """Return which terms, as :meth:`Tape.candidates` gives them, are as in the whole program."""
+        """Return which terms, as :meth:`Tape.list_candidates` gives them, are as in the whole program."""
         nodes, what = terms.T
         kept: BoolArray = self.kept[nodes, np.minimum(what, WHOLE)]
         return np.where(what == ITSELF, self.source[nodes] == nodes, kept)

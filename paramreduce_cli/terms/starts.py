@@ -71,7 +71,7 @@ def list_starts(
     )
 
 
-def order_by_promise(starts: list[Start], smallest: int) -> Iterator[Start]:
+def order_by_estimate(starts: list[Start], smallest: int) -> Iterator[Start]:
     """Yield starts, the most promising first: the leanest of every size, then the second of every size, and so on.
 
     What a larger subset has besides may cost little once terms are left out, and make up for these.

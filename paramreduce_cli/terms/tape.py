@@ -36,17 +36,17 @@ class Outputs(NamedTuple):
     """Among all outputs, rising, (k,)."""
 
     @classmethod
-    def of(cls, everything: FloatArray) -> Outputs:
-        """Of all outputs, (n_outputs, n_samples), but for those that are zero for every sample."""
+    def drop_zero(cls, everything: FloatArray) -> Outputs:
+        """Return the outputs, (n_outputs, n_samples), without those that are zero for every sample."""
         places = np.flatnonzero(everything.any(axis=1))
         return cls(everything[places], places)
 
 
 class Tape:
-    """A program whose terms can be left out, and whose nodes can stand for others.
+    """A program whose terms can be removed, and whose nodes can be replaced by multiples of others.
 
     Args:
-        program: Of sums, products, sines, cosines and friction's functions.
+        program: Program of sums, products, sines, cosines and friction's functions.
     """
 
     def __init__(self, program: Program) -> None:
@@ -67,12 +67,12 @@ class Tape:
         self._live = np.flatnonzero(~np.array(zero, dtype=np.bool_))
         self._signs = np.where(self._instructions.outputs[self._live] & 1, -1.0, 1.0)
 
-    def everything(self) -> Pruning:
-        """The whole program."""
+    def keep_all(self) -> Pruning:
+        """Return the pruning that removes nothing."""
         return Pruning.keep_all(self.size)
 
-    def candidates(self) -> IntArray:
-        """Terms: numbers of nodes and what of them, (n_candidates, 2).
+    def list_candidates(self) -> IntArray:
+        """Return all terms as pairs of node and part, (n_candidates, 2).
 
         All but the last ones can be left out. These are nodes as what they are, which can be put back
         where they stand for others.
@@ -86,17 +86,17 @@ class Tape:
         ]
         return np.array(terms, dtype=np.int64).reshape(-1, 2)
 
-    def made(self) -> BoolArray:
-        """Which nodes are computed, neither constants nor inputs, (n_nodes,)."""
+    def mark_computed(self) -> BoolArray:
+        """Return a mask of the nodes that are neither constants nor inputs, (n_nodes,)."""
         result: BoolArray = self._instructions.codes > INPUT
         return result
 
-    def constants(self) -> IntArray:
-        """Nodes that are constants, (n_constants,)."""
+    def find_constants(self) -> IntArray:
+        """Return the nodes that are constants, (n_constants,)."""
         return np.flatnonzero(self._instructions.codes == CONSTANT)
 
-    def linear(self, n: int) -> BoolArray:
-        """Of which nodes the first n inputs are part, (n_nodes,)."""
+    def mark_dependent(self, n: int) -> BoolArray:
+        """Return a mask of the nodes that depend on the first n inputs, (n_nodes,)."""
         result = np.zeros(self.size, dtype=np.bool_)
         for k, (operation, operands, number) in enumerate(self.program.nodes):
             result[k] = (operation == "input" and number < n) or any(
@@ -104,8 +104,8 @@ class Tape:
             )
         return result
 
-    def parameters(self, n: int) -> IntArray:
-        """Nodes of the first inputs, -1 for those that the program does not use, (n,)."""
+    def find_parameters(self, n: int) -> IntArray:
+        """Return the nodes of the first inputs, -1 for inputs that the program does not use, (n,)."""
         result = np.full(n, NONE)
         inputs = np.flatnonzero(self._instructions.codes == INPUT)
         positions = self._instructions.numbers[inputs].astype(np.int64)
@@ -113,18 +113,18 @@ class Tape:
         result[positions[first]] = inputs[first]
         return result
 
-    def needed(self, pruning: Pruning) -> BoolArray:
-        """Nodes that outputs are made of, (n_nodes,)."""
+    def mark_live(self, pruning: Pruning) -> BoolArray:
+        """Return a mask of the nodes that outputs depend on, (n_nodes,)."""
         needed: BoolArray = kernels.find_live_nodes(self._instructions, pruning)
         return needed
 
-    def values(self, pruning: Pruning, inputs: FloatArray, which: BoolArray) -> FloatArray:
-        """Of nodes, (n_nodes, n_samples); zero where they are left out, or not asked for.
+    def evaluate(self, pruning: Pruning, inputs: FloatArray, which: BoolArray) -> FloatArray:
+        """Return the values of nodes, (n_nodes, n_samples); zero for removed and unrequested nodes.
 
         Args:
             pruning: Pruning of the program.
-            inputs: By position, (n_inputs, n_samples).
-            which: Nodes that are asked for, with all that they are made of, (n_nodes,).
+            inputs: Inputs by position, (n_inputs, n_samples).
+            which: Mask of the requested nodes and of everything they depend on, (n_nodes,).
         """
         values: FloatArray = kernels.evaluate(
             self._instructions, pruning,
@@ -132,41 +132,43 @@ class Tape:
         )  # fmt: skip
         return values
 
-    def outputs(self, values: FloatArray) -> Outputs:
-        """Outputs from the values of nodes, (n_nodes, n_samples)."""
+    def get_outputs(self, values: FloatArray) -> Outputs:
+        """Return the outputs from the values of nodes, (n_nodes, n_samples)."""
         nodes = self._instructions.outputs[self._live] >> 1
         return Outputs(values[nodes] * self._signs[:, None], self._live)
 
-    def own_values(self, pruning: Pruning, inputs: FloatArray, values: FloatArray) -> FloatArray:
-        """What nodes would be if they were kept as they are, (n_nodes, n_samples).
+    def evaluate_unreplaced(
+        self, pruning: Pruning, inputs: FloatArray, values: FloatArray
+    ) -> FloatArray:
+        """Return the values that nodes would have if they were not replaced, (n_nodes, n_samples).
 
         Args:
             pruning: Pruning of the program.
-            inputs: By position, (n_inputs, n_samples).
-            values: Of all nodes.
+            inputs: Inputs by position, (n_inputs, n_samples).
+            values: Values of all nodes.
         """
         own: FloatArray = kernels.evaluate_unreplaced(self._instructions, pruning, inputs, values)
         return own
 
-    def adjoints(
+    def compute_adjoints(
         self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> FloatArray:
-        """Derivatives of quantities that are linear in the outputs, by nodes.
+        """Return the derivatives of quantities that are linear in the outputs, by nodes.
 
         Args:
             pruning: Pruning of the program.
-            values: Of the nodes.
+            values: Values of the nodes.
             seeds: Derivatives of the quantities by the outputs, (n_outputs, n_quantities, n_samples).
-            which: Nodes that are asked for, with all that is made of them, (n_nodes,).
+            which: Mask of the requested nodes and of everything that depends on them, (n_nodes,).
 
         Returns:
-            Zero for other nodes, (n_nodes, n_quantities, n_samples).
+            Derivatives, (n_nodes, n_quantities, n_samples); zero for other nodes.
         """
-        found, reached = self._adjoints(pruning, values, seeds, which)
+        found, reached = self._compute_adjoints(pruning, values, seeds, which)
         found[~reached] = 0.0
         return found
 
-    def adjoints_of(
+    def compute_adjoints_of(
         self,
         pruning: Pruning,
         values: FloatArray,
@@ -174,40 +176,40 @@ class Tape:
         which: BoolArray,
         nodes: IntArray,
     ) -> FloatArray:
-        """The same for some of the nodes that are asked for, (k, n_quantities, n_samples)."""
-        found, reached = self._adjoints(pruning, values, seeds, which)
+        """Return the derivatives by some of the requested nodes, (k, n_quantities, n_samples)."""
+        found, reached = self._compute_adjoints(pruning, values, seeds, which)
         some = found[nodes]
         some[~reached[nodes]] = 0.0
         return some
 
-    def _adjoints(
+    def _compute_adjoints(
         self, pruning: Pruning, values: FloatArray, seeds: FloatArray, which: BoolArray
     ) -> tuple[FloatArray, BoolArray]:
-        """Anything where there are none."""
+        """Return derivatives and a mask of the nodes they are valid for; other entries are undefined."""
         return kernels.accumulate_adjoints(
             self._instructions, pruning,
             values, seeds, which,
         )  # fmt: skip
 
-    def effects(
+    def estimate_effects(
         self,
         pruning: Pruning,
         candidates: IntArray,
         values: FloatArray,
-        own: FloatArray,
+        kept_values: FloatArray,
         adjoints: FloatArray,
     ) -> FloatArray:
-        """What terms give to quantities, to first order, (n_candidates, n_quantities n_samples).
+        """Return what terms add to quantities, to first order, (n_candidates, n_quantities * n_samples).
 
         Terms that are left out get what they would give, nodes that stand for others what they would
         give beyond that as what they are.
         """
         return kernels.compute_effects(
-            self._instructions, pruning, candidates, values, own, adjoints
+            self._instructions, pruning, candidates, values, kept_values, adjoints
         )
 
-    def combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
-        """Linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
+    def find_combinations(self, pruning: Pruning, terms: IntArray, n: int) -> FloatArray:
+        """Return the linear combinations of the first n inputs that terms are multiples of, (n_terms, n).
 
         Zero for terms that are no multiple of one, or for which that cannot be seen.
         """
@@ -218,12 +220,12 @@ class Tape:
         known = (node >= 0) & (what != ITSELF)
         return np.where(known[:, None], coefficients[node], 0.0)
 
-    def count(self, pruning: Pruning) -> int:
-        """Operations left, nearly: sums and products are not rearranged, nor numbers worked out."""
+    def count_operations(self, pruning: Pruning) -> int:
+        """Return the approximate number of operations: sums and products are not rearranged, numbers are not combined."""
         return int(kernels.count_operations(self._instructions, pruning))
 
-    def counts(self, pruning: Pruning, candidates: IntArray) -> IntArray:
-        """Operations left when one more term is the other way round, (n_candidates,).
+    def count_flipped(self, pruning: Pruning, candidates: IntArray) -> IntArray:
+        """Return the operations after flipping each candidate, (n_candidates,).
 
         Nodes that stand for themselves and could only stand for others stay as they are.
         """
@@ -232,17 +234,17 @@ class Tape:
             candidates,
         )  # fmt: skip
 
-    def counts_standing(
+    def count_replaced(
         self, pruning: Pruning, nodes: IntArray, sources: IntArray, factors: FloatArray
     ) -> IntArray:
-        """Operations left when one more node stands for another one, (n_ways,)."""
+        """Return the operations after replacing one more node by a multiple of another, (n_replacements,)."""
         return kernels.count_replaced(
             self._instructions, pruning,
             nodes, sources, factors,
         )  # fmt: skip
 
-    def rebuilt(self, pruning: Pruning) -> Program:
-        """The program that is left."""
+    def rebuild(self, pruning: Pruning) -> Program:
+        """Return the program that is left."""
         nodes = [Node("constant")]
         stands_for: list[int] = []
 

@@ -52,7 +52,7 @@ class TermSearch:
     def __init__(self, fitting: Fitting, seed: int) -> None:
         self._fitting = fitting
         self.tape = fitting.tape
-        self._candidates = self.tape.candidates()
+        self._candidates = self.tape.list_candidates()
         self._droppable: BoolArray = self._candidates[:, 1] != ITSELF
         self._itself = np.zeros(self.tape.size, dtype=np.int64)
         for number, (k, what) in enumerate(self._candidates.tolist()):
@@ -62,7 +62,7 @@ class TermSearch:
 
     def start(self, beta: FloatArray) -> Step:
         """Return the first step, with all terms."""
-        return self._step(self._fitting.fit(self.tape.everything(), beta, looks=2))
+        return self._step(self._fitting.fit(self.tape.keep_all(), beta, checks=2))
 
     def descend(
         self,
@@ -99,7 +99,7 @@ class TermSearch:
             pruning: Pruning of the program.
             beta: Values to start from.
         """
-        fit = self._fitting.fit(pruning, beta, looks=2)
+        fit = self._fitting.fit(pruning, beta, checks=2)
         back: list[int] = []
         while not fit.within:
             number = self._find_most_helpful(fit, back)
@@ -109,7 +109,7 @@ class TermSearch:
             fit = self._fit_flipped(fit, self._candidates[number][None])
         return self._step(fit)
 
-    def _remove_cheapest(self, step: Step, weights: FloatArray, looked_at: int) -> Step | None:
+    def _remove_cheapest(self, step: Step, weights: FloatArray, n_checked: int) -> Step | None:
         """Return the program with the cheapest terms removed, or None if all are too costly."""
         fit = step.fit
         numbers, saved = self._find_useful(step)
@@ -122,7 +122,7 @@ class TermSearch:
         if several is not None:
             return several
         lists = [
-            np.argsort(cost / saved, kind="stable")[:looked_at]
+            np.argsort(cost / saved, kind="stable")[:n_checked]
             for cost in (costs.again, costs.plain)
         ]
         for number in np.unique(np.concatenate(lists)):
@@ -168,7 +168,7 @@ class TermSearch:
         """Return the program with one node replaced by another, or None if all substitutions are too costly."""
         fit = step.fit
         ways, values, pulls = self._fitting.list_substitutions(fit)
-        counts = self.tape.counts_standing(fit.pruning, ways.nodes, ways.sources, ways.factors)
+        counts = self.tape.count_replaced(fit.pruning, ways.nodes, ways.sources, ways.factors)
         own = weights[self._itself[ways.nodes]]
         useful = np.flatnonzero(counts < step.count)
         ways, own, saved = ways[useful], own[useful], (step.count - counts[useful]).astype(float)
@@ -190,11 +190,11 @@ class TermSearch:
         pruning = step.fit.pruning
         # That a node is itself is no term to be left out: see stand-ins.
         numbers = np.flatnonzero(self._droppable & pruning.has(self._candidates))
-        saved = step.count - self.tape.counts(pruning, self._candidates[numbers])
+        saved = step.count - self.tape.count_flipped(pruning, self._candidates[numbers])
         return numbers[saved > 0], saved[saved > 0].astype(float)
 
     def _step(self, fit: TermFit) -> Step:
-        return Step(fit, self.tape.count(fit.pruning))
+        return Step(fit, self.tape.count_operations(fit.pruning))
 
     def _fit_flipped(self, fit: TermFit, flip: IntArray) -> TermFit:
         """Return the fit with some terms the other way round."""
@@ -202,7 +202,7 @@ class TermSearch:
 
     def _estimate_costs(self, fit: TermFit, live: IntArray) -> Costs:
         """Return the costs of removing each term."""
-        combinations = self.tape.combinations(fit.pruning, live, self._fitting.n)
+        combinations = self.tape.find_combinations(fit.pruning, live, self._fitting.n)
         return fit.linear.estimate_costs(
             self._fitting.compute_effects(fit, live), fit.beta, combinations
         )
@@ -215,7 +215,9 @@ class TermSearch:
         if not numbers.size:
             return None
         terms = self._candidates[numbers]
-        dearer = self.tape.counts(fit.pruning, terms) - self.tape.count(fit.pruning)
+        dearer = self.tape.count_flipped(fit.pruning, terms) - self.tape.count_operations(
+            fit.pruning
+        )
         G = self._fitting.compute_effects(fit, terms)
         gain = 2 * (G @ fit.linear.residual) - np.einsum("cr,cr->c", G, G)
         gain += fit.linear.compute_explained_squares(G)

@@ -126,8 +126,8 @@ def test_noise_of_torques_weights_the_rows():
     np.testing.assert_allclose(
         weighted.compute_peak_torques(z, dz, ddz), usual.compute_peak_torques(z, dz, ddz)
     )
-    assert weighted.compute_load_share(z, dz, ddz) == pytest.approx(
-        usual.compute_load_share(z, dz, ddz), rel=1e-9
+    assert weighted.compute_load_ratio(z, dz, ddz) == pytest.approx(
+        usual.compute_load_ratio(z, dz, ddz), rel=1e-9
     )
     made = optimize_trajectories(config.trajectories, model, None, Run(), Items())
     for trajectory in made.estimation:
@@ -206,7 +206,7 @@ def motion(made):
     _, model, trajectories = made
     return sample_motion(
         model.mechanism, trajectories, trajectories.estimation[0], rate=500.0, title="two_link",
-        start_pose=np.array([-np.pi / 2, 0.0]), ways=PathPlanner(model, trajectories),
+        start_pose=np.array([-np.pi / 2, 0.0]), planner=PathPlanner(model, trajectories),
     )  # fmt: skip
 
 

@@ -29,7 +29,7 @@ def test_how_many_motions_are_simulated_is_told():
         "sampling.simulation.test_runs=1",
     )
     told = []
-    sample(config.sampling, model, None, Recordings(None, None, None), tell=told.append)
+    sample(config.sampling, model, None, Recordings(None, None, None), report_progress=told.append)
     assert [(one.task, one.done, one.total) for one in told] == [
         ("simulate motions of the estimation set", 1, 2),
         ("simulate motions of the estimation set", 2, 2),

@@ -161,7 +161,7 @@ def test_large_regressors_are_projected_as_matrices(monkeypatch):
         return [
             dynamics.compute_regressor(q, dq, ddq),
             W,
-            *observation.pull_back(q, *states, W_bar),
+            *observation.compute_vector_jacobian_product(q, *states, W_bar),
         ]
 
     scalars = results()
@@ -179,7 +179,7 @@ def test_adjoint_of_observations_through_the_position_problem(name):
     states = [part[:, list(mechanism.independent)] for part in (q, dq, ddq)]
     rng = np.random.default_rng(0)
     W_bar = rng.normal(size=(6 * mechanism.n_dof, 5))
-    bars = observation.pull_back(q, *states[1:], W_bar)
+    bars = observation.compute_vector_jacobian_product(q, *states[1:], W_bar)
 
     def value(z, dz, ddz):
         return np.sum(observation.evaluate(coordinates.compute_positions(z, q), dz, ddz) * W_bar)

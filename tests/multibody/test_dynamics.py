@@ -65,7 +65,7 @@ def test_many_joints_agree_with_pinocchio():
     observation = Dynamics(mechanism).make_observation(columns)
     assert relative(observation.evaluate(*states), found[..., columns].reshape(-1, 4)) < 1e-12
     seed, direction = np.random.default_rng(3).normal(size=(2, 100, 4)), states[1]
-    gradient = observation.pull_back(*states, seed[0])[0]
+    gradient = observation.compute_vector_jacobian_product(*states, seed[0])[0]
     change = slope(lambda *s: np.sum(observation.evaluate(*s) * seed[0]), states, direction, 0)
     assert change == pytest.approx(np.sum(gradient * direction), rel=1e-6)
 
@@ -97,7 +97,7 @@ def test_adjoint_is_the_derivative_of_the_observation_matrix(mechanism):
     states = random_states(mechanism, 4)
     rng = np.random.default_rng(3)
     seed = rng.normal(size=observation.evaluate(*states).shape)
-    gradients = observation.pull_back(*states, seed)
+    gradients = observation.compute_vector_jacobian_product(*states, seed)
     for which, gradient in enumerate(gradients):
         direction = rng.normal(size=gradient.shape)
         found = slope(lambda *s: np.sum(observation.evaluate(*s) * seed), states, direction, which)

@@ -108,7 +108,7 @@ def forward_dynamics(oracle, independent, q, dq, phi, tau):
     M ddq + J' l = S' tau - h and J ddq = -dJ/dt dq, with S picking the independent coordinates.
     """
     n = q.size
-    M = np.array(oracle.build_mass_matrix(q, phi))
+    M = np.array(oracle.mass_matrix(q, phi))
     h = np.array(oracle.tau(q, dq, np.zeros(n), phi)).ravel()
     _, J, drift = (np.array(part) for part in oracle.closures(q, dq))
     force = np.zeros(n)

@@ -46,12 +46,12 @@ def test_figures_do_not_depend_on_processes(data, monkeypatch):
         told.append(name)
         assert done == len(told)
 
-    here = figure_rendering.render_figures(NAMES, data, ["png", "svg"], jobs=1, told=note)
+    here = figure_rendering.render_figures(NAMES, data, ["png", "svg"], jobs=1, on_figure=note)
     assert told == NAMES
     assert list(here) == ["torques", "poses"]
     assert all(set(one) == {"png", "svg"} for one in here.values())
     told.clear()
-    elsewhere = figure_rendering.render_figures(NAMES, data, ["png", "svg"], jobs=2, told=note)
+    elsewhere = figure_rendering.render_figures(NAMES, data, ["png", "svg"], jobs=2, on_figure=note)
     assert sorted(told) == sorted(NAMES)
     assert list(elsewhere) == list(here)
     assert elsewhere == here

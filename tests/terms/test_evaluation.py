@@ -24,7 +24,7 @@ class Moved:
 
     def evaluate(self, states):
         q, dq, ddq = np.split(states, 3)
-        return Outputs.of(
+        return Outputs.drop_zero(
             (self.dynamics.compute_torques(q.T, dq.T, ddq.T, self.values) + self.off).T
         )
 

@@ -37,7 +37,7 @@ def test_torques_and_mass_matrices_of_outputs_most_of_which_are_zero(direct, wit
     J = tangent if with_loops else np.broadcast_to(np.eye(N), (COUNT, N, N))
     everything = rng.normal(size=((N * (N + 1) // 2 if direct else 0) + N, COUNT))
     everything[rng.random(len(everything)) < share] = 0.0
-    outputs = Outputs.of(everything)
+    outputs = Outputs.drop_zero(everything)
     assert (len(outputs.places) > 0) == (share < 1)
     assert len(outputs.places) < len(everything)
 

@@ -11,9 +11,9 @@ from paramreduce_cli.terms.parallel_descents import Searcher
 def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_samples(
     searcher, start, monkeypatch
 ):
-    found = leanest_program.simplify(searcher, [start], rounds=8).ends
+    found = leanest_program.simplify(searcher, [start], max_rounds=8).ends
     monkeypatch.setattr(Searcher, "descend_again", lambda self, what: None)
-    without = leanest_program.simplify(searcher, [start], rounds=8).ends
+    without = leanest_program.simplify(searcher, [start], max_rounds=8).ends
     assert found[0].program.n_operations <= without[0].program.n_operations
 
 
@@ -56,7 +56,7 @@ def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
     for name in ("descend_nearby", "descend_again"):
         monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)
     found = leanest_program.simplify(
-        searcher, [start], rounds=rounds, progress=lambda share, detail: told.append(share)
+        searcher, [start], max_rounds=rounds, progress=lambda share, detail: told.append(share)
     )
     counts = [one.program.n_operations for one in found.ends]
     assert counts == sorted(counts)
@@ -75,11 +75,11 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
             name,
             lambda self, what, n=name, work=work: begun.append(n) or work(self, what),
         )
-    whole = leanest_program.simplify(searcher, [start], rounds=8)
+    whole = leanest_program.simplify(searcher, [start], max_rounds=8)
     assert not whole.cut_short
     assert {"descend_nearby", "descend_again"} < set(begun)
     begun.clear()
-    found = leanest_program.simplify(searcher, [start], rounds=8, seconds=1e-9)
+    found = leanest_program.simplify(searcher, [start], max_rounds=8, seconds=1e-9)
     assert begun == ["descend", "descend_closely"]
     assert found.cut_short
     least = min(one.program.n_operations for one in found.ends)

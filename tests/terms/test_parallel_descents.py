@@ -17,7 +17,7 @@ def found(searcher, start, jobs):
         ends += working.map(
             Searcher.descend_nearby, [Near(start, [start], turn) for turn in range(6)]
         )
-        ends += working.map(Searcher.descend_again, [Again(ends[k], k) for k in range(4)])
+        ends += working.map(Searcher.repeat_descent, [Again(ends[k], k) for k in range(4)])
         close = working.map(Searcher.descend_closely, ends)
     assert sorted(told) == sorted(one.rank for one in ends + close)
     return [one.rank for one in ends + close]

@@ -31,9 +31,9 @@ def inputs():
 def random_remains(tape, seed):
     """Some terms left out, and some nodes that stand for others, times a factor, or for numbers."""
     rng = np.random.default_rng(seed)
-    candidates = tape.candidates()
-    pruning = tape.everything().flip(candidates[rng.random(len(candidates)) < 0.12])
-    linear, made = tape.linear(2), tape.made()
+    candidates = tape.list_candidates()
+    pruning = tape.keep_all().flip(candidates[rng.random(len(candidates)) < 0.12])
+    linear, made = tape.mark_dependent(2), tape.mark_computed()
     for k in np.flatnonzero(made & (rng.random(tape.size) < 0.15)):
         like = np.flatnonzero(linear[:k] == linear[k])
         factor = rng.choice([1.0, -1.0, 0.37, -2.2])
@@ -41,7 +41,7 @@ def random_remains(tape, seed):
             pruning = pruning.replace(k, NUMBER, factor)
         elif like.size:
             pruning = pruning.replace(k, int(rng.choice(like)), factor)
-    for k in tape.constants()[rng.random(tape.constants().size) < 0.3]:
+    for k in tape.find_constants()[rng.random(tape.find_constants().size) < 0.3]:
         pruning = pruning.replace(k, NUMBER, 1.0)
     return pruning
 
@@ -51,7 +51,7 @@ def everywhere(tape):
 
 
 def outputs_of(tape, pruning, inputs):
-    values = tape.values(pruning, inputs, tape.needed(pruning))
+    values = tape.evaluate(pruning, inputs, tape.mark_live(pruning))
     return [values[o >> 1] * (-1 if o & 1 else 1) for o in tape.program.outputs]
 
 
@@ -59,10 +59,10 @@ def outputs_of(tape, pruning, inputs):
 def test_what_is_left_is_the_program_with_terms_set_to_zero(program, inputs, seed):
     tape = Tape(program)
     pruning = random_remains(tape, seed)
-    rebuilt = tape.rebuilt(pruning)
+    rebuilt = tape.rebuild(pruning)
     expected = [np.broadcast_to(v, 20) for v in rebuilt.evaluate(list(inputs))]
     np.testing.assert_allclose(outputs_of(tape, pruning, inputs), expected, atol=1e-14)
-    assert rebuilt.n_operations <= tape.count(pruning) <= program.n_operations
+    assert rebuilt.n_operations <= tape.count_operations(pruning) <= program.n_operations
 
 
 def test_a_constant_that_stands_for_one_saves_all_products_with_it():
@@ -71,13 +71,13 @@ def test_a_constant_that_stands_for_one_saves_all_products_with_it():
     length = g.constant(1.07)
     lengths = g.add(g.multiply(length, x), g.multiply(x, g.multiply(length, y)))
     tape = Tape(Program.from_graph(g, [g.multiply(p, lengths)]))
-    (constant,) = tape.constants()
-    pruning = tape.everything().replace(constant, NUMBER, 1.0)
-    assert tape.count(pruning) == tape.count(tape.everything()) - 2
-    assert tape.rebuilt(pruning).n_operations == tape.count(pruning)
+    (constant,) = tape.find_constants()
+    pruning = tape.keep_all().replace(constant, NUMBER, 1.0)
+    assert tape.count_operations(pruning) == tape.count_operations(tape.keep_all()) - 2
+    assert tape.rebuild(pruning).n_operations == tape.count_operations(pruning)
     itself = np.array([[constant, ITSELF]])
-    assert itself[0].tolist() in tape.candidates().tolist()
-    assert tape.count(pruning.flip(itself)) == tape.count(tape.everything())
+    assert itself[0].tolist() in tape.list_candidates().tolist()
+    assert tape.count_operations(pruning.flip(itself)) == tape.count_operations(tape.keep_all())
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -97,10 +97,10 @@ def test_what_is_left_is_linear_in_the_parameters(program, inputs, seed):
 @pytest.mark.parametrize("seed", range(5))
 def test_adjoints_are_derivatives(program, inputs, seed):
     tape = Tape(program)
-    pruning = random_remains(tape, seed) if seed else tape.everything()
-    values = tape.values(pruning, inputs, everywhere(tape))
+    pruning = random_remains(tape, seed) if seed else tape.keep_all()
+    values = tape.evaluate(pruning, inputs, everywhere(tape))
     seeds = np.eye(2)[:, :, None] * np.ones(20)
-    adjoints = tape.adjoints(pruning, values, seeds, everywhere(tape))
+    adjoints = tape.compute_adjoints(pruning, values, seeds, everywhere(tape))
     places = {int(n.number): k for k, n in enumerate(program.nodes) if n.operation == "input"}
     for position in (0, 1, 3):
         if not pruning.kept[places[position], WHOLE]:
@@ -118,13 +118,13 @@ def test_adjoints_are_derivatives(program, inputs, seed):
 def test_nodes_that_are_not_asked_for_change_nothing(program, inputs, seed):
     tape = Tape(program)
     pruning = random_remains(tape, seed)
-    seeds, linear = np.eye(2)[:, :, None] * np.ones(20), tape.linear(2)
-    values = tape.values(pruning, inputs, everywhere(tape))
-    some = tape.values(pruning, inputs, tape.needed(pruning))
-    np.testing.assert_array_equal(some[tape.needed(pruning)], values[tape.needed(pruning)])
+    seeds, linear = np.eye(2)[:, :, None] * np.ones(20), tape.mark_dependent(2)
+    values = tape.evaluate(pruning, inputs, everywhere(tape))
+    some = tape.evaluate(pruning, inputs, tape.mark_live(pruning))
+    np.testing.assert_array_equal(some[tape.mark_live(pruning)], values[tape.mark_live(pruning)])
     np.testing.assert_array_equal(
-        tape.adjoints(pruning, some, seeds, linear)[linear],
-        tape.adjoints(pruning, values, seeds, everywhere(tape))[linear],
+        tape.compute_adjoints(pruning, some, seeds, linear)[linear],
+        tape.compute_adjoints(pruning, values, seeds, everywhere(tape))[linear],
     )
 
 
@@ -142,24 +142,26 @@ def test_what_is_in_memory_where_there_are_no_derivatives_is_not_told(
         return found, reached
 
     monkeypatch.setattr(kernels, "accumulate_adjoints", spoilt)
-    values = tape.values(pruning, inputs, everywhere(tape))
+    values = tape.evaluate(pruning, inputs, everywhere(tape))
     given = (pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
-    adjoints, nodes = tape.adjoints(*given), tape.parameters(2)
+    adjoints, nodes = tape.compute_adjoints(*given), tape.find_parameters(2)
     assert np.all(np.isfinite(adjoints))
-    np.testing.assert_array_equal(tape.adjoints_of(*given, nodes), adjoints[nodes])
+    np.testing.assert_array_equal(tape.compute_adjoints_of(*given, nodes), adjoints[nodes])
 
 
 @pytest.mark.parametrize("seed", range(40))
 def test_effects_are_what_outputs_lose_or_gain(program, inputs, seed):
     """Exactly, where the parameters are part of a node: outputs are linear in those."""
     tape = Tape(program)
-    pruning = random_remains(tape, seed) if seed else tape.everything()
-    values = tape.values(pruning, inputs, everywhere(tape))
-    own = tape.own_values(pruning, inputs, values)
-    adjoints = tape.adjoints(pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape))
-    candidates = tape.candidates()
-    candidates = candidates[tape.linear(2)[candidates[:, 0]]]
-    effects = tape.effects(pruning, candidates, values, own, adjoints).reshape(-1, 2, 20)
+    pruning = random_remains(tape, seed) if seed else tape.keep_all()
+    values = tape.evaluate(pruning, inputs, everywhere(tape))
+    own = tape.evaluate_unreplaced(pruning, inputs, values)
+    adjoints = tape.compute_adjoints(
+        pruning, values, np.eye(2)[:, :, None] * np.ones(20), everywhere(tape)
+    )
+    candidates = tape.list_candidates()
+    candidates = candidates[tape.mark_dependent(2)[candidates[:, 0]]]
+    effects = tape.estimate_effects(pruning, candidates, values, own, adjoints).reshape(-1, 2, 20)
     now = np.array(outputs_of(tape, pruning, inputs))
     for term, here, effect in zip(candidates, pruning.has(candidates), effects, strict=True):
         other = outputs_of(tape, pruning.flip(term[None]), inputs)
@@ -169,8 +171,8 @@ def test_effects_are_what_outputs_lose_or_gain(program, inputs, seed):
 
 def test_nodes_that_stand_for_others_can_be_what_they_are_again(program, inputs):
     tape = Tape(program)
-    everything = tape.everything()
-    last = int(np.flatnonzero(tape.made() & tape.linear(2))[-1])
+    everything = tape.keep_all()
+    last = int(np.flatnonzero(tape.mark_computed() & tape.mark_dependent(2))[-1])
     pruning = everything.replace(last, last - 1, 0.7)
     back = np.array([[last, ITSELF]])
     again = pruning.flip(back)
@@ -185,14 +187,14 @@ def test_nodes_that_stand_for_others_can_be_what_they_are_again(program, inputs)
 def test_counts_of_single_changes(program, seed):
     tape = Tape(program)
     pruning = random_remains(tape, seed)
-    candidates = tape.candidates()
-    for term, count in zip(candidates, tape.counts(pruning, candidates), strict=True):
-        assert count == tape.count(pruning.flip(term[None]))
-    nodes = np.flatnonzero(tape.made())
+    candidates = tape.list_candidates()
+    for term, count in zip(candidates, tape.count_flipped(pruning, candidates), strict=True):
+        assert count == tape.count_operations(pruning.flip(term[None]))
+    nodes = np.flatnonzero(tape.mark_computed())
     sources, factors = np.maximum(nodes - 3, NUMBER), np.tile([1.0, 0.3], nodes.size)[: nodes.size]
-    counts = tape.counts_standing(pruning, nodes, sources, factors)
+    counts = tape.count_replaced(pruning, nodes, sources, factors)
     for *way, count in zip(nodes, sources, factors, counts, strict=True):
-        assert count == tape.count(pruning.replace(*way))
+        assert count == tape.count_operations(pruning.replace(*way))
 
 
 def test_outputs_are_those_that_are_not_zero(inputs):
@@ -201,7 +203,7 @@ def test_outputs_are_those_that_are_not_zero(inputs):
     tape = Tape(
         Program.from_graph(g, [g.constant(0.0), g.negate(g.multiply(a, x)), g.constant(0.0)])
     )
-    pruning = tape.everything()
-    found = tape.outputs(tape.values(pruning, inputs, tape.needed(pruning)))
+    pruning = tape.keep_all()
+    found = tape.get_outputs(tape.evaluate(pruning, inputs, tape.mark_live(pruning)))
     assert found.places.tolist() == [1]
     np.testing.assert_allclose(found.values, -inputs[:1] * inputs[2:3])

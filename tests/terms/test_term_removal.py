@@ -45,7 +45,7 @@ def fitting_of(model, direct, budget, count=60, reduced=None):
 
 def predicted(fitting, fit, samples, direct):
     """Torques, and mass matrices, from the program that is left, written out."""
-    program = fitting.tape.rebuilt(fit.pruning)
+    program = fitting.tape.rebuild(fit.pruning)
     m = samples.tau.shape[1]
     given = program.evaluate(
         [*np.broadcast_to(fit.beta[:, None], (fit.beta.size, m)), *samples.states]
@@ -101,7 +101,7 @@ def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
     fitting, reduced, _ = fitting_of(arm, direct, Budget(1e-6, np.inf))
     search, tape = TermSearch(fitting, 0), fitting.tape
     whole = search.start(reduced.values)
-    terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
+    terms = tape.list_candidates()[tape.list_candidates()[:, 1] != ITSELF]
     missed = helped = 0
     for term in terms:
         broken = fitting.fit(whole.fit.pruning.flip(term[None]), whole.fit.beta)
@@ -118,13 +118,13 @@ def test_terms_are_put_back_until_a_budget_is_kept_to(arm, direct):
 def test_costs_of_combinations_of_parameters_are_exact(arm):
     fitting, reduced, _ = fitting_of(arm, False, Budget(0.1, np.inf))
     tape = fitting.tape
-    terms = tape.candidates()[tape.candidates()[:, 1] != ITSELF]
-    fit = fitting.fit(tape.everything(), reduced.values)
+    terms = tape.list_candidates()[tape.list_candidates()[:, 1] != ITSELF]
+    fit = fitting.fit(tape.keep_all(), reduced.values)
     for chosen in (None, 7, 12):
         if chosen is not None:
             fit = fitting.fit(fit.pruning.flip(terms[chosen][None]), fit.beta)
         live = terms[fit.pruning.has(terms)]
-        combinations = tape.combinations(fit.pruning, live, fitting.n)
+        combinations = tape.find_combinations(fit.pruning, live, fitting.n)
         costs = fit.linear.estimate_costs(
             fitting.compute_effects(fit, live), fit.beta, combinations
         )
@@ -151,19 +151,19 @@ def test_nothing_leaner_can_be_had_on_a_small_arm(arm, direct):
     values = np.array([base.values[base.names.index(name)] for name in kept])
     reduced = ReducedModel(tuple(kept), values, position)
     whole, *_ = fitting_of(arm, direct, Budget(1.0, np.inf), 25, reduced)
-    fit = whole.fit(whole.tape.everything(), values)
+    fit = whole.fit(whole.tape.keep_all(), values)
     budget = Budget(4 * fit.torque_error, 4 * fit.acceleration_error if direct else np.inf)
     fitting, *_ = fitting_of(arm, direct, budget, 25, reduced)
 
     tape = fitting.tape
-    sums = sorted({k for k, what in tape.candidates().tolist() if what < 2})
+    sums = sorted({k for k, what in tape.list_candidates().tolist() if what < 2})
     assert 5 <= len(sums) <= 10, "an arm of this size can be searched exhaustively"
-    fewest = tape.count(tape.everything())
+    fewest = tape.count_operations(tape.keep_all())
     for ways in itertools.product(((True, True), (True, False), (False, True)), repeat=len(sums)):
-        pruning = tape.everything()
+        pruning = tape.keep_all()
         pruning.kept[sums, :2] = ways
-        if tape.count(pruning) < fewest and fitting.fit(pruning, values).within:
-            fewest = tape.count(pruning)
+        if tape.count_operations(pruning) < fewest and fitting.fit(pruning, values).within:
+            fewest = tape.count_operations(pruning)
     search = TermSearch(fitting, 0)
     start = search.start(values)
     noisy = (search.descend(start, noise=noise) for noise in [0.0] + [NOISE] * 20)

@@ -41,7 +41,7 @@ def outcome(store, record, robot, expected):
     """What became of a damaged file: noticed or harmless; or silently wrong, which must not be."""
     whole = store.is_whole(record)
     try:
-        store.refuse_to_replace(record, robot)
+        store.reject_replacement(record, robot)
     except ArtifactError:
         return "not made again"
     try:

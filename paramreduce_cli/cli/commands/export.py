@@ -161,7 +161,7 @@ def export(
                 simplified=simplified,
                 origin=origin,
                 validation=loading.get(Validation),
-                tell=tell,
+                report_progress=tell,
             )
         files = languages[kind](checked)
     save_files(folder, files)

@@ -75,7 +75,7 @@ def export_trajectory(
     def timed(which: str) -> TimedMotion:
         chosen, title = _find_chosen(trajectories, which), f"{loaded.robot} {which}"
         return sample_motion(
-            model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, ways=ways
+            model.mechanism, trajectories, chosen, rate=rate, title=title, start_pose=start, planner=ways
         )  # fmt: skip
 
     which, motion = (which, timed(which)) if which else _find_first(trajectories, timed)

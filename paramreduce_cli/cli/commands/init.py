@@ -226,7 +226,7 @@ def _close_loops(robot: SimplifiedRobot, choice: SourceSection) -> SimplifiedRob
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ParamreduceWarning)  # they come with the final text
         mechanism = _check_config(text).build_mechanism()
-    return close_loops(robot, mechanism, asked=bool(choice.independent))
+    return close_loops(robot, mechanism, required=bool(choice.independent))
 
 
 def _check_config(text: str) -> Config:

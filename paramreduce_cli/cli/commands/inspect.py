@@ -83,12 +83,12 @@ def _find_results() -> Path:
     )  # fmt: skip
 
 
-def _say_all(found: Mapping[str, Any], as_json: bool) -> None:
+def _say_all(values: Mapping[str, Any], as_json: bool) -> None:
     """Print values by name."""
     if as_json:
-        emit(**found)
+        emit(**values)
         return
-    for key, value in found.items():
+    for key, value in values.items():
         say(f"{key}: {value}")
 
 
@@ -134,6 +134,7 @@ def _fold_datasets(datasets: Sequence[tuple[str, str, str]]) -> Iterator[tuple[s
 
 
 def _make_family(row: tuple[str, str, str]) -> tuple[str, bool]:
+    """Return the folder of a numbered dataset and True, or the dataset's own path and False."""
     place, _, last = row[0].rpartition("/")
     return (place, True) if last.isdecimal() else (row[0], False)
 

@@ -138,6 +138,7 @@ class _Writer:
         return self._write_pointers(f, "RESTRICT ")
 
     def _write_pointers(self, f: Mapping[str, Any], mark: str) -> str:
+        """Return arguments and results of a batched function as pointers."""
         type_ = f"{self._model.name}_real"
         given = [
             f"const {type_} phi[{a.size}]" if a.name == "phi" else f"const {type_} *{mark}{a.name}"
@@ -201,7 +202,9 @@ class _Writer:
             before.append(f"{self._real} angles[{count}] = {{{angles}}};")
             before.append(f"{self._real} sine[{count}], cosine[{count}];")
             before.append(f"sines({count}, angles, sine, cosine);")
-        places = zip(function.list_places(function.results), function.program.outputs, strict=True)
+        places = zip(
+            function.list_positions(function.results), function.program.outputs, strict=True
+        )
         outputs = [
             f"{array.name}[{k}] = {write_signed(names, value)};" for (array, k), value in places
         ]
@@ -251,7 +254,7 @@ class _Writer:
         rest += [
             f"out[{row}][k] = {write_signed(names, value)};" for row, value in enumerate(outputs)
         ]
-        places = zip(function.list_places(function.results), program.outputs, strict=True)
+        places = zip(function.list_positions(function.results), program.outputs, strict=True)
         return {
             "once": once,
             "before": before,

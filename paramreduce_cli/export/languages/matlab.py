@@ -43,7 +43,7 @@ def _write_function(model: ExportedModel, function: Function) -> str:
     for result in function.results:
         rows, columns = (*result.shape, 1)[:2]
         lines.append(f"{result.name} = zeros({rows}, {columns});")
-    for (array, k), text in zip(function.list_places(function.results), outputs, strict=True):
+    for (array, k), text in zip(function.list_positions(function.results), outputs, strict=True):
         lines.append(f"{_write_element(array, k)} = {text};")
     return "\n".join([*lines, "end"])
 

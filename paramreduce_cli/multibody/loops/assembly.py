@@ -345,6 +345,7 @@ def _choose_best_conditioned(jacobian: FloatArray, count: int) -> list[int]:
 
 
 def _compute_rank(jacobian: FloatArray) -> int:
+    """Return the numerical rank of a Jacobian."""
     s = np.linalg.svd(jacobian, compute_uv=False)
     return int(np.sum(s > _RANK * s[0]))
 

@@ -91,11 +91,13 @@ class _ClosedPair:
 
 
 def _express_distance(pair: _ClosedPair) -> list[ca.SX]:
+    """Return the error of a distance closure, m."""
     length = pair.closure.length
     return [(dot(pair.gap, pair.gap) - length**2) / (2 * length)]
 
 
 def _express_coupling(pair: _ClosedPair) -> list[ca.SX]:
+    """Return the error of a coupling of two coordinates."""
     (a, b), closure = pair.closure.bodies, pair.closure
     return [pair.q[b] - closure.ratio * pair.q[a] - closure.offset]
 

@@ -11,13 +11,13 @@ _DIGITS = 6
 """Decimals of the guess, which leads back to the assembly."""
 
 
-def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) -> SimplifiedRobot:
+def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, required: bool) -> SimplifiedRobot:
     """Close the loops from the pose of the file, and choose independent coordinates, those that are named first.
 
     Args:
         robot: A robot with loops.
         mechanism: The same robot as a mechanism with any independent coordinates.
-        asked: Whether the user named the independent coordinates, not the file.
+        required: Whether the user named the independent coordinates, not the file.
 
     Returns:
         The robot with a guess and independent coordinates; without a guess where its loops do not close.
@@ -41,7 +41,7 @@ def close_loops(robot: SimplifiedRobot, mechanism: Mechanism, *, asked: bool) ->
         )
     own = tuple(names[k] for k in independent)
     lost = [names[k] for k in named if k not in independent]
-    if lost and asked:
+    if lost and required:
         raise ConfigError(
             f"--independent: the loops tie {', '.join(lost)} to the other coordinates that are named. "
             f"{', '.join(own)} determine all others; name some of these."

@@ -95,7 +95,7 @@ class Projection:
         """Return the accelerations of the dependent coordinates at ddz = 0, Phi_d^-1 gamma, (n_d,)."""
         return self.solve(self._gamma(self.q, dq))
 
-    def pull_back(self, q_bar: ca.MX) -> ca.MX:
+    def compute_vector_jacobian_product(self, q_bar: ca.MX) -> ca.MX:
         """Return R' q_bar: derivatives by all coordinates as derivatives by the independent ones, in columns."""
         return q_bar[self._z, :] + self.tangent.T @ q_bar[self._d, :]
 

@@ -150,8 +150,8 @@ class KeptProofs:
         """Whether an item holds on the data at hand; None says that a size has no subset."""
         return item is None or np.array_equal(item.factor, self._factor)
 
-    def _list_usable(self, found: Sequence[ProofItem | None]) -> list[Proofs]:
-        return [item.proofs for item in found if item is not None and self._holds(item)]
+    def _list_usable(self, items: Sequence[ProofItem | None]) -> list[Proofs]:
+        return [item.proofs for item in items if item is not None and self._holds(item)]
 
 
 def _make_size_key(n: int) -> str:

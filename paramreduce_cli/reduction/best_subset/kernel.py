@@ -120,94 +120,96 @@ def _copy_vector(given: FloatArray | IntArray, to: FloatArray | IntArray) -> Non
 
 
 @_within
-def _find_position(numbers: IntArray, column: int) -> int:
+def _find_position(counters: IntArray, column: int) -> int:
     """Return the position of a column among the free columns, or -1."""
-    for j in range(numbers[FREE]):
-        if numbers[FIRST + j] == column:
+    for j in range(counters[FREE]):
+        if counters[FIRST + j] == column:
             return j
     return -1
 
 
 @_within
-def _drop(sheet: FloatArray, numbers: IntArray, j: int) -> None:
+def _drop(tableau: FloatArray, counters: IntArray, j: int) -> None:
     """Put the last free column in place of column j."""
-    n, last = sheet.shape[1], numbers[FREE] - 1
-    numbers[FREE] = last
+    n, last = tableau.shape[1], counters[FREE] - 1
+    counters[FREE] = last
     if j == last:
         return
-    numbers[FIRST + j] = numbers[FIRST + last]
+    counters[FIRST + j] = counters[FIRST + last]
     for start in (0, n):
         for k in range(last + 1):
-            sheet[start + j, k] = sheet[start + last, k]
+            tableau[start + j, k] = tableau[start + last, k]
         for i in range(last):
-            sheet[start + i, j] = sheet[start + i, last]
-    for row in range(2 * n, sheet.shape[0]):
-        sheet[row, j] = sheet[row, last]
+            tableau[start + i, j] = tableau[start + i, last]
+    for row in range(2 * n, tableau.shape[0]):
+        tableau[row, j] = tableau[row, last]
 
 
 @_within
-def _sweep(sheet: FloatArray, start: int, row: int, j: int, own: FloatArray) -> None:
+def _sweep(tableau: FloatArray, start: int, row: int, j: int, column_errors: FloatArray) -> None:
     """Sweep column j out of the matrix and the vector of one form; its own entries are not used again.
 
     The loop takes one row at a time, with a copy of row j, as only then the compiler vectorises it.
     """
-    n = own.size
+    n = column_errors.size
     for k in range(n):
-        own[k] = sheet[start + j, k]
-    pivot = 1.0 / own[j]
+        column_errors[k] = tableau[start + j, k]
+    pivot = 1.0 / column_errors[j]
     for i in range(n):
         if i != j:
-            line = sheet[start + i, :n]
-            part = own[i] * pivot
+            line = tableau[start + i, :n]
+            part = column_errors[i] * pivot
             for k in range(n):
-                line[k] -= part * own[k]
-    line = sheet[row, :n]
+                line[k] -= part * column_errors[k]
+    line = tableau[row, :n]
     step = line[j] * pivot
     for k in range(n):
-        line[k] -= step * own[k]
+        line[k] -= step * column_errors[k]
 
 
 @_within
-def _compute_null_share(sheet: FloatArray, nullity: int, j: int) -> float:
+def _compute_null_fraction(tableau: FloatArray, nullity: int, j: int) -> float:
     """Return the squared share of a column in the null space of all included and free columns."""
-    start, share = 2 * sheet.shape[1], 0.0
+    start, share = 2 * tableau.shape[1], 0.0
     for c in range(nullity):
-        share += sheet[start + c, j] * sheet[start + c, j]
+        share += tableau[start + c, j] * tableau[start + c, j]
     return share
 
 
 @inline
 def _exclude(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
     """Exclude a free column, and raise the bound by what the exclusion costs."""
-    n, row = sheet.shape[1], sheet.shape[0] - 1
-    share = _compute_null_share(sheet, numbers[NULLITY], j)
+    n, row = tableau.shape[1], tableau.shape[0] - 1
+    share = _compute_null_fraction(tableau, counters[NULLITY], j)
     # Round-off may leave nothing of what an exclusion costs where columns are nearly dependent.
-    known = share > APART or sheet[n + j, j] > 0
-    if numbers[NEAR] == 1 or APART < share < INVOLVED or not known:
-        _drop(sheet, numbers, j)
-        _refit(sheet, numbers, errors, s, data)
+    known = share > APART or tableau[n + j, j] > 0
+    if counters[NEAR] == 1 or APART < share < INVOLVED or not known:
+        _drop(tableau, counters, j)
+        _refit(tableau, counters, errors, s, data)
         return
     if share > APART:
-        _exclude_dependent(sheet, numbers, j, share)
+        _exclude_dependent(tableau, counters, j, share)
     else:
-        errors[BOUND] += sheet[row, j] ** 2 / sheet[n + j, j]
-        _sweep(sheet, n, row, j, s.spare[: numbers[FREE]])
-    _drop(sheet, numbers, j)
+        errors[BOUND] += tableau[row, j] ** 2 / tableau[n + j, j]
+        _sweep(tableau, n, row, j, s.spare[: counters[FREE]])
+    _drop(tableau, counters, j)
 
 
 @_making_arrays
-def _refit(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> None:
+def _refit(
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data
+) -> None:
     """Fit all included and free columns from the columns themselves.
 
     Rarely the decomposition of a large matrix does not converge: then the bound of more columns stays, and the next
     exclusion starts again.
     """
-    n, free, count = sheet.shape[1], numbers[FREE], numbers[INCLUDED]
+    n, free, count = tableau.shape[1], counters[FREE], counters[INCLUDED]
     rows = np.empty((free + count, data.chi.size))
     for j in range(free):
-        _copy_vector(data.columns[numbers[FIRST + j]], rows[j])
+        _copy_vector(data.columns[counters[FIRST + j]], rows[j])
     for k in range(count):
         _copy_vector(data.columns[s.included[k]], rows[free + k])
     left, values, right = np.empty((0, 0)), np.empty(0), np.empty((0, 0))
@@ -217,7 +219,7 @@ def _refit(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, d
     except Exception:
         converged = False
     if not converged:
-        numbers[NEAR] = 1
+        counters[NEAR] = 1
         return
     rank = 0
     while rank < values.size and values[rank] > DEPENDENT * values[0]:
@@ -228,43 +230,47 @@ def _refit(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, d
     own = np.ascontiguousarray(left[:free, :rank])
     inverse = (own / values[:rank] ** 2) @ np.ascontiguousarray(own.T)
     for i in range(free):
-        _copy_vector(inverse[i], sheet[n + i, :free])
-    numbers[NULLITY] = min(free + count - rank, sheet.shape[0] - 2 * n - 2)
-    for c in range(numbers[NULLITY]):
-        _copy_vector(left[:free, rank + c], sheet[2 * n + c, :free])
-    _copy_vector(own @ (inner / values[:rank]), sheet[sheet.shape[0] - 1, :free])
+        _copy_vector(inverse[i], tableau[n + i, :free])
+    counters[NULLITY] = min(free + count - rank, tableau.shape[0] - 2 * n - 2)
+    for c in range(counters[NULLITY]):
+        _copy_vector(left[:free, rank + c], tableau[2 * n + c, :free])
+    _copy_vector(own @ (inner / values[:rank]), tableau[tableau.shape[0] - 1, :free])
     ratio = values[rank - 1] / values[0] if rank > 0 else 1.0
-    numbers[NEAR] = 1 if ratio < NEARLY else 0
+    counters[NEAR] = 1 if ratio < NEARLY else 0
     length = np.sqrt(np.dot(rest, rest)) - ROUND_OFF / ratio
     errors[BOUND] = max(errors[BOUND], max(length, 0.0) ** 2)
 
 
 @_making_arrays
-def _exclude_dependent(sheet: FloatArray, numbers: IntArray, j: int, share: float) -> None:
+def _exclude_dependent(
+    tableau: FloatArray, counters: IntArray, j: int, null_fraction: float
+) -> None:
     """Move a column's part to the others along the null space: the fit stays the same."""
-    n, row = sheet.shape[1], sheet.shape[0] - 1
-    free, nullity, start = numbers[FREE], numbers[NULLITY], 2 * n
+    n, row = tableau.shape[1], tableau.shape[0] - 1
+    free, nullity, start = counters[FREE], counters[NULLITY], 2 * n
     along = np.zeros(free)
     for c in range(nullity):
         for i in range(free):
-            along[i] += sheet[start + c, i] * sheet[start + c, j] / share
-    old = sheet[n + j, :free].copy()
-    amount, own = sheet[row, j], old[j]
+            along[i] += tableau[start + c, i] * tableau[start + c, j] / null_fraction
+    old = tableau[n + j, :free].copy()
+    amount, own = tableau[row, j], old[j]
     for i in range(free):
-        sheet[row, i] -= along[i] * amount
+        tableau[row, i] -= along[i] * amount
         for k in range(free):
-            sheet[n + i, k] += along[i] * along[k] * own - along[i] * old[k] - old[i] * along[k]
+            tableau[n + i, k] += along[i] * along[k] * own - along[i] * old[k] - old[i] * along[k]
     # A reflection turns the basis so that only its last vector has a part in column j.
-    mirror = sheet[start : start + nullity, j].copy()
-    mirror[nullity - 1] += np.sqrt(share) if mirror[nullity - 1] >= 0 else -np.sqrt(share)
+    mirror = tableau[start : start + nullity, j].copy()
+    mirror[nullity - 1] += (
+        np.sqrt(null_fraction) if mirror[nullity - 1] >= 0 else -np.sqrt(null_fraction)
+    )
     squared = np.sum(mirror**2)
     for i in range(free):
         total = 0.0
         for c in range(nullity):
-            total += sheet[start + c, i] * mirror[c]
+            total += tableau[start + c, i] * mirror[c]
         for c in range(nullity):
-            sheet[start + c, i] -= 2 * total / squared * mirror[c]
-    numbers[NULLITY] = nullity - 1
+            tableau[start + c, i] -= 2 * total / squared * mirror[c]
+    counters[NULLITY] = nullity - 1
 
 
 @_making_arrays
@@ -291,39 +297,39 @@ def _span(s: State, data: Data, count: int) -> None:
 
 @inline
 def _include(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, j: int
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, j: int
 ) -> None:
     """Include a free column, and lower the error by what the column explains."""
-    own, row = sheet[j, j], sheet.shape[0] - 2
+    own, row = tableau[j, j], tableau.shape[0] - 2
     if own > SURE:
-        errors[INSIDE] -= sheet[row, j] ** 2 / own
-        _sweep(sheet, _GRAM, row, j, s.spare[: numbers[FREE]])
-    _drop(sheet, numbers, j)
+        errors[INSIDE] -= tableau[row, j] ** 2 / own
+        _sweep(tableau, _GRAM, row, j, s.spare[: counters[FREE]])
+    _drop(tableau, counters, j)
     if GONE < own <= SURE:
-        _recompute(sheet, numbers, errors, s, data)
+        _recompute(tableau, counters, errors, s, data)
 
 
 @_making_arrays
 def _recompute(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data
 ) -> None:
     """Compute from the columns themselves what the included columns leave."""
-    free, row = numbers[FREE], sheet.shape[0] - 2
-    count = numbers[INCLUDED]
+    free, row = counters[FREE], tableau.shape[0] - 2
+    count = counters[INCLUDED]
     _span(s, data, count)
     left = _project_out(s.basis, count, data.chi)
     rest = np.empty((free, left.size))
     for j in range(free):
-        _copy_vector(_project_out(s.basis, count, data.columns[numbers[FIRST + j]]), rest[j])
-        sheet[row, j] = np.dot(rest[j], left)
+        _copy_vector(_project_out(s.basis, count, data.columns[counters[FIRST + j]]), rest[j])
+        tableau[row, j] = np.dot(rest[j], left)
         for i in range(j + 1):
-            sheet[i, j] = sheet[j, i] = np.dot(rest[i], rest[j])
+            tableau[i, j] = tableau[j, i] = np.dot(rest[i], rest[j])
     errors[INSIDE] = np.dot(left, left)
 
 
 @_within
 def _decide(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int,
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, unit: int,
     include: bool,
 ) -> None:  # fmt: skip
     """Include or exclude all columns of a unit."""
@@ -332,14 +338,14 @@ def _decide(
     progress[LOGGED] += 1
     first = data.first[unit]
     for column in range(first, first + data.size[unit]):
-        j = _find_position(numbers, column)
+        j = _find_position(counters, column)
         if include:
-            s.included[numbers[INCLUDED]] = column
-            progress[SPANNED] = min(progress[SPANNED], numbers[INCLUDED])
-            numbers[INCLUDED] += 1
-            _include(sheet, numbers, errors, s, data, j)
+            s.included[counters[INCLUDED]] = column
+            progress[SPANNED] = min(progress[SPANNED], counters[INCLUDED])
+            counters[INCLUDED] += 1
+            _include(tableau, counters, errors, s, data, j)
         else:
-            _exclude(sheet, numbers, errors, s, data, j)
+            _exclude(tableau, counters, errors, s, data, j)
 
 
 @inline
@@ -368,10 +374,10 @@ def _branch(s: State, data: Data, unit: int) -> None:
 
 
 @_making_arrays
-def _is_parallel(s: State, data: Data, count: int, one: int, other: int) -> bool:
+def _is_parallel(s: State, data: Data, count: int, column: int, other: int) -> bool:
     """Return whether two columns are parallel up to rounding once the included columns are projected out."""
     _span(s, data, count)
-    first = _project_out(s.basis, count, data.columns[one])
+    first = _project_out(s.basis, count, data.columns[column])
     length = np.dot(first, first)
     if length <= DEPENDENT**2:
         return False
@@ -382,25 +388,25 @@ def _is_parallel(s: State, data: Data, count: int, one: int, other: int) -> bool
 
 @inline
 def _exclude_parallel(
-    sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data, unit: int
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data, unit: int
 ) -> None:
     """Exclude the columns that are parallel, in what is left of them, to that of a unit.
 
     A subset with one of them explains no more than the same with the unit, which is searched.
     """
-    own = _find_position(numbers, data.first[unit])
-    for j in range(numbers[FREE] - 1, -1, -1):
-        column = numbers[FIRST + j]
-        near = sheet[j, j] * sheet[own, own] - sheet[j, own] ** 2 <= GONE * sheet[own, own]
+    own = _find_position(counters, data.first[unit])
+    for j in range(counters[FREE] - 1, -1, -1):
+        column = counters[FIRST + j]
+        near = tableau[j, j] * tableau[own, own] - tableau[j, own] ** 2 <= GONE * tableau[own, own]
         if j == own or not near or data.size[data.unit[column]] > 1:
             continue
-        if _is_parallel(s, data, numbers[INCLUDED], data.first[unit], column):
-            _decide(sheet, numbers, errors, s, data, data.unit[column], _EXCLUDE)
-            own = _find_position(numbers, data.first[unit])
+        if _is_parallel(s, data, counters[INCLUDED], data.first[unit], column):
+            _decide(tableau, counters, errors, s, data, data.unit[column], _EXCLUDE)
+            own = _find_position(counters, data.first[unit])
 
 
 @inline
-def _go_back(s: State, data: Data) -> None:
+def _backtrack(s: State, data: Data) -> None:
     """Take the exclude branch of the level above."""
     s.progress[LEVEL] -= 1
     level = s.progress[LEVEL]
@@ -416,6 +422,7 @@ def _go_back(s: State, data: Data) -> None:
 
 @_within
 def _compute_threshold(best: float, factor: float, uncertainty: float) -> float:
+    """Return the squared error above which a node is cut off."""
     wanted: float = best * factor
     return wanted + 2 * np.sqrt(wanted) * uncertainty
 
@@ -449,7 +456,9 @@ def _offer(s: State, data: Data, count: int, first: int, second: int) -> None:
 
 
 @inline
-def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, data: Data) -> bool:
+def _reduce_node(
+    tableau: FloatArray, counters: IntArray, errors: FloatArray, s: State, data: Data
+) -> bool:
     """Decide what needs no branching at a node; False where it can be left.
 
     Units that are explained already or have no place are excluded; those without which the
@@ -458,47 +467,54 @@ def _settle(sheet: FloatArray, numbers: IntArray, errors: FloatArray, s: State, 
     while True:
         threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
         if errors[INSIDE] < threshold + data.slack:
-            _offer(s, data, numbers[INCLUDED], _NO_COLUMN, _NO_COLUMN)
+            _offer(s, data, counters[INCLUDED], _NO_COLUMN, _NO_COLUMN)
             threshold = _compute_threshold(s.best[0], data.factor, data.uncertainty)
-        places = data.places - numbers[INCLUDED]
-        if errors[BOUND] >= threshold or places == 0 or numbers[FREE] == 0:
+        places = data.places - counters[INCLUDED]
+        if errors[BOUND] >= threshold or places == 0 or counters[FREE] == 0:
             return False
         room = threshold - errors[BOUND]
-        needed, must, useless = _count_mandatory(sheet, numbers, data.unit, data.size, places, room)
+        needed, must, useless = _count_mandatory(
+            tableau, counters, data.unit, data.size, places, room
+        )
         if useless >= 0:
-            _decide(sheet, numbers, errors, s, data, useless, _EXCLUDE)
+            _decide(tableau, counters, errors, s, data, useless, _EXCLUDE)
         elif needed > places:
             return False
         elif must < 0:
             return True
         else:
-            _decide(sheet, numbers, errors, s, data, must, _INCLUDE)
+            _decide(tableau, counters, errors, s, data, must, _INCLUDE)
 
 
 @_within
-def _is_mandatory(sheet: FloatArray, nullity: int, j: int, room: float) -> bool:
+def _is_mandatory(tableau: FloatArray, nullity: int, j: int, room: float) -> bool:
     """Return whether the bound rises by at least ``room`` if a column is excluded."""
-    own = sheet[sheet.shape[0] - 1, j]
-    if own * own < room * sheet[sheet.shape[1] + j, j]:
+    own = tableau[tableau.shape[0] - 1, j]
+    if own * own < room * tableau[tableau.shape[1] + j, j]:
         return False
-    return _compute_null_share(sheet, nullity, j) <= APART
+    return _compute_null_fraction(tableau, nullity, j) <= APART
 
 
 @inline
 def _count_mandatory(
-    sheet: FloatArray, numbers: IntArray, unit: IntArray, size: IntArray, places: int, room: float
+    tableau: FloatArray,
+    counters: IntArray,
+    unit: IntArray,
+    size: IntArray,
+    columns_left: int,
+    room: float,
 ) -> tuple[int, int, int]:
     """Return the columns of mandatory units, one such unit, and an excludable unit; -1 for none."""
-    needed, must, nullity = 0, _NO_COLUMN, numbers[NULLITY]
-    for j in range(numbers[FREE]):
-        own = unit[numbers[FIRST + j]]
-        if size[own] > places or (size[own] == 1 and sheet[j, j] <= GONE):
+    needed, must, nullity = 0, _NO_COLUMN, counters[NULLITY]
+    for j in range(counters[FREE]):
+        own = unit[counters[FIRST + j]]
+        if size[own] > columns_left or (size[own] == 1 and tableau[j, j] <= GONE):
             return needed, must, own
-        if numbers[NEAR] == 0 and _is_mandatory(sheet, nullity, j, room):
+        if counters[NEAR] == 0 and _is_mandatory(tableau, nullity, j, room):
             counted = False
             for i in range(j if size[own] > 1 else 0):
-                same = unit[numbers[FIRST + i]] == own
-                counted = counted or (same and _is_mandatory(sheet, nullity, i, room))
+                same = unit[counters[FIRST + i]] == own
+                counted = counted or (same and _is_mandatory(tableau, nullity, i, room))
             if not counted:
                 needed += size[own]
                 must = own
@@ -507,38 +523,38 @@ def _count_mandatory(
 
 @inline
 def _fill_last_place(
-    sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
+    tableau: FloatArray, counters: IntArray, inside: float, s: State, data: Data
 ) -> None:
     """Try every free column in the last place."""
-    row = sheet.shape[0] - 2
+    row = tableau.shape[0] - 2
     limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
-    for j in range(numbers[FREE]):
-        part = abs(sheet[row, j]) + ROUND_OFF
-        if part * part > (inside - limit) * (sheet[j, j] - ROUND_OFF):
-            _offer(s, data, numbers[INCLUDED], numbers[FIRST + j], _NO_COLUMN)
+    for j in range(counters[FREE]):
+        part = abs(tableau[row, j]) + ROUND_OFF
+        if part * part > (inside - limit) * (tableau[j, j] - ROUND_OFF):
+            _offer(s, data, counters[INCLUDED], counters[FIRST + j], _NO_COLUMN)
             limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
 
 
 @inline
 def _fill_last_two_places(
-    sheet: FloatArray, numbers: IntArray, inside: float, s: State, data: Data
+    tableau: FloatArray, counters: IntArray, inside: float, s: State, data: Data
 ) -> None:
     """Try every pair of free columns, each of its own unit, in the last two places."""
-    moments, own = sheet[sheet.shape[0] - 2], s.spare
+    moments, own = tableau[tableau.shape[0] - 2], s.spare
     limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
-    for i in range(numbers[FREE]):
-        own[i] = sheet[i, i]
+    for i in range(counters[FREE]):
+        own[i] = tableau[i, i]
         if not own[i] > GONE:  # its pairs are other columns alone
             continue
         step = moments[i] / own[i]
         left = inside - moments[i] * step
         if left < limit:  # every pair may be dependent
-            _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], _NO_COLUMN)
+            _offer(s, data, counters[INCLUDED], counters[FIRST + i], _NO_COLUMN)
             limit = _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
-        if _has_explaining(sheet[i, :i], own[:i], moments[:i], own[i], step, left - limit):
+        if _has_explaining(tableau[i, :i], own[:i], moments[:i], own[i], step, left - limit):
             for j in range(i):
-                if _is_explaining(sheet[i, j], own[j], moments[j], own[i], step, left - limit):
-                    _offer(s, data, numbers[INCLUDED], numbers[FIRST + i], numbers[FIRST + j])
+                if _is_explaining(tableau[i, j], own[j], moments[j], own[i], step, left - limit):
+                    _offer(s, data, counters[INCLUDED], counters[FIRST + i], counters[FIRST + j])
                     limit = (
                         _compute_threshold(s.best[0], data.factor, data.uncertainty) + data.slack
                     )
@@ -546,40 +562,45 @@ def _fill_last_two_places(
 
 @_within
 def _is_explaining(
-    shared: float, own: float, moment: float, beside: float, step: float, gap: float
+    shared: float, column_errors: float, moment: float, beside: float, step: float, gap: float
 ) -> bool:
     """Return whether a column explains more than ``gap`` of what another column beside it leaves."""
-    rest = own - shared * shared / beside
+    rest = column_errors - shared * shared / beside
     part = abs(moment - shared * step) + ROUND_OFF
     return bool((rest > GONE) & (part * part > gap * (rest - ROUND_OFF)))
 
 
 @_within
 def _has_explaining(
-    shared: FloatArray, own: FloatArray, moments: FloatArray, beside: float, step: float, gap: float
+    shared: FloatArray,
+    column_errors: FloatArray,
+    moments: FloatArray,
+    beside: float,
+    step: float,
+    gap: float,
 ) -> bool:
     """Return whether any of some columns explains more than ``gap``, which is rare; without branches, so that the loop
     is vectorised.
     """
     found = False
     for j in range(shared.size):
-        found |= _is_explaining(shared[j], own[j], moments[j], beside, step, gap)
+        found |= _is_explaining(shared[j], column_errors[j], moments[j], beside, step, gap)
     return found
 
 
 @_within
-def _choose_branching_column(sheet: FloatArray, numbers: IntArray) -> int:
+def _choose_branching_column(tableau: FloatArray, counters: IntArray) -> int:
     """Return the free column to branch on: the column with the largest product of what including it explains and what
     excluding it costs the bound. By the latter alone an arm's searches take two thirds more nodes.
     """
-    n, row = sheet.shape[1], sheet.shape[0] - 2
-    best, chosen = -1.0, numbers[FIRST]
-    for j in range(numbers[FREE]):
-        own, inverse = sheet[j, j], sheet[n + j, j]
+    n, row = tableau.shape[1], tableau.shape[0] - 2
+    best, chosen = -1.0, counters[FIRST]
+    for j in range(counters[FREE]):
+        own, inverse = tableau[j, j], tableau[n + j, j]
         if own > GONE and inverse > 0:  # round-off may leave none of it
-            value = (sheet[row, j] * sheet[row + 1, j]) ** 2 / (own * inverse)
+            value = (tableau[row, j] * tableau[row + 1, j]) ** 2 / (own * inverse)
             if value > best:
-                best, chosen = value, numbers[FIRST + j]
+                best, chosen = value, counters[FIRST + j]
     return int(chosen)
 
 
@@ -611,7 +632,7 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
     nodes = 0
     while True:
         if s.progress[GOING_BACK] == 1:
-            _go_back(s, data)
+            _backtrack(s, data)
             s.progress[GOING_BACK] = 0
         level = s.progress[LEVEL]
         if level < 0:
@@ -620,7 +641,7 @@ def search(s: State, data: Data, log: IntArray, most: int) -> tuple[int, int]:
             return PAUSED, nodes
         nodes += 1
         sheet, numbers, errors = s.sheets[level], s.numbers[level], s.errors[level]
-        open_ = _settle(sheet, numbers, errors, s, data)
+        open_ = _reduce_node(sheet, numbers, errors, s, data)
         places = data.places - numbers[INCLUDED]
         if open_ and places == 1:
             _fill_last_place(sheet, numbers, errors[INSIDE], s, data)

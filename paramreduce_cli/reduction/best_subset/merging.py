@@ -13,68 +13,68 @@ from paramreduce_cli.reduction.best_subset.subset_search import BEGINNING
 from paramreduce_cli.reduction.best_subset.ties import find_ties
 
 
-def join_subtrees(shares: Sequence[Proofs]) -> Proofs:
+def join_subtrees(parts: Sequence[Proofs]) -> Proofs:
     """Join searches of which each job has done a part of the subtrees.
 
     Args:
-        shares: Proofs of all jobs on the same data.
+        parts: Proofs of all jobs on the same data.
 
     Raises:
         DataError: They were not dealt the same subtrees.
     """
-    first = shares[0]
+    first = parts[0]
     for row, n in enumerate(first.n.tolist()):
         if (
-            not all(_has_same_sizes(one, first) for one in shares)
-            or len(_list_deals(shares, row)) > 1
+            not all(_has_same_sizes(one, first) for one in parts)
+            or len(_list_deals(parts, row)) > 1
         ):
             raise DataError(
-                f"the {len(shares)} parts have not split the search for {n} parameters into the same subtrees, as "
+                f"the {len(parts)} parts have not split the search for {n} parameters into the same subtrees, as "
                 "machines do that calculate differently. Make all again on machines of one kind, or write "
                 "reduction.best_subset.parts: sizes."
             )
-    best = [_find_best(shares, row) for row in range(first.n.size)]
+    best = [_find_best(parts, row) for row in range(first.n.size)]
     error = np.array([one.torque_error[row] for row, one in enumerate(best)])
     return Proofs(
         units=first.units,
         n=first.n,
         subsets=tuple(one.subsets[row] for row, one in enumerate(best)),
         torque_error=error,
-        lower_bound=np.minimum(error, np.min([one.lower_bound for one in shares], axis=0)),
+        lower_bound=np.minimum(error, np.min([one.lower_bound for one in parts], axis=0)),
         status=tuple(
-            _combine_statuses([one.status[row] for one in shares]) for row in range(first.n.size)
+            _combine_statuses([one.status[row] for one in parts]) for row in range(first.n.size)
         ),
-        seconds=np.sum([one.seconds for one in shares], axis=0),
-        nodes=np.sum([one.nodes for one in shares], axis=0),
-        logs=tuple(_join_logs(shares, row) for row in range(first.n.size)),
+        seconds=np.sum([one.seconds for one in parts], axis=0),
+        nodes=np.sum([one.nodes for one in parts], axis=0),
+        logs=tuple(_join_logs(parts, row) for row in range(first.n.size)),
         dealt=np.zeros_like(first.n),
     )
 
 
-def _find_best(shares: Sequence[Proofs], row: int) -> Proofs:
+def _find_best(parts: Sequence[Proofs], row: int) -> Proofs:
     """Return the proofs of the job with the best subset; of tied subsets, the one whose columns come first."""
-    squared = np.array([one.torque_error[row] for one in shares]) ** 2
+    squared = np.array([one.torque_error[row] for one in parts]) ** 2
     ties = np.flatnonzero(find_ties(squared, squared.min()))
-    return min((shares[int(k)] for k in ties), key=lambda one: one.subsets[row].tolist())
+    return min((parts[int(k)] for k in ties), key=lambda one: one.subsets[row].tolist())
 
 
-def _has_begun(one: Proofs, row: int) -> bool:
-    return one.status[row] is not ProofStatus.BEST_FOUND or one.logs[row].size > 0
+def _is_started(proofs: Proofs, row: int) -> bool:
+    return proofs.status[row] is not ProofStatus.BEST_FOUND or proofs.logs[row].size > 0
 
 
-def _list_deals(shares: Sequence[Proofs], row: int) -> set[int]:
+def _list_deals(parts: Sequence[Proofs], row: int) -> set[int]:
     """Return the digests of the subtrees that started jobs were given."""
-    return {int(one.dealt[row]) for one in shares if _has_begun(one, row)}
+    return {int(one.dealt[row]) for one in parts if _is_started(one, row)}
 
 
-def _join_logs(shares: Sequence[Proofs], row: int) -> IntArray:
+def _join_logs(parts: Sequence[Proofs], row: int) -> IntArray:
     """Return where all jobs have stopped, or the beginning if some have not started, as no log has their subtrees."""
-    if not all(_has_begun(one, row) for one in shares):
+    if not all(_is_started(one, row) for one in parts):
         return BEGINNING
-    return concatenate_logs([one.logs[row] for one in shares])
+    return concatenate_logs([one.logs[row] for one in parts])
 
 
-def _combine_statuses(found: Sequence[ProofStatus]) -> ProofStatus:
+def _combine_statuses(statuses: Sequence[ProofStatus]) -> ProofStatus:
     """Return what is proven if every job must have proven its part."""
     order = (
         ProofStatus.UNCERTIFIED,
@@ -82,7 +82,7 @@ def _combine_statuses(found: Sequence[ProofStatus]) -> ProofStatus:
         ProofStatus.OPTIMAL,
         ProofStatus.BEYOND_RANK,
     )
-    return min(found, key=order.index)
+    return min(statuses, key=order.index)
 
 
 def merge_proofs(proofs: Sequence[Proofs]) -> Proofs:
@@ -106,10 +106,10 @@ def merge_proofs(proofs: Sequence[Proofs]) -> Proofs:
 def _merge_size(proofs: Sequence[Proofs]) -> Proofs:
     """Return the strongest proof of one size."""
 
-    def worth(one: Proofs) -> tuple[bool, float, float, int]:
-        unfinished = one.status[0] is ProofStatus.BEST_FOUND
-        error, bound = float(one.torque_error[0]), float(one.lower_bound[0])
-        return unfinished, error, -bound, -int(one.nodes[0])  # of equal ones the furthest search
+    def worth(proofs: Proofs) -> tuple[bool, float, float, int]:
+        unfinished = proofs.status[0] is ProofStatus.BEST_FOUND
+        error, bound = float(proofs.torque_error[0]), float(proofs.lower_bound[0])
+        return unfinished, error, -bound, -int(proofs.nodes[0])  # of equal ones the furthest search
 
     return replace(
         min(proofs, key=worth), lower_bound=np.max([one.lower_bound for one in proofs], axis=0)
@@ -127,9 +127,9 @@ def _stack_sizes(proofs: Sequence[Proofs]) -> Proofs:
     return Proofs(units=proofs[0].units, **columns)
 
 
-def _has_same_sizes(one: Proofs, other: Proofs) -> bool:
-    return np.array_equal(one.n, other.n) and _is_same(one.units, other.units)
+def _has_same_sizes(first: Proofs, other: Proofs) -> bool:
+    return np.array_equal(first.n, other.n) and _is_same(first.units, other.units)
 
 
-def _is_same(one: Sequence[IntArray], other: Sequence[IntArray]) -> bool:
-    return len(one) == len(other) and all(map(np.array_equal, one, other))
+def _is_same(first: Sequence[IntArray], other: Sequence[IntArray]) -> bool:
+    return len(first) == len(other) and all(map(np.array_equal, first, other))

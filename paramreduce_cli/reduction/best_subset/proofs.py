@@ -194,7 +194,7 @@ class ProofSearch:
             search = self._start_search(proof)
             for nodes in self._iterate_slices(proof, search, budget - before, deadline, stop):
                 search.advance(nodes, self._count_threads(len(waiting)))
-                self._exchange(proof, search)
+                self._share_incumbents(proof, search)
             self._spent[proof.n] = before + search.nodes
             self._take_over(proof, search)
             if proof.status != ProofStatus.BEST_FOUND and proof.seconds > _WORTH_KEEPING:
@@ -232,7 +232,7 @@ class ProofSearch:
             search.take_incumbent(proof.squared_error, proof.subset)
         return search
 
-    def _exchange(self, proof: _Proof, search: PartedSearch) -> None:
+    def _share_incumbents(self, proof: _Proof, search: PartedSearch) -> None:
         """Tell other jobs of a better subset, or hear of one; what is heard is calculated anew."""
         key = f"incumbent-{proof.n:04d}"
         told = self._task.incumbents.get(key, proof.subset[:0])

@@ -93,7 +93,7 @@ class Search:
 
     Args:
         problem: The columns.
-        places: Columns that may be taken.
+        size: Columns that may be taken.
         squared_error: Of the best subset known.
         subset: That subset, numbered as the columns of ``problem``.
         factor: Share of the best squared error that is searched for: below one, a finished
@@ -104,7 +104,7 @@ class Search:
     def __init__(
         self,
         problem: UnitProblem,
-        places: int,
+        size: int,
         squared_error: float,
         subset: IntArray,
         factor: float = 1.0,
@@ -119,22 +119,22 @@ class Search:
             unit=problem.unit.astype(np.int64),
             first=np.searchsorted(problem.unit, np.arange(problem.unit[-1] + 1)),
             size=np.bincount(problem.unit).astype(np.int64),
-            places=places,
+            places=size,
             factor=factor * (1 - RESOLUTION),
             uncertainty=_UPDATES * problem.condition,
             slack=_SLACK,
         )
-        self._state = self._make_root(problem, places, squared_error, subset)
+        self._state = self._make_root(problem, size, squared_error, subset)
         self.finished = False
         self.nodes = 0
         kernel.search(self._state, self._data, log.astype(np.int64), 0)
 
     def _make_root(
-        self, problem: UnitProblem, places: int, squared_error: float, subset: IntArray
+        self, problem: UnitProblem, size: int, squared_error: float, subset: IntArray
     ) -> State:
         """Return the state at the root: all columns free."""
         kernel, X, chi = self._kernel, problem.X, problem.chi
-        n, levels = X.shape[1], min(places, int(problem.unit[-1]) + 1) + 2
+        n, levels = X.shape[1], min(size, int(problem.unit[-1]) + 1) + 2
         inverse, null, solution, left = problem.fit
         sheets = np.zeros((levels, 2 * n + len(null) + 2, n))
         sheets[0] = np.vstack([X.T @ X, inverse, null, X.T @ chi, solution])
@@ -185,6 +185,7 @@ class Search:
         return given
 
     def _continue_from(self, log: IntArray) -> Search:
+        """Return a search that continues from a log of nodes."""
         places = self._data.places
         return Search(self._problem, places, self.squared_error, self.subset, self._factor, log)
 

@@ -122,11 +122,11 @@ class OperationsObjective(Objective):
             u: self.count_operations((*kept, u)) - now for u in {into for _, into, _ in exchanges}
         }
 
-        def promise(exchange: tuple[int, int, float]) -> float:
-            out, into, error = exchange
+        def estimate_score(swap: tuple[int, int, float]) -> float:
+            out, into, error = swap
             return (more[into] - less[out]) / self._all + self._compute_penalty(error)
 
-        best = sorted(exchanges, key=promise)[:_PROPOSALS]
+        best = sorted(exchanges, key=estimate_score)[:_PROPOSALS]
         proposals = [(*remove_unit(kept, out), into) for out, into, _ in best]
         return min([kept, *proposals], key=self.score)
 

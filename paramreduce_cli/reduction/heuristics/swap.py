@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from paramreduce_cli.records import IntArray, Progress, Tell
+from paramreduce_cli.records import IntArray, Progress, ProgressCallback
 from paramreduce_cli.reduction.heuristics.backward_elimination import backward_elimination
 from paramreduce_cli.reduction.heuristics.forward_selection import forward_selection
 from paramreduce_cli.reduction.heuristics.forward_selection_2 import forward_selection_2
@@ -92,12 +92,14 @@ class _SwapSearch:
         shorter = self.objective.remove_worst(kept)
         return self.objective.count_columns(shorter) >= self.smallest and self.offer(shorter)
 
-    def kick(self, times: int, random: np.random.Generator, tell: Tell) -> None:
+    def kick(
+        self, times: int, random: np.random.Generator, report_progress: ProgressCallback
+    ) -> None:
         """Replace a few parameters by random ones, and improve the result."""
         everything = np.arange(len(self.objective.units))
         better = False
         for done, n in enumerate(sorted(self.best)):
-            tell(Progress("random changes", done, len(self.best)))
+            report_progress(Progress("random changes", done, len(self.best)))
             for _ in range(times):
                 kept = np.array(self.best[n])
                 rest = np.setdiff1d(everything, kept)
@@ -106,6 +108,6 @@ class _SwapSearch:
                 kept[out] = random.choice(rest, count, replace=False)
                 same = self.objective.count_columns(tuple(kept.tolist())) == n
                 better |= bool(same and self.offer(tuple(kept.tolist())))
-        tell(Progress("random changes", len(self.best), len(self.best)))
+        report_progress(Progress("random changes", len(self.best), len(self.best)))
         if better:
             self.extend_to_neighbours()

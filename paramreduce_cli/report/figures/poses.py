@@ -43,6 +43,7 @@ def _find_extent(skeleton: Skeleton) -> FloatArray:
 
 
 def _draw_skeleton(axes: Axes, skeleton: Skeleton, half: float, plots: int) -> None:
+    """Draw links, joints, axes and closures of one pose."""
     link = {"color": "#44607a", "linewidth": 4, "solid_capstyle": "round", "alpha": 0.9}
     for i, parent in enumerate(skeleton.parents):
         start = np.zeros(3) if parent < 0 else skeleton.poses[parent][:3, 3]

@@ -21,6 +21,7 @@ def identified_parameters(data: ReportData) -> Table:
 
 
 def _list_rows(model: str, estimate: Estimate) -> list[tuple[str, ...]]:
+    """Return a row for every parameter of an estimate."""
     relative = 100 * estimate.deviations / np.maximum(np.abs(estimate.values), 1e-300)
     cells = zip(estimate.names, estimate.values, estimate.deviations, relative, strict=True)
     return [

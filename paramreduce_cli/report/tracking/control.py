@@ -61,6 +61,7 @@ def advance_state(
 def _take_runge_kutta_step(
     z: Any, dz: Any, tau: Any, arm: Callable[[Any, Any, Any], Any], h: float
 ) -> tuple[Any, Any]:
+    """Return z and dz a step h later, by the classical method of fourth order."""
     a1 = arm(z, dz, tau)
     v2 = dz + h / 2 * a1
     a2 = arm(z + h / 2 * dz, v2, tau)
