@@ -93,17 +93,17 @@ def test_commands_are_those_of_the_shell(tmp_path):
     [
         ("robots: []", "robots"),
         ("seeds: [1]", "robots"),
-        ("robots: [a.yaml]\nseed: [1]", "did you mean seeds"),
+        ("robots: [a.yaml]\nseed: [1]", "Did you mean seeds"),
         ("robots: [a.yaml]\nparts: {reduce: 0}", "parts.reduce"),
         ("robots: [a.yaml, b/a.yaml]", "two runs are called a"),
         ("- a.yaml", "must be a mapping"),
-        ("robots: [a.yaml]\nparts: {reduced: 2}", "parts.*did you mean reduce"),
-        ("robots: [a.yaml]\nseeds: [1, 2, 1]", "the seed 1 stands there twice"),
+        ("robots: [a.yaml]\nparts: {reduced: 2}", "parts.*Did you mean reduce"),
+        ("robots: [a.yaml]\nseeds: [1, 2, 1]", "the seed 1 is listed twice"),
         ("robots: [a.yaml]\nvariants: {a/b: []}", "'a/b' becomes part of a folder's"),
         ("robots: [missing.yaml]", r"sweep.yaml: robots: .*missing.yaml.*no such file"),
         (
             f"robots: [{TWO_LINK}]\nvariants: {{long: [trajectories.pints=3]}}",
-            r"sweep.yaml: variants.long: --set .*did you mean points",
+            r"sweep.yaml: variants.long: --set .*Did you mean points",
         ),
     ],
 )

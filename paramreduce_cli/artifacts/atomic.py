@@ -48,10 +48,10 @@ def check_is_file(path: Path) -> None:
     """Refuse what would be waited for, such as a pipe; a file that is not there is no matter.
 
     Raises:
-        ArtifactError: It is no file.
+        ArtifactError: It is not a file.
     """
     if path.exists() and not path.is_file():
-        raise ArtifactError(f"{path}: is no file.")
+        raise ArtifactError(f"{path}: is not a file.")
 
 
 def make_missing_error(path: Path, *, command: str = "", remedy: str = "") -> ArtifactError:

@@ -110,7 +110,7 @@ def _check_header(path: Path, header: list[str]) -> None:
         )
     twice = sorted({name for name in header if name and header.count(name) > 1})
     if twice:
-        raise DataError(f"{path}, line 1: the heading {twice[0]} stands there twice.")
+        raise DataError(f"{path}, line 1: the heading {twice[0]} is listed twice.")
 
 
 def _is_number(cell: str) -> bool:

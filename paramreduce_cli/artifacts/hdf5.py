@@ -362,8 +362,7 @@ class Reader:
         data = CheckedRows(dataset)
         if data.nbytes > _SMALL + _MOST_COMPRESSED * dataset.get_storage_size():
             raise ArtifactError(
-                f"{self.path}: /{name} declares {' x '.join(map(str, data.shape))} numbers, but "
-                "holds hardly any."
+                f"{self.path}: /{name} declares {' x '.join(map(str, data.shape))} numbers, but holds almost none."
             )
         return data
 

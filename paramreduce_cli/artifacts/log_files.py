@@ -156,7 +156,7 @@ def _split_columns(
             columns[name] = matrix[:, 0]
         elif matrix.shape[1] > _MOST_COLUMNS and matrix.shape[0] < matrix.shape[1]:
             raise DataError(
-                f"{path}: {name} has {matrix.shape[0]} rows and {matrix.shape[1]} columns. Bring it with a row for each "
+                f"{path}: {name} has {matrix.shape[0]} rows and {matrix.shape[1]} columns. Store it with a row for each "
                 "sample."
             )
         else:

@@ -98,7 +98,7 @@ def load_summary(path: Path) -> dict[str, Any]:
         path /= SUMMARY
     summary = load_json(path)
     if not isinstance(summary, dict):
-        raise ArtifactError(f"{path}: is no summary.json.")
+        raise ArtifactError(f"{path}: is not a summary.json.")
     if not _is_whole(summary):
         raise ArtifactError(
             f"{path}: is damaged or was changed: its digest does not fit.",

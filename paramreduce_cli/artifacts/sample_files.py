@@ -74,10 +74,10 @@ def save_sample_set(writer: Writer, name: str, sample_set: SampleSet) -> None:
     writer.write_dataset(f"{name}/factors", accumulator.get_factors() if known is None else known)
 
 
-def _iterate_blocks(sample_set: SampleSet, known_torques: FloatArray | None) -> Iterator[Block]:
+def _iterate_blocks(sample_set: SampleSet, known_factors: FloatArray | None) -> Iterator[Block]:
     """Yield the samples, without observation matrices if these are neither kept nor needed."""
-    if isinstance(sample_set, JoinedSet) and known_torques is not None:
-        _, n_dof, k, _ = known_torques.shape
+    if isinstance(sample_set, JoinedSet) and known_factors is not None:
+        _, n_dof, k, _ = known_factors.shape
         if _is_matrix_omitted(sample_set, n_dof, k - 1):
             return sample_set.iterate_states()
     return sample_set.iterate_blocks()

@@ -113,7 +113,7 @@ def load_recording(path: Path, n_dof: int) -> Recording:
                 f"{path}: {key} is not a finite number in data row {bad + 1}. Remove such rows."
             )
     if rows < _FEWEST_SAMPLES:
-        raise DataError(f"{path}: {rows} samples are too few; bring at least {_FEWEST_SAMPLES}.")
+        raise DataError(f"{path}: {rows} samples are too few; use at least {_FEWEST_SAMPLES}.")
     time = arrays.get("time", np.arange(rows, dtype=float))
     _check_time(path, time.ravel())
     return Recording(
@@ -161,7 +161,7 @@ def _read_csv_arrays(path: Path, n_dof: int) -> dict[str, FloatArray]:
             missing = [name for name in wanted if name not in columns]
             raise DataError(
                 f"{path}, line 1: the header lacks {', '.join(missing)}. Columns are t, z1 ... "
-                f"z{n_dof}, dz1 ..., ddz1 ..., and perhaps tau1 ...; it has {', '.join(header)}."
+                f"z{n_dof}, dz1 ..., ddz1 ..., and optionally tau1 ...; the file has {', '.join(header)}."
             )
     for name in ("t", "time"):
         if name in columns:

@@ -55,8 +55,8 @@ def main() -> None:
         code = WRONG
     except (KeyboardInterrupt, click.exceptions.Abort):
         print_error(
-            "\nInterrupted. Finished stages are kept, and of the stage at work its finished trajectories, samples, proofs and "
-            "functions. The same command does the rest."
+            "\nInterrupted. Finished stages are kept, and so are finished trajectories, samples, proofs and functions of the "
+            "current stage. Run the same command again to continue."
         )
         code = INTERRUPTED
     except BrokenPipeError:

@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from paramreduce_cli.artifacts.store import Store
+from paramreduce_cli.cli.project_state import find_config, get_results_path, is_config
 from paramreduce_cli.cli.terminal import interruption, warn_user
 from paramreduce_cli.config import Config
 from paramreduce_cli.errors import MissingConfigError
@@ -30,22 +31,55 @@ class FilePath(click.Path):
             raise
 
 
-CONFIG = click.argument("config", type=FilePath())
-OPTIONAL_CONFIG = click.argument("config", type=FilePath(), required=False)
+class ConfigPath(FilePath):
+    """A path of a config, or of a results folder that was made with one."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the config; note the results folder if the path is one."""
+        folder = Path(value)
+        if ctx is None or not any(folder.glob("*.h5")):
+            return super().convert(value, param, ctx)
+        ctx.meta[_FOLDER] = folder
+        config = find_config(folder)
+        if config is None:
+            raise MissingConfigError(
+                f"{folder}: the config of these results was not found. Give the config, and --results {folder}.",
+                rejected=str(folder),
+            )
+        return config
+
+
+class ResultsPath(click.Path):
+    """A path of a results folder or of a file in it, or of the config that the results were made with."""
+
+    def __init__(self) -> None:
+        super().__init__(path_type=Path)
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the path, or the results folder of a config."""
+        path = Path(value)
+        return get_results_path(path) if is_config(path) else super().convert(value, param, ctx)
+
+
+_FOLDER = "paramreduce.results"
+"""Key of click's context for the results folder that was given in place of a config."""
+CONFIG = click.argument("config", type=ConfigPath(), is_eager=True)
+OPTIONAL_CONFIG = click.argument("config", type=ConfigPath(), required=False, is_eager=True)
 RESULTS = click.option(
     "--results",
     type=click.Path(path_type=Path, file_okay=False),
+    callback=lambda ctx, _, folder: folder or ctx.meta.get(_FOLDER),
     help="Folder of the artifacts.  [default: results/ROBOT]",
 )
 SET = click.option(
     "--set", "overrides", multiple=True, metavar="KEY=VALUE",
-    help="Override a key of the config, such as trajectories.count=3; may be repeated.",
+    help="Override a key of the config, for example trajectories.count=3. May be repeated.",
 )  # fmt: skip
-FORCE = click.option("--force", is_flag=True, help="Do it again even if it is up to date.")
-QUIET = click.option("--quiet", is_flag=True, help="Say nothing but errors and warnings.")
+FORCE = click.option("--force", is_flag=True, help="Run again, even if the result is up to date.")
+QUIET = click.option("-q", "--quiet", is_flag=True, help="Print only errors and warnings.")
 JOBS = click.option(
-    "--jobs", type=click.IntRange(min=1), default=None, metavar="N",
-    help="Worker processes.  [default: all cores]",
+    "-j", "--jobs", type=click.IntRange(min=1), default=None, metavar="N",
+    help="Number of worker processes.  [default: all cores]",
 )  # fmt: skip
 
 
@@ -64,12 +98,12 @@ class PartType(click.ParamType):
 
 PART = click.option(
     "--part", "part", type=PartType(), metavar="i/N",
-    help="Do every N-th item of the work, from the i-th on; the same command without --part does what is missing and combines all.",
+    help="Do every N-th item, beginning with the i-th. The same command without --part does the missing items and combines all.",
 )  # fmt: skip
 
 WAIT = click.option(
     "--wait", is_flag=True,
-    help="Wait for another run that is at work on the same, rather than end; for schedulers, whose jobs may outlive them.",
+    help="Wait while another run works in this results folder, instead of ending with an error.",
 )  # fmt: skip
 
 

@@ -1,5 +1,6 @@
 """Configs and results in a folder, found without reading whole files."""
 
+import contextlib
 import re
 import shlex
 from collections.abc import Callable
@@ -18,7 +19,7 @@ _CONFIGS, _RESULTS = Path("configs"), Path("results")
 def list_configs(folder: Path) -> list[Path]:
     """Return the configs in a folder or in its ``configs``, relative to the folder; those with results first."""
     found = [*sorted(folder.glob("*.yaml")), *sorted((folder / _CONFIGS).glob("*.yaml"))]
-    configs = [path.relative_to(folder) for path in found if _is_config(path)]
+    configs = [path.relative_to(folder) for path in found if is_config(path)]
     return sorted(
         configs, key=lambda path: not has_report(folder / get_results_path(folder / path))
     )
@@ -33,8 +34,8 @@ def find_project_above(folder: Path) -> Path | None:
     return None
 
 
-def _is_config(path: Path) -> bool:
-    """Whether it names a robot, and more than that."""
+def is_config(path: Path) -> bool:
+    """Return whether a file is a config: it names a robot, and has more keys."""
     if not _is(path, Path.is_file):  # a pipe would be waited for
         return False
     try:
@@ -54,7 +55,7 @@ def get_results_path(config: Path) -> Path:
 
 
 def has_report(results: Path) -> bool:
-    """Whether a run ended there, as far as one may look."""
+    """Return whether a results folder has a report, as far as the folder may be read."""
     return _is(results / SUMMARY, Path.is_file)
 
 
@@ -73,6 +74,26 @@ def list_results(folder: Path) -> list[Path]:
         for path in sorted(place.glob("*"))
         if has_report(path)
     ]
+
+
+def find_config(folder: Path) -> Path | None:
+    """Return the config that a results folder was made with; None if there is no such config here.
+
+    The artifacts know the name of its file, and of its robot.
+    """
+    from paramreduce_cli.artifacts.hdf5 import read_stamp
+
+    names, robots = set(), set()
+    for artifact in sorted(folder.glob("*.h5")):
+        with contextlib.suppress(ArtifactError):
+            stamp = read_stamp(artifact)
+            if stamp is not None:
+                names.add(stamp.config)
+                robots.add(stamp.robot)
+    configs = list_configs(Path())
+    named = [path for path in configs if path.name in names]
+    of_robot = [path for path in configs if get_results_path(path).name in robots]
+    return next(iter(named or of_robot), None)
 
 
 def guess_config(word: str) -> Path | None:

@@ -9,14 +9,15 @@ import click
 from paramreduce_cli.artifacts.store import get_file, load_file
 from paramreduce_cli.cli.example_command import ExampleCommand
 from paramreduce_cli.cli.options import (
+    CONFIG,
     FORCE,
     JOBS,
+    OPTIONAL_CONFIG,
     PART,
     QUIET,
     RESULTS,
     SET,
     WAIT,
-    FilePath,
     count_cores,
     make_callbacks,
     make_store,
@@ -85,10 +86,10 @@ def make_stage_command(name: str) -> click.Command:
         params.append(
             click.option(
                 "--samples", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
-                help="A samples.h5 of your own; then CONFIG may be left out, or hold settings without a robot.",
+                help="Use your own samples.h5. CONFIG is then optional, and may hold settings without a robot.",
             )
         )  # fmt: skip
-    params.append(click.argument("config", type=FilePath(), required=not config_optional))
+    params.append(OPTIONAL_CONFIG if config_optional else CONFIG)
     decorated: Callable[..., Any] = command
     for parameter in params:
         decorated = parameter(decorated)

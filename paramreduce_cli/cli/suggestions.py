@@ -55,7 +55,7 @@ class UnknownCommandError(click.UsageError):
         if wanted in ("version", "help"):
             hint = f"see `paramreduce --{wanted}`."
         elif near:
-            hint = f"did you mean `paramreduce {near[0]}`?"
+            hint = f"Did you mean `paramreduce {near[0]}`?"
         super().__init__(f"there is no command {name!r}; {hint}", context)
 
 
@@ -252,7 +252,7 @@ def _find_option(name: str, command: click.Command, words: Sequence[str]) -> str
     value = " ".join(words).partition(f" {name}")[2].lstrip(" =").split(" ")[0]
     for parameter in taken:
         if isinstance(parameter.type, click.Choice) and value in parameter.type.choices:
-            return parameter.opts[0]
+            return max(parameter.opts, key=len)
     options = [option for parameter in taken for option in parameter.opts]
     if not name.startswith("--"):
         begun = [option for option in options if option.startswith(f"-{name}")]

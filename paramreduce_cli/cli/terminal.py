@@ -63,17 +63,17 @@ class Journal:
 
         Raises:
             ConfigError: It cannot be written, or holds something else.
-            ArtifactError: It is no file.
+            ArtifactError: It is not a file.
         """
         check_is_file(path)
         try:
             if path.exists() and not _OWN_LINE.match(path.open("rb").read(_OWN_LENGTH)):
                 raise ConfigError(
-                    f"--log {path}: holds something else than messages of paramreduce; name another file."
+                    f"--log-file {path}: is not a file of paramreduce's messages. Name another file."
                 )
             self._file = path.open("a", encoding="utf-8")
         except OSError as error:
-            raise ConfigError(f"--log {path}: cannot be written: {error.strerror}.") from error
+            raise ConfigError(f"--log-file {path}: cannot be written: {error.strerror}.") from error
         self.note(f"$ {' '.join(map(shlex.quote, sys.argv))}")
 
     def note(self, text: str) -> None:
@@ -85,22 +85,22 @@ class Journal:
                 self._file.flush()
             except OSError as error:
                 self._file = None  # the work matters more than its log
-                warn_user(f"--log: cannot be written any more: {error.strerror}")
+                warn_user(f"--log-file: cannot be written any more: {error.strerror}")
 
 
 journal = Journal()
 
 
-JSON = click.option("--json", "as_json", is_flag=True, help="Say it as JSON, for programs.")
+JSON = click.option("--json", "as_json", is_flag=True, help="Print JSON, for programs.")
 LOG = click.option(
-    "--log", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", expose_value=False,
+    "--log-file", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE", expose_value=False,
     callback=lambda _, __, path: None if path is None else journal.open(path),
-    help="Append what is said to a file too, with times.",
+    help="Also write messages to FILE, with times.",
 )  # fmt: skip
 VERBOSE = click.option(
-    "--verbose", is_flag=True, expose_value=False,
+    "-v", "--verbose", is_flag=True, expose_value=False,
     callback=lambda _, __, wanted: setattr(journal, "verbose", wanted),
-    help="Say every step of long work in a line of its own.",
+    help="Print every step of long work on its own line.",
 )  # fmt: skip
 
 

@@ -53,7 +53,7 @@ def _check_bodies(config: Config) -> Iterator[Problem]:
     seen: set[str] = set()
     for k, (name, parent) in enumerate(zip(names, bodies.list_parents(), strict=True)):
         if name in seen or name == "base":
-            yield (*path, k, "name"), f"{name!r} is taken; every body needs a name of its own"
+            yield (*path, k, "name"), f"{name!r} is used twice; every body needs its own name"
         if parent is not None and parent not in {"base", *seen}:
             if parent in names:
                 message: str | UnknownNameError = (
@@ -77,11 +77,11 @@ def _check_payloads_and_drives(config: Config) -> Iterator[Problem]:
 def _check_tracking(config: Config) -> Iterator[Problem]:
     """Yield problems of the simulated control."""
     if config.report.tracking is not None and config.unmeasured:
-        yield ("report", "tracking"), "needs the torques of all joints; leave it out"
+        yield ("report", "tracking"), "needs the torques of all joints; remove it"
     if config.report.tracking is not None and config.description.bodies.closed:
         yield (
             ("report", "tracking"),
-            "is for open trees, and this mechanism has loops; leave it out",
+            "works for open trees only, and this mechanism has loops; remove it",
         )
 
 
@@ -99,7 +99,10 @@ def _check_constraints(config: Config) -> Iterator[Problem]:
     for k, entry in enumerate(config.trajectories.constraints):
         path: Key = ("trajectories", "constraints", k)
         if entry.name in seen:
-            yield (*path, "name"), f"{entry.name!r} is taken; every constraint needs its own name"
+            yield (
+                (*path, "name"),
+                f"{entry.name!r} is used twice; every constraint needs its own name",
+            )
         seen.add(entry.name)
         if entry.coordinate is not None and entry.coordinate not in coordinates:
             yield (
@@ -114,7 +117,7 @@ def _check_constraints(config: Config) -> Iterator[Problem]:
             if name not in bodies:
                 yield (*path, "bodies", j), UnknownNameError("body", name, bodies)
         if entry.quantity == "singularity" and not description.bodies.closed:
-            yield (*path, "quantity"), "singularity is of loops, but there is no closure"
+            yield (*path, "quantity"), "singularity needs closed loops, and there is no closure"
 
 
 def _list_parameters(config: Config) -> list[str]:
@@ -143,7 +146,7 @@ def _check_groups(config: Config) -> Iterator[Problem]:
                 yield (*path, "name"), f"the name {group!r} is taken"
             for j, name in enumerate(members):
                 if name in members[:j]:
-                    yield path, f"{name} stands there twice"
+                    yield path, f"{name} is listed twice"
                 elif name in owner:
                     yield path, f"{name} is in the group {owner[name]} already"
             owner |= dict.fromkeys(members, group)
@@ -190,7 +193,7 @@ def _check_simulation(config: Config) -> Iterator[Problem]:
 
 def _check_inertia(config: Config) -> Iterator[Problem]:
     if not config.description.bodies.list_inertial_bodies():
-        yield ("description", "tree", "bodies"), "are all massless, so that there is no parameter"
+        yield ("description", "tree", "bodies"), "are all massless, so there is no parameter"
 
 
 def _check_parameter_sets(config: Config) -> Iterator[Problem]:
@@ -298,7 +301,7 @@ def _check_unmeasured(config: Config) -> Iterator[Problem]:
                         f"limits {name}, whose torque is unmeasured; write inf for it",
                     )
     if not config.find_measured().any():
-        yield ("unmeasured",), "leaves no torque to explain; leave out what is measured"
+        yield ("unmeasured",), "leaves no measured torque; remove the joints that are measured"
 
 
 def _check_base_columns(config: Config) -> Iterator[Problem]:
@@ -308,7 +311,7 @@ def _check_base_columns(config: Config) -> Iterator[Problem]:
         if name not in known:
             yield ("model", "base_columns", k), UnknownNameError("parameter", name, known)
         elif name in (config.model.base_columns or [])[:k]:
-            yield ("model", "base_columns", k), f"{name} stands there twice"
+            yield ("model", "base_columns", k), f"{name} is listed twice"
 
 
 def _check_selection(config: Config) -> Iterator[Problem]:
@@ -316,7 +319,7 @@ def _check_selection(config: Config) -> Iterator[Problem]:
     total = len(config.list_parameters())
     for k, name in enumerate(config.reduction.heuristics):
         if name in config.reduction.heuristics[:k]:
-            yield ("reduction", "heuristics", k), f"{name} stands there twice"
+            yield ("reduction", "heuristics", k), f"{name} is listed twice"
     if config.selected.heuristic not in (None, *config.reduction.heuristics):
         yield (
             ("selected", "heuristic"),

@@ -54,14 +54,12 @@ def guess_columns(names: Sequence[str], joints: Sequence[str]) -> dict[str, str 
     more = _count_surplus_joints(names, len(joints))
     if more and not match_joint_names(names, _WORDS["position"], joints):
         raise ConfigError(
-            f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}): is "
-            f"it of this robot? If it is: {_BY_HAND[0].lower()}{_BY_HAND[1:]}"
+            f"the log has {more} joints by its columns, the robot {len(joints)} ({', '.join(joints[:_MOST_JOINTS])}). If it is a log of this robot: {_BY_HAND[0].lower()}{_BY_HAND[1:]}"
         )
     missing = [key for key in _NEEDED if key not in found] + ([] if times else ["time"])
     if missing:
         raise ConfigError(
-            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by "
-            f"any usual name among {', '.join(names[:30])}. {_suggest_locking(names, joints)}"
+            f"no columns for {' and '.join(missing)} of {len(joints)} joints ({', '.join(joints[:_MOST_JOINTS])}) by a usual name among {', '.join(names[:30])}. {_suggest_locking(names, joints)}"
         )
     return {"time": _choose_time(times, found["position"]), **found}
 

@@ -41,7 +41,9 @@ def write_robot_file(
         )
     file = config.source.file
     if detect_format(file) != kind:
-        raise ConfigError(f"{file}: is no {kind.upper()}; the model goes back into what it was.")
+        raise ConfigError(
+            f"{file}: is not a {kind.upper()} file. A model can only be written into the format that its robot came from."
+        )
     robot = read_robot(config.source)
     form = formats[kind]()
     _check_same(config, config.source, robot, gravity=form.holds_gravity)

@@ -137,7 +137,7 @@ def find_compiler() -> tuple[str, ...] | None:
         wanted = shlex.split(os.environ.get("CC", ""))
     except ValueError as error:
         raise ConfigError(
-            f"the variable CC holds no command: {error}. Unset it or mend it."
+            f"the variable CC holds no command: {error}. Unset it or fix it."
         ) from error
     names = [wanted[0]] if wanted else ["gcc", "cc"]
     path = next((path for name in names if (path := shutil.which(name))), None)

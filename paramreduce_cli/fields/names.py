@@ -38,10 +38,10 @@ class UnknownNameError(ValueError):
         names = list(choices)
         self.name, self.is_key = name, what == "key"
         self.nearest = find_nearest_name(name, names)
-        hint = f"there is {', '.join(names) or 'none'}."
+        hint = f"Choose from: {', '.join(names)}." if names else "There is none."
         if self.nearest:
-            hint = f"did you mean {self.nearest}?"
-        super().__init__(f"{what} {name!r} is not known; {hint}")
+            hint = f"Did you mean {self.nearest}?"
+        super().__init__(f"unknown {what} {name!r}. {hint}")
 
 
 Problem = tuple[Key, str | UnknownNameError]

@@ -107,9 +107,14 @@ def _validate_number(value: Any, info: ValidationInfo) -> float:
 
 def _validate_whole(value: Any, info: ValidationInfo) -> int:
     """Return a whole number, or raise ValueError if it has decimals."""
-    result = _validate_number(value, info)
-    if result != int(result):
-        raise ValueError(f"{value!r} is not a whole number")
+    try:
+        result = _validate_number(value, info)
+    except ValueError as error:
+        raise ValueError(
+            f"expected a whole number, for example 1, not {_abbreviate(value)}"
+        ) from error
+    if not math.isfinite(result) or result != int(result):
+        raise ValueError(f"expected a whole number, for example 1, not {_abbreviate(value)}")
     return int(result)
 
 

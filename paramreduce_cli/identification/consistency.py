@@ -196,8 +196,7 @@ def _express_divergence(cp: Any, physical: Physical, bodies: Sequence[Any]) -> A
         known = S @ _build_pseudo_inertia(physical.known[row]) @ S
         if np.linalg.eigvalsh(known)[0] <= _MARGIN:
             raise DataError(
-                f"the known inertia of {name} is not that of any body, so nothing has an entropic distance "
-                "to it. Give physical parameters, or ask for the euclidean distance."
+                f"the known inertia of {name} is not that of any body, so the entropic distance is undefined. Give physical parameters, or use the euclidean distance."
             )
         cost += cp.trace(np.linalg.inv(known) @ bodies[body]) - cp.log_det(bodies[body])
     return cost

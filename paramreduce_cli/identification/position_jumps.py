@@ -91,8 +91,7 @@ def find_position_jumps(signals: Signals) -> PositionJumps:
     bad |= _repeat_bad_rows(signals, bad)
     if np.mean(bad) > _MOST_BAD:
         raise DataError(
-            f"positions jump in {np.count_nonzero(bad)} of {bad.size} rows, faster than the joints move otherwise. Bring "
-            "a recording of one publisher, or write sampling.log.outliers: keep."
+            f"positions jump in {np.count_nonzero(bad)} of {bad.size} rows, faster than the joints move otherwise. Use a recording of one publisher, or write sampling.log.outliers: keep."
         )
     return PositionJumps(bad, np.array(sorted(steps), dtype=np.int64))
 

@@ -95,7 +95,7 @@ def process_logs(
     if held_out and abs(others.rate - rate) > _SAME_RATE * rate:
         raise DataError(
             f"{others.sources[0]}: is recorded at {others.rate:.6g} Hz, {files.sources[0]} at "
-            f"{rate:.6g} Hz. Bring logs of one rate."
+            f"{rate:.6g} Hz. Use logs of one rate."
         )
     recorded = [piece for pieces in (*training, *held_out) for piece in pieces]
     warnings = dict.fromkeys(
@@ -204,8 +204,7 @@ def _read_files(
         steps += _describe_outliers(outliers, names)
         if files.rate and abs(rate - files.rate) > _SAME_RATE * files.rate:
             raise DataError(
-                f"{source}: is recorded at {rate:.6g} Hz, {files.sources[0]} at {files.rate:.6g} Hz. Bring "
-                "logs of one rate."
+                f"{source}: is recorded at {rate:.6g} Hz, {files.sources[0]} at {files.rate:.6g} Hz. Use logs of one rate."
             )
         files.rate = files.rate or rate
         files.sources.append(source)
@@ -342,8 +341,8 @@ def _check_left(parts: list[list[Piece]], sources: list[str], section: LogSectio
     for part, source in zip(parts, sources, strict=True):
         if sum(p.used.stop - p.used.start for p in part) < _FEWEST_USED:
             raise DataError(
-                f"{source}: hardly any samples are left to learn from after sampling.log.trim "
-                f"{section.trim} and standstill. Bring a longer log, or cut off less."
+                f"{source}: too few samples are left for training after sampling.log.trim "
+                f"{section.trim} and standstill. Use a longer log, or trim less."
             )
 
 

@@ -183,8 +183,7 @@ def _read_matrix(
     for name, column in zip(listed, found, strict=True):
         if reference is not None and column.size != reference.size:
             raise DataError(
-                f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; bring "
-                "signals that were recorded together."
+                f"{log.source}: column {name} has {column.size} rows, {times} has {reference.size}; use signals that were recorded together."
             )
     return stack_columns(found)
 
@@ -193,13 +192,12 @@ def _read_column(log: RawLog, name: str) -> FloatArray:
     """Return a column of numbers, or raise DataError if there is none."""
     column = log.columns.get(name)
     if column is None and name in log.others:
-        raise DataError(f"{log.source}: column {name} holds {log.others[name]}; bring numbers.")
+        raise DataError(f"{log.source}: column {name} holds {log.others[name]}; use numbers.")
     if column is None:
         known = list(log.columns)
         shown = ", ".join(known[:_MOST_SHOWN]) + (", ..." if len(known) > _MOST_SHOWN else "")
         raise DataError(
-            f"{log.source}: there is no column {name}; there are {shown}. Say under "
-            "sampling.log.columns what is where."
+            f"{log.source}: there is no column {name}. Columns: {shown}. Assign them under sampling.log.columns."
         )
     wrong = np.flatnonzero(~(np.abs(column) < _LARGEST))
     if wrong.size == column.size:
@@ -214,7 +212,7 @@ def _read_column(log: RawLog, name: str) -> FloatArray:
             "Remove such rows."
         )
     if column.size < _FEWEST:
-        raise DataError(f"{log.source}: {column.size} rows are too few; bring {_FEWEST} or more.")
+        raise DataError(f"{log.source}: {column.size} rows are too few; use {_FEWEST} or more.")
     return column
 
 
@@ -227,7 +225,7 @@ def _check_time(log: RawLog, name: str, time: FloatArray) -> None:
         what = "stands still" if steps[row - 1] == 0 else "goes back"
         raise DataError(
             f"{log.describe_row(row)}, column {name}: time {what}, from {time[row - 1]:.6g} s to "
-            f"{time[row]:.6g} s; so it does in {wrong.size} rows. Bring rows in the order in which they "
+            f"{time[row]:.6g} s; so it does in {wrong.size} rows. Use rows in the order in which they "
             "were recorded, one file for each recording."
         )
 

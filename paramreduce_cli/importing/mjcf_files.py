@@ -320,7 +320,9 @@ class MjcfReader:
             seen, joint = {name}, mimics[name].joint
             while joint in mimics:
                 if joint in seen:
-                    raise ConfigError(f"{self._path}: joint {joint} follows itself by equalities.")
+                    raise ConfigError(
+                        f"{self._path}: joint {joint} mimics itself through equalities."
+                    )
                 seen.add(joint)
                 joint = mimics[joint].joint
 

@@ -104,7 +104,7 @@ class _Reader:
             name = self._get_name(element)
             if name in links:
                 raise self._make_error(
-                    element, "stands there twice; every link needs a name of its own"
+                    element, "is listed twice; every link needs a name of its own"
                 )
             links[name] = self._read_inertia(element)
         joints = tuple(self._read_joint(e, links) for e in self._root.findall("joint"))
@@ -264,8 +264,7 @@ class _Reader:
             while follower.mimic is not None:
                 if follower.mimic.joint in seen:
                     raise ConfigError(
-                        f"{self._path}, line {follower.line}: <joint name={follower.name!r}> follows itself "
-                        "in a circle."
+                        f"{self._path}, line {follower.line}: <joint name={follower.name!r}> mimics itself in a circle."
                     )
                 seen.add(follower.mimic.joint)
                 follower = by_name[follower.mimic.joint]
@@ -289,7 +288,7 @@ class _Reader:
         for joint in joints:
             where = f"{self._path}, line {joint.line}: <joint name={joint.name!r}>"
             if joint.name in names:
-                raise ConfigError(f"{where} stands there twice; every joint needs its own name.")
+                raise ConfigError(f"{where} is listed twice; every joint needs its own name.")
             if joint.child in above:
                 raise ConfigError(
                     f"{where} carries {joint.child!r}, as {above[joint.child].name!r} does; a URDF is a "

@@ -89,18 +89,17 @@ def _check_subsets(
     last = int(result.n[unsafe].max(initial=0))
     yield (
         unsafe,
-        f"direct dynamics is not safe to use everywhere up to n = {last}; there the mass matrix loses "
-        f"positive definiteness on the samples, or comes more than {_CONDITION_FACTOR:g} times "
-        "nearer to singular than with all given parameters.",
-        "is not safe for direct dynamics: use its inverse dynamics only.",
+        f"n ≤ {last}: do not simulate; the mass matrix is indefinite on some samples, or more than "
+        f"{_CONDITION_FACTOR:g} times nearer to singular than with all parameters.",
+        "is good for inverse dynamics only; do not simulate with it.",
     )
     for what in ("torque", "acceleration"):
         apart = _find_overfitted(result, what)
         yield (
             apart,
-            f"{what} errors on the two sets differ more than {_ERROR_FACTOR:g} times at n = "
+            f"{what} errors on the estimation and the validation set differ by more than a factor of {_ERROR_FACTOR:g} at n = "
             f"{', '.join(_format_ranges(result.n[apart].tolist()))}.",
-            f"has {what} errors on the two sets that part: use more trajectories, or more parameters.",
+            f"has {what} errors that differ between the two sets by more than a factor of {_ERROR_FACTOR:g}; use more trajectories, or more parameters.",
         )
 
 

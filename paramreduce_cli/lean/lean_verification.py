@@ -78,6 +78,6 @@ def reject_if_wrong(
     error = np.max(np.abs(off), initial=0.0) / np.max(np.abs(against), initial=1e-300)
     if not error <= tolerance:
         raise FormulationError(
-            f"{what} is off by {error:.1e} of the largest value against plain recursion. This is a "
+            f"{what} is off by {error:.1e} of the largest value against textbook recursion. This is a "
             "defect of paramreduce: please report it with the config."
         )

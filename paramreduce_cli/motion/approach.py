@@ -157,14 +157,13 @@ class PathPlanner:
                 name = self._find_violated_bound(z)
                 if name is not None:
                     raise _NoWayError(
-                        "the way between trajectories.start_pose and the trajectory misses the bounds of "
-                        f"{name}; choose another pose."
+                        "the move from trajectories.start_pose to the trajectory violates the bounds of {name}; choose another pose."
                     )
                 if self._is_loadable(z, dz, ddz):
                     return way
             duration *= _LONGER
         raise _NoWayError(
-            "no way between trajectories.start_pose and the trajectory keeps to the limits; choose another "
+            "no move from trajectories.start_pose to the trajectory keeps the limits; choose another "
             "pose within the position limits, or trajectories.rest_to_rest."
         )
 

@@ -29,7 +29,7 @@ class Part:
         if not (slash and number.isdecimal() and count.isdecimal()):
             raise ValueError(f"{text!r} is not of the form 3/8.")
         if not 1 <= int(number) <= int(count):
-            raise ValueError(f"{text!r} is none of {count} parts, which count from 1.")
+            raise ValueError(f"{text!r} is not one of {count} parts, which count from 1.")
         return cls(int(number), int(count))
 
     def __str__(self) -> str:

@@ -44,7 +44,7 @@ def _check_sizes(what: str, values: FloatArray) -> None:
     if np.isnan(largest) or largest > large or 0 < largest < small:
         raise DataError(
             f"the {what} of the estimation set: the largest number is {largest:.3g}, which is too "
-            f"{'small' if largest < small else 'large'} to calculate with. Bring SI units."
+            f"{'small' if largest < small else 'large'} to calculate with. Use SI units."
         )
 
 
@@ -92,12 +92,12 @@ def make_problem(
         values: Values of the standard parameters where these are known, (n_standard,).
 
     Raises:
-        DataError: There is nothing to choose from, or nothing to explain.
+        DataError: There is nothing to choose from, or there is nothing to fit.
     """
     W, chi = factor[:, :-1], factor[:, -1]
     _check_sizes("observation matrix", W)
     if not np.any(chi):
-        raise DataError("the torques of the estimation set are all zero: nothing to explain.")
+        raise DataError("the torques of the estimation set are all zero: there is nothing to fit.")
     _check_sizes("torques", chi)
     certifiable = True
     if model is not None:
@@ -110,5 +110,7 @@ def make_problem(
         certifiable = not np.any(lengths[~affecting] > _ROUND_OFF * lengths.max())
     candidates = np.flatnonzero(affecting)
     if candidates.size == 0:
-        raise DataError("no column of the observation matrix differs from zero: nothing to choose.")
+        raise DataError(
+            "no column of the observation matrix differs from zero: there is nothing to select."
+        )
     return SelectionProblem(W, chi, candidates, grouped.preference, grouped.groups, certifiable)

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -41,6 +41,17 @@ class Difference:
     first: str
     second: str
     tolerated: bool
+    quantity: str = ""
+    """Key of :data:`QUANTITIES` that the difference belongs to."""
+
+    @property
+    def size(self) -> float:
+        """Relative difference of two numbers; infinite if one is infinite or no number."""
+        try:
+            first, second = float(self.first), float(self.second)
+        except ValueError:
+            return math.inf
+        return abs(second - first) / (max(abs(first), abs(second)) or 1.0)
 
 
 Summary = Mapping[str, Any]
@@ -62,7 +73,11 @@ def compare(
         only: Quantities to compare; all if empty.
     """
     names = only or tuple(QUANTITIES)
-    return [d for name in names for d in QUANTITIES[name](first, second, tolerances)]
+    return [
+        replace(difference, quantity=name)
+        for name in names
+        for difference in QUANTITIES[name](first, second, tolerances)
+    ]
 
 
 def _compare_models(
@@ -223,10 +238,7 @@ def _iterate_subsets(heuristic: Mapping[str, Any]) -> Iterator[tuple[int, list[s
 def _compare_proofs(
     a: Summary, b: Summary, tolerances: Mapping[str, Tolerance]
 ) -> Iterator[Difference]:
-    """Compare proofs: an error below a proven one, or a lower bound above it, is a contradiction.
-
-    An error below a proven one, or a lower bound above it, is a contradiction.
-    """
+    """Compare proofs: an error below a proven one, or a lower bound above it, is a contradiction."""
     others = {proof["n"]: proof for proof in b["reduction"]["proofs"]}
     for x in a["reduction"]["proofs"]:
         y = others.get(x["n"])
@@ -270,13 +282,13 @@ def _compare_terms(
 ) -> Iterator[Difference]:
     """Compare pruned functions by their operations, upwards only, and by whether they keep to the budget."""
     first, second = ({one["function"]: one for one in s.get("terms", [])} for s in (a, b))
-    yield from _compare_exactly("functions without small terms", sorted(first), sorted(second))
+    yield from _compare_exactly("pruned functions", sorted(first), sorted(second))
     for name in first.keys() & second.keys():
         x, y = first[name], second[name]
         most = x["operations"] * (1 + tolerances["terms"].relative)
         if x["operations"] != y["operations"]:
             yield Difference(
-                f"operations without small terms, {name}",
+                f"operations of the pruned function, {name}",
                 str(x["operations"]),
                 str(y["operations"]),
                 y["operations"] <= most,
@@ -296,11 +308,11 @@ def _check_budget(name: str, x: Summary, y: Summary) -> Iterator[Difference]:
         if before is None or allowed is None or before > allowed:
             continue
         if now is None or now > allowed:
-            what = f"{kind} error without small terms, {name}, {part}"
+            what = f"{kind} error of the pruned function, {name}, {part}"
             yield Difference(what, f"{before:.6g} of {allowed:.6g}", _format_number(now), False)
     before, now = x["smallest_eigenvalue"], y["smallest_eigenvalue"]
     if before is not None and (now is None or now <= 0 < before):
-        what = f"smallest eigenvalue without small terms, {name}"
+        what = f"smallest eigenvalue of the pruned function, {name}"
         yield Difference(what, _format_number(before), _format_number(now), False)
 
 

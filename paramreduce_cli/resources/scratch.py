@@ -90,8 +90,8 @@ class LargeTable:
             self._file.write(self._waiting.tobytes())
         except OSError as error:
             raise DataError(
-                f"{_find_temporary_folder() or tempfile.gettempdir()}: no room for a table that memory does not hold "
-                f"({error.strerror}). TMPDIR names another folder."
+                f"{_find_temporary_folder() or tempfile.gettempdir()}: no space for temporary data larger than memory "
+                f"({error.strerror}). Set TMPDIR to another folder."
             ) from error
         del self._waiting[:]
 

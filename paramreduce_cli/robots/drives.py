@@ -45,7 +45,7 @@ class DriveSection(Section):
     def _check_not_empty(self) -> DriveSection:
         """Raise ValueError if the section gives nothing."""
         if not self.get_values() and "smoothing" not in self.model_fields_set:
-            raise ValueError(f"says nothing; give one of {', '.join(kind.key for kind in DRIVE)}")
+            raise ValueError(f"is empty; give one of {', '.join(kind.key for kind in DRIVE)}")
         return self
 
     def get_values(self) -> dict[Kind, float]:
@@ -115,4 +115,4 @@ def find_drive_problems(
                     UnknownNameError("coordinate", coordinate, coordinates),
                 )
             elif weight == 0:
-                yield (name, "motion", coordinate), "has the weight zero; leave it out"
+                yield (name, "motion", coordinate), "has the weight zero; remove it"

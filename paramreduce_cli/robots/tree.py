@@ -319,7 +319,7 @@ class TreeDescription(BodiesDescription):
             if name not in coordinates:
                 yield ("independent", k), UnknownNameError("coordinate", name, coordinates)
             elif name in self.independent[:k]:
-                yield ("independent", k), f"{name} stands there twice"
+                yield ("independent", k), f"{name} is listed twice"
         for name in self.guess:
             if name not in coordinates:
                 yield ("guess", name), UnknownNameError("coordinate", name, coordinates)

@@ -33,7 +33,7 @@ def _check_seeds(seeds: list[int]) -> list[int]:
     """Raise ValueError if a seed is listed twice."""
     twice = sorted({seed for seed in seeds if seeds.count(seed) > 1})
     if twice:
-        raise ValueError(f"the seed {twice[0]} stands there twice")
+        raise ValueError(f"the seed {twice[0]} is listed twice")
     return seeds
 
 

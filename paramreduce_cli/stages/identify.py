@@ -183,7 +183,7 @@ def _fit_consistent(
         return None
     except ImportError:
         warnings.warn(
-            "physical consistency is not looked at, as cvxpy is not installed; "
+            "physical consistency is not checked, because cvxpy is missing; install it with "
             "`pip install 'paramreduce[identify]'` does that",
             ParamreduceWarning,
             stacklevel=2,

@@ -25,7 +25,7 @@ def process_log(
     logs: RawLogs,
     report_progress: ProgressCallback = lambda _: None,
 ) -> MeasuredLog:
-    """Make logs ready: clean, low-pass, differentiate, and split them.
+    """Process logs: clean, filter, differentiate and split them.
 
     What was done to them, and what looks wrong in them, is part of the result.
     """

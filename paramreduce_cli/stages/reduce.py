@@ -68,8 +68,7 @@ def reduce(
     """
     if model is not None and model.mechanism.parameter_names != tuple(samples.names):
         raise DataError(
-            "the samples have other parameters than the model: they are of another robot. Bring "
-            "samples of this one, or give no CONFIG."
+            "the samples have other parameters than the model: they belong to another robot. Use samples of this robot, or leave out CONFIG."
         )
     weights = _choose_weights(reduction, samples)
     grouped = make_columns(reduction, samples)
@@ -79,7 +78,7 @@ def reduce(
     rows = samples.estimation.n_samples * weights.size
     if rows < problem.candidates.size:
         raise DataError(
-            f"{rows} rows are too few for {problem.candidates.size} parameters; bring more samples."
+            f"{rows} rows are too few for {problem.candidates.size} parameters; use more samples."
         )
     rank = len(select_independent(problem.W, problem.candidates_by_preference))
     _warn_of_rank(rank, model, columns)
@@ -118,7 +117,7 @@ def _check_proves(heuristics: Sequence[str]) -> None:
     """Raise ConfigError unless best subsets are proven, as all else takes seconds."""
     if PROVING not in heuristics:
         raise ConfigError(
-            f"has no {PROVING}, and proofs are all that is done in parts. Leave --part out.",
+            f"has no {PROVING}, and --part divides proofs only. Remove --part.",
             ("reduction", "heuristics"),
         )
 
@@ -164,7 +163,7 @@ def _choose_weights(section: ReductionSection, samples: Samples) -> FloatArray:
     if not good.all():
         raise DataError(
             f"joint {int(np.argmin(good)) + 1} has no torque to weigh its errors by, or one too "
-            "small or too large to calculate with. Bring SI units, or give nominal_torque, in N m (N "
+            "small or too large to calculate with. Use SI units, or give nominal_torque, in N m (N "
             "for a prismatic joint)."
         )
     return weights
@@ -174,7 +173,7 @@ def _warn_of_rank(rank: int, model: Model | None, columns: Columns) -> None:
     if model is not None and not columns.tied and rank < model.base.columns.size:
         warnings.warn(
             f"the estimation set excites only {rank} of the {model.base.columns.size} base "
-            "parameters; the others cannot be told apart on it",
+            "parameters; the data do not determine the others",
             ParamreduceWarning,
             stacklevel=2,
         )

@@ -61,7 +61,7 @@ def reduce_terms(
     run: Run,
     items: Items,
 ) -> TermReduction:
-    """Leave terms out of the functions of reduced models, and fit what is left.
+    """Prune negligible terms of the functions of reduced models, and fit the rest.
 
     Parameters are fitted to the estimation set; errors of torques that the full model gave are kept
     within 80 % of the budget there and on the validation set, so that those on the test set, which
@@ -105,7 +105,7 @@ class _Task:
 
 
 def _search(task: _Task, name: str) -> TermModel | None:
-    """Leave terms out of a function; None where nothing is found within the budget."""
+    """Prune the terms of a function; return None if nothing is found within the budget."""
     section, budget, trajectories = task.section, task.budget, task.trajectories
     sampling, samples, run = task.sampling, task.samples, task.run
     model, reduction = task.model, task.reduction

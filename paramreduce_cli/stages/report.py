@@ -70,7 +70,7 @@ def report(
     provenance: Provenance,
     run: Run,
 ) -> Report:
-    """Draw the figures, set the tables and write the page and summary.json.
+    """Draw figures, make tables and write the page and summary.json.
 
     Works on any samples.h5, also one that a user brings: without a model what is of a mechanism is
     left out. Figures are SVG; --set report.formats=pdf,png draws others instead.

@@ -79,7 +79,7 @@ def sample(
     items = items or Items()
     if sampling.log is not None and not items.part.is_whole:
         raise ConfigError(
-            "is sampled as a whole, as its low-pass runs on across parts. Leave --part out.",
+            "is sampled as a whole, as its low-pass runs on across parts. Remove --part.",
             ("sampling", "log"),
         )
     dynamics = Dynamics(model.mechanism)
@@ -268,7 +268,7 @@ def _sample_log(model: Model, dynamics: Dynamics, log: MeasuredLog | None, name:
     if found.n_samples == 0:
         raise ConfigError(
             f"leaves no sample for the {name} set: at {log.torque_cutoff:.3g} Hz the low-pass is longer than "
-            "the motion. Raise it, or bring a longer log.",
+            "the motion. Raise it, or use a longer log.",
             ("sampling", "log", "torque_cutoff"),
         )
     return found
@@ -402,7 +402,7 @@ def _warn_of_still_joints(model: Model, recording: Recording) -> None:
     names = [n for n, s in zip(model.mechanism.coordinate_names, still, strict=True) if s]
     if names:
         warnings.warn(
-            f"{recording.source}: {', '.join(names)} never moves, so its dynamics is not seen",
+            f"{recording.source}: {', '.join(names)} never moves, so its parameters cannot be determined",
             ParamreduceWarning,
             stacklevel=2,
         )

@@ -96,7 +96,7 @@ def validate(
     previous: Validation | None,
     run: Run,
 ) -> Validation:
-    """Judge the reduced models on all sets.
+    """Compute errors and costs of the reduced models on all sets.
 
     Without a model, on samples that a user brings, torques alone are judged.
 
@@ -184,8 +184,7 @@ def _check_without_model(judging: ValidationSection, section: SelectedSection) -
     for key in asked:
         if str(key[-1]).startswith(("acceleration_error", "operations")):
             raise ConfigError(
-                "of samples that were brought torques alone are known; this needs a model of the robot.",
-                key,
+                "user-supplied samples hold torques only, and this needs a model of the robot.", key
             )
 
 

@@ -72,7 +72,7 @@ def test_csv_that_does_not_fit_is_refused(tmp_path, header, data, says):
         ("x.csv", lambda b: b.replace(b"%.18e" % table()[3, 2], b"n/a"), DataError,
          r"line 5, column \w+: 'n/a' is not a number"),
         ("x.csv", lambda b: b.replace(b",", b";").replace(b".", b",", 3), DataError, "Write decimal points"),
-        ("x.csv", lambda b: b.replace(b"dz2", b"z2", 1), DataError, "z2 stands there twice"),
+        ("x.csv", lambda b: b.replace(b"dz2", b"z2", 1), DataError, "z2 is listed twice"),
         ("x.csv", lambda b: b"", DataError, "line 1"),
         ("x.csv", lambda b: b"\x80\xfe\x00\x01" * 10, ArtifactError, "cannot be read"),
         ("x.csv.gz", lambda b: b[:-40], ArtifactError, "cannot be read"),

@@ -153,7 +153,7 @@ def test_values_of_a_validation_of_another_reduction_are_not_written(invoke, noi
 @pytest.mark.parametrize(
     ("setting", "said"),
     [
-        ("reduction.heuristic=[qr]", "did you mean heuristics"),
+        ("reduction.heuristic=[qr]", "Did you mean heuristics"),
         ("trajectories.count=3", "trajectories"),
         ("selected.n=99", "is 99"),
     ],

@@ -152,7 +152,8 @@ def test_inspect_shows_the_selected_model(invoke, two_link_results):
 
 
 def test_parameters_are_shown_with_units_and_deviations(invoke, two_link_results, measured_results):
-    shown = invoke("inspect", two_link_results).out.splitlines()[1:]
+    *shown, lumped = invoke("inspect", two_link_results).out.splitlines()[1:]
+    assert "are lumped" in lumped
     units = {"m": "kg", "mx": "kg m", "my": "kg m", "Izz": "kg m^2"}
     assert [line.split(maxsplit=2)[2] for line in shown] == [
         units[line.split("_")[0].strip()] for line in shown
@@ -187,7 +188,7 @@ def test_selected_is_that_of_the_only_results(invoke, two_link_results, tmp_path
     assert invoke("inspect", "selected").out == invoke("inspect", "results/a").out
     shutil.copytree(two_link_results, tmp_path / "results" / "b")
     assert (
-        "Here are 2. Try `paramreduce inspect results/a`"
+        "there are 2 results folders here. Try `paramreduce inspect results/a`"
         in invoke("inspect", "selected", code=2).err
     )
 
@@ -273,10 +274,10 @@ def test_init_knows_robots_of_a_package_by_name(invoke, tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        ([], "say what the robot is"),
-        (["--tree", "arm", "--tip", "hand"], "--tree describes a robot anew"),
+        ([], "name the robot"),
+        (["--tree", "arm", "--tip", "hand"], "--tree takes no options"),
         (["arm"], "give the path of a URDF or MJCF"),
-        (["--loop", "a/b"], "is no name"),
+        (["--loop", "a/b"], "is not a valid name"),
     ],
 )
 def test_init_says_what_it_needs(invoke, arguments, says):
@@ -303,7 +304,7 @@ def test_run_says_what_settings_replace_in_the_default_folder(
     assert "--set" not in same.err
     changed = ["report.title=Other", ONE_FORMAT]
     err = " ".join(invoke("run", TWO_LINK, "--quiet", settings=changed).err.split())
-    assert "which --set replaces from report on" in err
+    assert "--set replaces them from report on" in err
     assert "--set" not in invoke("run", TWO_LINK, "--quiet", "--results", "x", settings=changed).err
 
 

@@ -13,10 +13,10 @@ from conftest import CONFIGS, ONE_FORMAT
 from paramreduce_cli.artifacts.hdf5 import SCHEMA
 
 MOVES = [
-    (["rnu", "configs/two_link.yaml"], "did you mean `paramreduce run`"),
-    (["Run", "configs/two_link.yaml"], "did you mean `paramreduce run`"),
-    (["build_model", "configs/two_link.yaml"], "did you mean `paramreduce build-model`"),
-    (["optimise-trajectories", "x.yaml"], "did you mean `paramreduce optimize-trajectories`"),
+    (["rnu", "configs/two_link.yaml"], "Did you mean `paramreduce run`"),
+    (["Run", "configs/two_link.yaml"], "Did you mean `paramreduce run`"),
+    (["build_model", "configs/two_link.yaml"], "Did you mean `paramreduce build-model`"),
+    (["optimise-trajectories", "x.yaml"], "Did you mean `paramreduce optimize-trajectories`"),
     (["help"], "see `paramreduce --help`"),
     (["-v"], "paramreduce --help lists all commands"),
     (["run"], "Next: paramreduce run configs/two_link.yaml"),
@@ -37,12 +37,12 @@ MOVES = [
     (["run", "configs/broken.yaml"], "Then again: paramreduce run configs/broken.yaml"),
     (["run", "configs/two_link.yaml", "--sett", "a=b"],
      "Next: paramreduce run configs/two_link.yaml --set a=b"),
-    (["init", "one.urdf", "-o", "one.yaml"], "Next: paramreduce init one.urdf --output one.yaml"),
+    (["init", "one.urdf", "-o", "one.yaml"], "Next: paramreduce init one.urdf -o one.yaml"),
     (["init", "--from", "one.urdf"], "Example: paramreduce init robot.urdf"),
     (["run", "configs/two_link.yaml", "--sett=selected.n=3"],
      "Next: paramreduce run configs/two_link.yaml --set=selected.n=3"),
     (["report", "--config", "configs/two_link.yaml"], "Example: paramreduce report"),
-    (["run", "configs/two_link.yaml", "--set", "selected.m=4"], "there is heuristic, n,"),
+    (["run", "configs/two_link.yaml", "--set", "selected.m=4"], "Choose from: heuristic, n,"),
     (["run", "configs/two_link.yaml", "--set", "selected.n"], "write KEY=VALUE"),
     (["run", "configs/two_link.yaml", "--set", "selected.heuristic=swapp"],
      "Next: paramreduce run configs/two_link.yaml --set selected.heuristic=swap"),
@@ -50,7 +50,7 @@ MOVES = [
      "Next: paramreduce run configs/two_link.yaml --set selected.n=3"),
     (["run", "configs/two_link.yaml", "--set", "n=3"],
      "Next: paramreduce run configs/two_link.yaml --set selected.n=3"),
-    (["run", "configs/two_link.yaml", "--set", "selected.n=many"], "write one such as"),
+    (["run", "configs/two_link.yaml", "--set", "selected.n=many"], "expected a whole number, for example 1"),
     (["run", "configs/two_link.yaml", "--jobs", "0"], "Example: paramreduce run configs/two_link.yaml"),
     (["run", "configs/two_link.yaml", "--results", "notes.txt"], "Example: paramreduce run"),
     (["run", "configs/two_link.yaml", "more"], "Example: paramreduce run"),
@@ -74,7 +74,7 @@ MOVES = [
      "Next: paramreduce export configs/two_link.yaml --results done --model best-subset:4"),
     (["export", "configs/two_link.yaml", "--lang", "matlab"],
      "Next: paramreduce export configs/two_link.yaml --format matlab"),
-    (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "add --what idm"),
+    (["export", "configs/two_link.yaml", "--results", "done", "--model", "terms"], "Add --what idm"),
     (["export", "configs/two_link.yaml", "--results", "done", "--format", "urdf"],
      "`paramreduce init ROBOT.urdf` writes"),
     (["export", "configs/two_link.yaml", "--results", "done", "--set", "selected.n=3"],
@@ -91,7 +91,7 @@ MOVES = [
     (["compare", "done", "dome"], "Did you mean done?"),
     (["compare", "done", "summary.json"], "Run `paramreduce run CONFIG`"),
     (["inspect", "two_link"], "Next: paramreduce run configs/two_link.yaml"),
-    (["open", "configs/two_link.yaml"], "Next: paramreduce run configs/two_link.yaml"),
+    (["open", "configs/two_link.yaml"], "Run `paramreduce run configs/two_link.yaml`"),
     (["validate"], "Next: paramreduce validate configs/two_link.yaml"),
     (["table"], "Example: paramreduce table"),
     (["table", "."], "`paramreduce table done`"),
@@ -158,15 +158,20 @@ def test_what_does_not_work_says_what_does(invoke, folder, words, told):
 
 def test_results_are_named_by_their_robot(invoke, folder):
     shutil.copytree(folder / "done", folder / "results" / "two_link")
-    for words in (
-        ["open", "two_link"],
-        ["open", "configs/two_link.yaml"],
-        ["open", "results/two_link/report/index.html"],
-        ["inspect", "configs/two_link.yaml"],
-    ):
+    for words in (["open", "two_link"], ["open", "results/two_link/report/index.html"]):
         assert f"Next: paramreduce {words[0]} results/two_link\n" in invoke(*words, code=2).err
-    for words in (["run", "results/two_link"], ["validate", "results/two_link/model.h5"]):
-        assert f"Next: paramreduce {words[0]} configs/two_link.yaml\n" in invoke(*words, code=2).err
+    refused = invoke("validate", "results/two_link/model.h5", code=2).err
+    assert "Next: paramreduce validate configs/two_link.yaml\n" in refused
+
+
+def test_a_config_stands_for_its_results_and_results_for_their_config(invoke, folder):
+    shutil.copytree(folder / "done", folder / "results" / "two_link")
+    assert "results/two_link/report/index.html" in invoke("open", "configs/two_link.yaml").out
+    by_config, by_folder = (
+        invoke("inspect", word).out for word in ("configs/two_link.yaml", "done")
+    )
+    assert by_config == by_folder
+    assert "validate: up to date, done/validation.h5" in invoke("validate", "done").out
 
 
 @pytest.mark.parametrize(
@@ -278,7 +283,7 @@ def test_json_is_a_line_for_every_event(invoke, folder):
 
 
 def test_a_log_keeps_what_is_said(invoke, folder):
-    run = ("run", "configs/two_link.yaml", "--results", "done", "--log", "run.log")
+    run = ("run", "configs/two_link.yaml", "--results", "done", "--log-file", "run.log")
     said = invoke(*run, settings=[ONE_FORMAT]).out
     lines = (folder / "run.log").read_text().splitlines()
     assert all(re.match(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d ", line) for line in lines)
@@ -333,10 +338,10 @@ def test_a_template_that_is_not_filled_in_is_said(invoke, tmp_path, monkeypatch)
 def test_messages_are_never_appended_to_something_else(invoke, folder):
     """A recording, say, for who has read of `init --log`."""
     before = (folder / "log.csv").read_text()
-    said = invoke("check-data", "log.csv", "--log", "log.csv", code=2).err
-    assert "holds something else than messages of paramreduce" in said
+    said = invoke("check-data", "log.csv", "--log-file", "log.csv", code=2).err
+    assert "is not a file of paramreduce's messages" in said
     assert (folder / "log.csv").read_text() == before
     (folder / "run.log").touch()
     for _ in range(2):
-        invoke("inspect", "done", "--log", "run.log")
+        invoke("inspect", "done", "--log-file", "run.log")
     assert (folder / "run.log").read_text().count("$ ") == 2

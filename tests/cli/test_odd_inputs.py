@@ -157,7 +157,7 @@ TAU = (W @ np.arange(1.0, 6)).reshape(150, 2)
         (W, TAU * 1e-300, "too small or too large to calculate with"),
         (W * 1e160, TAU, "too large to calculate with"),
         (W * 1e-200, TAU, "too small to calculate with"),
-        ((10**10, 2), (5 * 10**9, 2), "declares 10000000000 x 2 numbers, but holds hardly any"),
+        ((10**10, 2), (5 * 10**9, 2), "declares 10000000000 x 2 numbers, but holds almost none"),
         (W, (150, 2), "no torque to weigh"),
     ],
 )
@@ -213,12 +213,12 @@ def test_a_pipe_is_no_file(invoke, tmp_path):
     for arguments in (
         ("check-data", log),
         ("check-data", bag),
-        ("check-data", tmp_path, "--log", log),
+        ("check-data", tmp_path, "--log-file", log),
         ("inspect", pipe),
         ("compare", pipe, pipe),
         ("reduce", "--samples", pipe, "--results", tmp_path / "r"),
     ):
-        assert "is no file" in invoke(*arguments, code=2).err
+        assert "is not a file" in invoke(*arguments, code=2).err
 
 
 def test_a_pipe_in_the_folder_is_no_config_to_propose(tmp_path):

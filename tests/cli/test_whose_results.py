@@ -19,10 +19,10 @@ def test_results_of_another_config_are_not_replaced_without_a_word(invoke, tmp_p
     assert "holds results of" not in said
     said = " ".join(invoke("run", "two.yaml", settings=QUICK[1:]).err.split())
     assert (
-        "results/two_link holds results of one.yaml, which those of two.yaml replace from optimize-trajectories on"
+        "results/two_link holds results of one.yaml. Results of two.yaml replace them from optimize-trajectories on"
         in said
     )
-    assert "give one of them another name under robot:" in said
+    assert "change robot: in one config" in said
     (tmp_path / "two.yaml").write_text(text.replace("  count: 2", "  count: 1"))
     said = invoke("run", "two.yaml", settings=QUICK[1:]).err
     assert "holds results of one.yaml" not in said, "an edited config replaces its own results"

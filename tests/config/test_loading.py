@@ -42,7 +42,7 @@ def test_misprint_of_the_papers_table_stays_in_its_own_set():
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [
-        ("harmonics: 2", "harmonic: 2", 23, ["trajectories.harmonic", "did you mean harmonics?"]),
+        ("harmonics: 2", "harmonic: 2", 23, ["trajectories.harmonic", "Did you mean harmonics?"]),
         ("count: 2", "count: -2", 20, ["trajectories.count", "greater than or equal to 1", "-2"]),
         ("count: 2", "count: many", 20, ["trajectories.count", "many"]),
         ("velocity_limits: 3", "velocity_limits: [1, 2, 3]", 26,
@@ -54,14 +54,14 @@ def test_misprint_of_the_papers_table_stays_in_its_own_set():
         ("points: 40", "points: 4", 24, ["trajectories.points", "4 points cannot hold 2 harmonics"]),
         ("convention: modified", "convention: moddified", 7, ["convention", "'modified' or 'standard'"]),
         ("a: 0.5", "a: 0.5m", 10, ["joints.1.a", "'0.5m' is not a number"]),
-        ("name: fore", "name: upper", 10, ["joints.1.name", "taken"]),
-        ("name: fore", "name: fore, parent: base_", 10, ["parent", "did you mean base?"]),
-        ("    fore: {m", "    for: {m", 15, ["parameter_sets.slender_rods.for", "did you mean fore?"]),
+        ("name: fore", "name: upper", 10, ["joints.1.name", "used twice"]),
+        ("name: fore", "name: fore, parent: base_", 10, ["parent", "Did you mean base?"]),
+        ("    fore: {m", "    for: {m", 15, ["parameter_sets.slender_rods.for", "Did you mean fore?"]),
         ("com: [0.2, 0.01, 0]", "com: [0.2, 0.01]", 15, ["fore.com", "3 items"]),
         ("com: [0.2, 0.01, 0]", "mx: 1", 15, ["inertia_com needs com"]),
         ("nominal_torque: [20, 5]", "nominal_torque: [20, 0]", 17, ["nominal_torque", "greater than 0"]),
         ("heuristic: forward-selection", "heuristic: forward_selction", 31,
-         ["heuristic", "did you mean forward-selection?"]),
+         ["heuristic", "Did you mean forward-selection?"]),
         ("  n: 4", "  n: 40", 32, ["selected.n is 40, but two_link has 20 parameters"]),
         ("  n: 4", "  n: 4\n  torque_error: 0.1", 30, ["give n or torque_error, not both"]),
         ("robot: two_link", "robot: two/link", 2, ["robot"]),
@@ -242,7 +242,7 @@ def test_former_keys_say_what_stands_in_their_place(write_config, key):
 
 
 def test_a_misspelt_key_of_a_section_that_may_be_a_list_has_a_suggestion(write_config):
-    with pytest.raises(ConfigError, match=r"did you mean motion\?"):
+    with pytest.raises(ConfigError, match=r"Did you mean motion\?"):
         load_config(write_config(), ["sampling.log.signs={motin: [1, -1]}"])
 
 

@@ -100,7 +100,7 @@ def test_loops_stay_closed(simulated):
             ["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "start={z_upper: [1, -1]}"],
             "the range crosses",
         ),
-        (["inputs={q_1: {amplitude: 1, frequencies: [1]}}"], "'q_1' is not known"),
+        (["inputs={q_1: {amplitude: 1, frequencies: [1]}}"], "'q_1'"),
         (["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "step=2"], "is too long for 10 s"),
         (
             ["inputs={z_fore: {amplitude: 1, frequencies: [1]}}", "step=1e-9"],

@@ -1,4 +1,4 @@
-"""Exported code is run by its own language against plain recursion."""
+"""Exported code is run by its own language against textbook recursion."""
 
 import dataclasses
 import re

@@ -174,13 +174,13 @@ def test_a_four_bar_whose_ends_are_joined(invoke, tmp_path, kind):
     [
         (["--close", "tip1"], "--close tip1: write two links as A=B, or A=B:KIND"),
         (["--close", "tip1=corner1:ball"], "write two links as A=B, or A=B:KIND with fixed, revolute or spherical"),
-        (["--close", "tip1=corner3"], "link 'corner3' is not known; did you mean corner2?"),
+        (["--close", "tip1=corner3"], "unknown link 'corner3'. Did you mean corner2?"),
         (["--close", "tip1=fore1"], "--close tip1=fore1: both links move with fore1, so there is nothing to close"),
-        (["--close", "tip1=corner1:spherical", "--independent", "moter1"], "joint 'moter1' is not known; did you mean motor1?"),
+        (["--close", "tip1=corner1:spherical", "--independent", "moter1"], "unknown joint 'moter1'. Did you mean motor1?"),
         (["--close", "tip1=corner1:spherical", "--independent", "end1"], "--independent end1: does not move"),
         (["--close", "tip1=corner1:spherical", *(part for k in (0, 1) for name in ("motor", "tilt", "sway")
            for part in ("--independent", f"{name}{k}"))], "--independent: the loops tie"),
-        (["--independent", "motor1"], "--independent: belongs to loops"),
+        (["--independent", "motor1"], "--independent: needs closed loops"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_closed_gets_one_message(invoke, tmp_path, options, says):

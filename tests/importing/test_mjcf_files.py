@@ -310,7 +310,7 @@ def test_mujoco_takes_physical_bodies_alone(tmp_path, invoke):
     out = invoke("export", *given, "--format", "mjcf", *model, settings=settings, code=2)
     assert "MuJoCo takes physical bodies alone" in " ".join(out.err.split())
     out = invoke("export", *given, "--format", "urdf", *model, settings=settings, code=2)
-    assert "is no URDF" in " ".join(out.err.split())
+    assert "is not a URDF file" in " ".join(out.err.split())
 
 
 def test_a_spring_goes_back_with_its_rest(tmp_path, invoke):
@@ -393,4 +393,4 @@ def test_a_file_of_another_gravity_or_another_kind_of_output_is_refused(tmp_path
     out = invoke("export", *given, *chosen, settings=settings, code=2)
     assert "has another gravity than the config" in " ".join(out.err.split())
     out = invoke("export", *given, *chosen, "--constants", settings=settings, code=2)
-    assert "are of code, not of mjcf" in " ".join(out.err.split())
+    assert "apply to code, not to --format mjcf" in " ".join(out.err.split())

@@ -258,12 +258,12 @@ def test_every_robot_of_the_wheel_is_read_or_refused_with_a_message(tmp_path):
         ('<mass value="2.5"/>', "", "needs <mass> and <inertia>"),
         ('xyz="0.1 0.02 -0.03"', 'xyz="0.1 0.02"', "3 numbers should stand there"),
         ('xyz="0.1 0.02 -0.03"', 'xyz="${x} 0 0"', "is xacro that was not expanded"),
-        ('<link name="slide">', '<link name="upper">', "stands there twice"),
+        ('<link name="slide">', '<link name="upper">', "is listed twice"),
         ('<parent link="world"/><child link="post"/>', '<parent link="world"/><child link="slide"/>', "a URDF is a tree"),
         ('<parent link="world"/><child link="post"/>', '<parent link="finger"/><child link="post"/>', "closes a circle"),
         ('<link name="world"/>', '<link name="world"/><link name="lost"/>', "no joint carries world, lost"),
         ('<link name="world"/>', "<link/>", "has no name"),
-        ('effort="50"/>', 'effort="50"/><mimic joint="shoulder"/>', "follows itself in a circle"),
+        ('effort="50"/>', 'effort="50"/><mimic joint="shoulder"/>', "mimics itself in a circle"),
     ],
 )  # fmt: skip
 def test_wrong_files_get_one_message(tmp_path, invoke, old, new, says):

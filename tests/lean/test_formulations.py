@@ -1,4 +1,4 @@
-"""Formulations against plain recursion, and what they take."""
+"""Formulations against textbook recursion, and what they take."""
 
 import dataclasses
 
@@ -43,7 +43,7 @@ def relative(values, expected):
 
 
 def compared(mechanism, choices, rng, samples=30):
-    """Errors of d and of [M | delta] against plain recursion, relative to the largest value."""
+    """Errors of d and of [M | delta] against textbook recursion, relative to the largest value."""
     q, dq, ddq = rng.normal(size=(3, samples, mechanism.n_q))
     phi = rng.normal(size=mechanism.n_parameters)
     plain = Dynamics(mechanism, once=True)

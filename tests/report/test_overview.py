@@ -40,4 +40,4 @@ def test_folders_without_a_report(invoke, tmp_path):
 def test_a_summary_of_another_version(invoke, tmp_path):
     (tmp_path / "old.json").write_text('{"robot": "old"}')
     refused = invoke("table", tmp_path / "old.json", "--output", tmp_path / "all", code=2)
-    assert "is no summary of this version" in refused.err
+    assert "is not a summary of this version" in refused.err

@@ -64,7 +64,7 @@ def test_the_command_on_a_sweep_leaves_out_and_names_what_has_not_ended(
     for seed in (0, 2):
         shutil.copytree(two_link_results, tmp_path / "here" / f"two_link-{seed}-plain")
     said = invoke("table", "--sweep", listed)
-    assert "left out, as they have not ended: two_link-1-plain" in said.err
+    assert "unfinished runs are left out: two_link-1-plain" in said.err
     assert "two_link, plain" in said.out
     rows = list(csv.DictReader((tmp_path / "here" / "table-runs.csv").open()))
     assert [(row["variant"], row["seed"]) for row in rows] == [("plain", "0"), ("plain", "2")]

@@ -53,10 +53,10 @@ def test_operations_as_a_tolerance(validate, two_link_copy):
 @pytest.mark.parametrize(
     ("setting", "says"),
     [
-        ("reduction.heuristics=[swap@speed]", "criterion 'speed' is not known"),
+        ("reduction.heuristics=[swap@speed]", "unknown criterion 'speed'"),
         ("reduction.heuristics=[qr@acceleration]", "qr takes no criterion"),
         ("reduction.heuristics=[swap@torque]", "leave out @torque"),
-        ("reduction.heuristics=[swap, swap]", "swap stands there twice"),
+        ("reduction.heuristics=[swap, swap]", "swap is listed twice"),
         ("selected.heuristic=floating@operations", "does not run"),
         ("reduction.best_subset.time_limit=-1", "greater than or equal to 0"),
     ],

@@ -64,7 +64,7 @@ def test_recordings_may_lack_what_is_not_measured(invoke, tmp_path, unmeasured):
 
 @pytest.mark.parametrize(
     ("value", "says"),
-    [("[z_uper]", "did you mean z_upper"), ("[z_upper, z_fore]", "leaves no torque to explain")],
+    [("[z_uper]", "Did you mean z_upper"), ("[z_upper, z_fore]", "leaves no measured torque")],
 )
 def test_wrong_names_are_refused(invoke, tmp_path, value, says):
     out = invoke(

@@ -31,7 +31,7 @@ _TABLE_WIDTH = 100
 @SET
 @LOG
 def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:
-    """Say what a log is good for: rate, gaps, noise, and with a CONFIG how well it excites the robot.
+    """Check whether a log is good enough: rate, gaps, noise, and with a CONFIG how well it excites the robot.
 
     Columns are those of the config's log, or found by their usual names.
     """

@@ -21,7 +21,7 @@ _PLACES = {
 @click.argument("shell", type=click.Choice(list(_PLACES)))
 @click.option("--install", is_flag=True, help="Write it to where the shell looks.")
 def completion(shell: str, install: bool) -> None:
-    """Print what completes commands and options in a shell, or install it."""
+    """Print the completion script of a shell, or install it."""
     made = get_completion_class(shell)
     assert made is not None  # the shells are those that click knows
     root = click.get_current_context().find_root().command

@@ -36,7 +36,7 @@ WRONG = 1
 @click.command()
 @JSON
 def doctor(as_json: bool) -> int:
-    """Say what this machine has: compiler, caches, linear algebra, threads, extras.
+    """Check this machine: compiler, caches, linear algebra, threads, extras.
 
     Compiles the loops of all searches, so that no later run waits for that.
 

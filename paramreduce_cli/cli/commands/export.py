@@ -56,22 +56,22 @@ _OF_A_ROBOT = (FULL, BASE, IDENTIFIED, CONSISTENT, *_OF_ONE)
 @SET
 @click.option(
     "--format", "kind", type=click.Choice([*sorted(languages), *formats, VALUES]), default="c", show_default=True,
-    help="Language of the code; or urdf, mjcf: the robot's own file with the model's parameters; or values alone, as JSON.",
+    help="Language of the code. urdf and mjcf write the robot's own file with the model's parameters, values writes JSON.",
 )  # fmt: skip
 @click.option(
     "--what", type=click.Choice([str(what) for what in Exported]), default="both", show_default=True,
-    help="Inverse dynamics, direct dynamics [M | delta], both, or the regressor.",
+    help="Function to export: inverse dynamics (idm), direct dynamics [M | delta] (ddm), both, or the regressor.",
 )  # fmt: skip
 @click.option(
     "--model",
     "text",
     metavar="HEURISTIC:N",
-    help="Or full, or base; with a log also identified, or consistent; terms, for one function with terms left out; leanest, for the one with the fewest operations within what selected, or terms, allows.  [default: the selected one]",
+    help="Model to export: HEURISTIC:N, full or base; with a log also identified or consistent; terms (one function with pruned terms); leanest (fewest operations within the limits of selected and terms).  [default: the selected model]",
 )
-@click.option("--constants", is_flag=True, help="Put the parameters' values into the code.")
-@click.option("--single", is_flag=True, help="Single precision, in C.")
+@click.option("--constants", is_flag=True, help="Write the values of the parameters into the code.")
+@click.option("--single", is_flag=True, help="Use single precision (C only).")
 @click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/FORMAT]",
 )  # fmt: skip
 @VERBOSE
@@ -89,29 +89,29 @@ def export(
 ) -> None:
     """Write a model as code with few operations.
 
-    The code is checked against plain recursion on random states before it is written. For
+    The code is compared with textbook recursion on random states before it is written. For
     mechanisms with loops it also solves positions, velocities and accelerations.
 
-    Without a CONFIG, of samples that were brought, values alone can be written.
+    For user-supplied samples without a CONFIG, only --format values works.
     """
     loaded = load_config(config, overrides) if config is not None else None
     store = make_store(loaded, results)
     if loaded is None and (kind != VALUES or text in _OF_A_ROBOT):
         raise click.UsageError(
-            f"Code and robots' files need a CONFIG; without one there is --format {VALUES} of a reduced model."
+            f"Code and robots' files need a CONFIG. Without a CONFIG only --format {VALUES} works."
         )
     if single and kind != "c":
-        raise click.UsageError("--single goes with --format c.")
+        raise click.UsageError("--single needs --format c.")
     if kind in (*formats, VALUES) and (what != Exported.BOTH or constants) and text not in _OF_ONE:
-        raise click.UsageError(f"--what and --constants are of code, not of {kind}.")
+        raise click.UsageError(f"--what and --constants apply to code, not to --format {kind}.")
     if text in _OF_ONE and kind in formats:
         raise click.UsageError(
-            f"--model {text}: its values are of use to one function alone, not to a robot's file; "
-            f"write code, or --format {VALUES}."
+            f"--model {text}: these values are valid for one function only, not for a robot's file. "
+            f"Write code, or use --format {VALUES}."
         )
     if text in _OF_ONE and what not in _FUNCTIONS:
         raise click.UsageError(
-            f"--model {text}: each function has values of its own; add --what {' or --what '.join(_FUNCTIONS)}."
+            f"--model {text}: each function has its own values. Add --what {' or --what '.join(_FUNCTIONS)}."
         )
     if text == LEANEST:
         assert loaded is not None
@@ -179,7 +179,7 @@ def _find_leanest(config: Config, store: Store, function: str) -> str:
     found = find_leanest(function, config.selected, validation.heuristics, terms)
     if found is None:
         raise ConfigError(
-            f"--model {LEANEST}: the {function} dynamics of no model is within what is asked for. Give selected.torque_error, and more of it."
+            f"--model {LEANEST}: no model's {function} dynamics is within the limits. Set selected.torque_error, or raise it."
         )
     return found.model
 

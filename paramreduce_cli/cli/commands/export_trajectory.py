@@ -46,7 +46,7 @@ _RUN = ("ros", "urscript")
 @click.option("--allow-moving-start", "moving", is_flag=True,
               help="Also write code for a controller that begins in motion.")  # fmt: skip
 @click.option(
-    "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
+    "-o", "--output", type=click.Path(path_type=Path, file_okay=False), metavar="DIR",
     help="[default: RESULTS/export/trajectory-FORMAT]",
 )  # fmt: skip
 @LOG

@@ -41,34 +41,48 @@ _FARTHEST = 1e6
     cls=ExampleCommand, example="init robot.urdf --log recording.csv --output configs/robot.yaml"
 )
 @click.argument("source", metavar="FILE|NAME", required=False)
-@click.option("--dh", "kind", flag_value="dh", help="An arm in Denavit-Hartenberg parameters.")
-@click.option("--tree", "kind", flag_value="tree", help="A tree of bodies.")
-@click.option("--loop", "kind", flag_value="loop", help="A mechanism with a closed loop.")
-@click.option("--recorded", "kind", flag_value="recorded", help="An arm with recorded motions.")
+@click.option(
+    "--dh", "kind", flag_value="dh", help="Template of an arm in Denavit-Hartenberg parameters."
+)
+@click.option("--tree", "kind", flag_value="tree", help="Template of a tree of bodies.")
+@click.option(
+    "--loop", "kind", flag_value="loop", help="Template of a mechanism with a closed loop."
+)
+@click.option(
+    "--recorded", "kind", flag_value="recorded", help="Template of an arm with recorded motions."
+)
 @click.option("--example", "kind", flag_value="example",
-              help="One of the robots that come along.")  # fmt: skip
+              help="Copy one of the example configs.")  # fmt: skip
 @click.option(
     "--joints",
     type=click.IntRange(1, 30),
     default=6,
     show_default=True,
-    help="With --dh and --recorded.",
+    help="Number of joints, with --dh and --recorded.",
 )
-@click.option("--root", metavar="LINK", help="What stands still.  [default: the file's root]")
-@click.option("--tip", metavar="LINK", help="The end of a chain; joints beside it are locked at 0.")
+@click.option(
+    "--root", metavar="LINK", help="Link that is fixed to the ground.  [default: the file's root]"
+)
+@click.option(
+    "--tip",
+    metavar="LINK",
+    help="Link at the end of a chain; joints beside the chain are locked at 0.",
+)
 @click.option("--lock", "locked", multiple=True, metavar="JOINT=VALUE",
-              help="A joint that does not move, rad or m; may be repeated.")  # fmt: skip
+              help="Lock a joint at a value, rad or m. May be repeated.")  # fmt: skip
 @click.option("--ignore", "ignored", multiple=True, metavar="LINK",
-              help="Leave a link out, with all it carries; may be repeated.")  # fmt: skip
+              help="Remove a link with everything it carries. May be repeated.")  # fmt: skip
 @click.option("--close", "closed", multiple=True, metavar="A=B[:KIND]",
-              help="Hold the frames of two links together, so that a loop is closed: fixed, revolute (but for a turn about z of the frames; a pin about another axis is spherical) or spherical; may be repeated.  [default KIND: fixed]")  # fmt: skip
+              help="Close a loop by holding the frames of two links together: fixed, revolute (free about the z axis of the frames) or spherical. A pin about another axis is spherical. May be repeated.  [default KIND: fixed]")  # fmt: skip
 @click.option("--independent", multiple=True, metavar="JOINT",
-              help="With --close, a joint that is driven; may be repeated.  [default: chosen]")  # fmt: skip
-@click.option("--floating", is_flag=True, help="The root moves freely.")
-@click.option("--uncouple", is_flag=True, help="Joints that follow others move on their own.")
+              help="Driven joint, with --close. May be repeated.  [default: chosen]")  # fmt: skip
+@click.option("--floating", is_flag=True, help="Let the root link move freely.")
+@click.option("--uncouple", is_flag=True, help="Let mimic joints move independently.")
 @click.option("--log", "logs", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="A log of the machine to identify from; may be repeated.")  # fmt: skip
-@click.option("--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]")
+              help="Recording of the robot to identify parameters from. May be repeated.")  # fmt: skip
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="[default: configs/ROBOT.yaml]"
+)
 def init(
     source: str | None, kind: str | None, joints: int, root: str | None, tip: str | None,
     locked: tuple[str, ...], ignored: tuple[str, ...], closed: tuple[str, ...],
@@ -82,7 +96,7 @@ def init(
     """
     if source is None:
         raise ConfigError(
-            "say what the robot is.",
+            "name the robot.",
             remedy="`paramreduce init robot.urdf` reads a robot's file; to describe a robot in a config there is "
             "`paramreduce init --dh NAME` (an arm), `--tree NAME` (a tree of bodies), `--loop NAME` "
             "(closed loops) and `--recorded NAME` (an arm with recorded motions); `paramreduce init --example puma560` "
@@ -91,7 +105,7 @@ def init(
     if kind == "example":
         copied, absent = copy_example(source, output or Path("configs") / f"{source}.yaml")
         for name in absent:
-            say(f"- {name} does not come along; bring it, or a log of your own.")
+            say(f"- {name} is not part of the package. Copy it here, or use your own log.")
         say(f"Wrote {', '.join(map(str, copied))}. paramreduce run {quote(str(copied[0]))}")
         return
     choice = SourceSection(
@@ -101,7 +115,7 @@ def init(
     )  # fmt: skip
     if kind is not None:
         if logs or choice != SourceSection(file=choice.file):
-            raise ConfigError(f"--{kind} describes a robot anew; other options are for a URDF.")
+            raise ConfigError(f"--{kind} takes no options of a robot's file.")
         path = output or Path("configs") / f"{source}.yaml"
         text = _make_template(source, kind, joints)
     else:
@@ -111,7 +125,7 @@ def init(
             robot = replace(robot, name=path.stem)
         if independent and not robot.closures:
             raise ConfigError(
-                "--independent: belongs to loops, such as those of --close; without any all joints are independent."
+                "--independent: needs closed loops, for example from --close. Without loops all joints are independent."
             )
         if robot.closures:
             robot = _close_loops(robot, choice)
@@ -185,7 +199,7 @@ def _make_template(name: str, kind: str, joints: int) -> str:
     """Return a config to fill in, of the kind that is asked for."""
     if not re.fullmatch(NAME, name, re.ASCII):
         raise ConfigError(
-            f"NAME: {name!r} is no name; start with a letter or digit, go on with those, _, - or dots."
+            f"NAME: {name!r} is not a valid name. Begin with a letter or digit; letters, digits, _, - and dots may follow."
         )
     if kind == "dh":
         return format_dh_template(name, joints)
@@ -202,7 +216,7 @@ def _parse_lock(text: str) -> tuple[str, float]:
     except ValueError as error:
         raise ConfigError(f"--lock {text}: write JOINT=VALUE with a number, rad or m.") from error
     if abs(number) > _FARTHEST:
-        raise ConfigError(f"--lock {text}: a joint cannot be locked there; write rad or m.")
+        raise ConfigError(f"--lock {text}: the value is too large for a joint; write rad or m.")
     return joint, number
 
 

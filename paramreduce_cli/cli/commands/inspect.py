@@ -18,31 +18,38 @@ from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.inspection import list_contents
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.options import ResultsPath
 from paramreduce_cli.cli.project_state import list_results_below, make_no_results_error
-from paramreduce_cli.cli.terminal import JSON, LOG, emit, escape_controls, say, say_table
+from paramreduce_cli.cli.terminal import JSON, LOG, emit, escape_controls, out, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning
 from paramreduce_cli.records import Identification, Model, ModelChoice, Reduction, Validation
 from paramreduce_cli.texts.measured_values import format_measured
 
 if TYPE_CHECKING:
     from paramreduce_cli.records import ReducedModel
+    from paramreduce_cli.texts.table import Table
 
 
 @click.command(cls=ExampleCommand, example="inspect {results} --model selected")
-@click.argument("file", type=click.Path(path_type=Path))
+@click.argument("file", type=ResultsPath())
 @click.option(
     "--model",
     "chosen",
     metavar="HEURISTIC:N",
-    help="Show a model of a reduction.h5, or `selected`.",
+    help="Show the parameters of this model, or of the `selected` one.",
 )
-@click.option("--relations", is_flag=True, help="And what its parameters stand for.")
+@click.option(
+    "--relations",
+    is_flag=True,
+    help="Also show the sum of standard parameters that each value is of.",
+)
 @JSON
 @LOG
 def inspect(file: Path, chosen: str | None, relations: bool, as_json: bool) -> None:
-    """Show what is in an artifact and where it came from; of a results folder the selected model.
+    """Show the results in an artifact, or the selected model of a results folder.
 
-    `inspect selected` is that of the only results here.
+    FILE is an artifact such as validation.h5, a results folder, or a config. `inspect selected` finds the only results
+    here.
     """
     if str(file) == "selected" and not file.exists():
         file = _find_results()
@@ -78,7 +85,7 @@ def _find_results() -> Path:
         return found[0]
     meant = f"Try `paramreduce inspect {found[0]}`." if found else ""
     raise ConfigError(
-        f"selected: of which results? Here are {len(found)}.",
+        f"selected: there are {len(found)} results folders here.",
         remedy=meant, command="" if found else "run",
     )  # fmt: skip
 
@@ -93,8 +100,11 @@ def _say_all(values: Mapping[str, Any], as_json: bool) -> None:
 
 
 def _say_contents(file: Path, as_json: bool) -> None:
-    """Print attributes and datasets of a file."""
+    """Print the main results in a file, then its attributes and datasets."""
     attributes, datasets = list_contents(file)
+    results = None if as_json else _make_table(file, attributes.get("stage", ""))
+    if results is not None:
+        say(results.to_text())
     if as_json:
         keys = ("name", "shape", "content")
         emit(
@@ -109,6 +119,17 @@ def _say_contents(file: Path, as_json: bool) -> None:
     for row in _fold_datasets(datasets):
         table.add_row(*(rich.markup.escape(escape_controls(cell)) for cell in row))
     say_table(table, max(len(name) + len(shape) + 20 for name, shape, _ in datasets))
+
+
+def _make_table(file: Path, stage: str) -> Table | None:
+    """Return the main results in an artifact; None if the file is no artifact of this version."""
+    from paramreduce_cli.cli.artifact_tables import load_artifact, tabulate_artifact  # slow to load
+
+    try:
+        return tabulate_artifact(load_artifact(file, stage), out.width)
+    except ArtifactError as error:
+        warnings.warn(f"no table: {str(error).rstrip(chr(46))}", ParamreduceWarning, stacklevel=2)
+        return None
 
 
 def _shorten_attribute(text: str) -> str:
@@ -150,13 +171,19 @@ def _say_model(
     longest = max((len(p.name) for p in parameters), default=0)
     for p in parameters:
         if p.deviation is None:
-            value = f"{p.value: .9e}"
+            value = f"{p.value: .5g}"
         else:
             value = " ± ".join(format_measured(p.value, p.deviation))
             value = value if p.value < 0 else f" {value}"
         say(
             f"  {p.name:{longest}}  {value} {p.unit}".rstrip()
             + (f"  =  {p.stands_for}" if relations else "")
+        )
+    lumped = [p for p in parameters if p.is_lumped]
+    if lumped and not relations:
+        say(
+            f"Values of {len(lumped)} of {len(parameters)} parameters are lumped: {lumped[0].name} is that of "
+            f"{lumped[0].stands_for}, not of one body alone. --relations shows all sums."
         )
 
 
@@ -171,6 +198,12 @@ class _Parameter:
     deviation: float | None
     """Standard deviation, where torques were measured."""
     stands_for: str
+    """Sum of standard parameters that the value is of."""
+
+    @property
+    def is_lumped(self) -> bool:
+        """Whether the value includes multiples of other parameters."""
+        return self.stands_for not in ("", self.name)
 
 
 def _list_parameters(chosen: ReducedModel, folder: Path) -> list[_Parameter]:
@@ -208,7 +241,7 @@ def _load_neighbour(file: Path, record: type) -> Any:
     try:
         return load_file(file, record, None, "")[0]
     except ArtifactError as error:
-        warnings.warn(f"what it tells is left out: {error}", ParamreduceWarning, stacklevel=2)
+        warnings.warn(f"its contents are not shown: {error}", ParamreduceWarning, stacklevel=2)
         return None
 
 

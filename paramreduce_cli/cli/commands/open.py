@@ -7,12 +7,13 @@ import click
 
 from paramreduce_cli.artifacts.report_files import list_newer_artifacts, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.options import ResultsPath
 from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import print_error, say
 
 
 @click.command(cls=ExampleCommand, example="open {results}")
-@click.argument("results", type=click.Path(path_type=Path))
+@click.argument("results", type=ResultsPath())
 def open(results: Path) -> None:  # the file's name is the command's
     """Open a report in the browser.
 

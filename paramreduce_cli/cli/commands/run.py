@@ -121,8 +121,8 @@ def _warn_of_open_tasks(config: Path) -> None:
     if marked:
         more = ", ..." if len(marked) > _MOST_PLACES else ""
         warn_user(
-            f"{config}: line {', '.join(marked[:_MOST_PLACES])}{more}: marked TODO, so numbers there may be those of "
-            "the template"
+            f"{config}: line {', '.join(marked[:_MOST_PLACES])}{more}: marked TODO; replace the "
+            "template's numbers there"
         )
 
 
@@ -137,13 +137,13 @@ def _say_what_is_replaced(runner: Runner, *, changed: bool) -> None:
     folder = runner.store.folder
     if owner not in ("", runner.config_name):
         warn_user(
-            f"{folder} holds results of {owner}, which those of {runner.config_name} replace from {others[0].name} on; give "
-            "one of them another name under robot:, or name another folder in --results, to keep both"
+            f"{folder} holds results of {owner}. Results of {runner.config_name} replace them from {others[0].name} on. To keep "
+            "both, change robot: in one config, or name another folder with --results"
         )
     elif changed:
         warn_user(
-            f"{folder} holds results of other settings, which --set replaces from "
-            f"{others[0].name} on; name another folder in --results to keep both"
+            f"{folder} holds results of other settings. --set replaces them from "
+            f"{others[0].name} on. To keep both, name another folder with --results"
         )
 
 

@@ -11,6 +11,7 @@ from paramreduce_cli.artifacts.atomic import replace_atomically
 from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
+from paramreduce_cli.cli.options import ResultsPath
 from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say, warn_user
 from paramreduce_cli.errors import ArtifactError, ConfigError
@@ -24,13 +25,13 @@ _MOST_NAMED = 12
 
 
 @click.command(cls=ExampleCommand, example="table {results}")
-@click.argument("results", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("results", nargs=-1, type=ResultsPath())
 @click.option(
     "--sweep", "listed", type=click.Path(path_type=Path, dir_okay=False), metavar="FILE",
     help="A list of runs, such as pipelines/sweep.yaml: all of them that have ended, with their seeds and variants.",
 )  # fmt: skip
 @click.option(
-    "--output", type=click.Path(path_type=Path), metavar="PREFIX",
+    "-o", "--output", type=click.Path(path_type=Path), metavar="PREFIX",
     help="Files are called PREFIX.txt, .csv, .tex and .html.  [default: table, beside the first results]",
 )  # fmt: skip
 @click.option("--parquet", is_flag=True, help="Write PREFIX-runs.parquet too; it needs pyarrow.")
@@ -43,7 +44,7 @@ def table(
     parquet: bool,
     as_json: bool,
 ) -> None:
-    """Set one table over several robots or runs, as text, CSV, LaTeX and a page.
+    """Make one table of several robots or runs, as text, CSV, LaTeX and a page.
 
     RESULTS are results folders or summaries. Shows the selected model of each robot beside its
     full one; of several runs of a robot how they spread, and which parameters all of them select.
@@ -65,7 +66,7 @@ def table(
             rows.append(make_overview_row(summary, name if robots[summary["robot"]] > 1 else ""))
             records.append(make_run_record(name, summary, **labels[path]))
         except (KeyError, TypeError, ValueError) as error:
-            raise ConfigError(f"{path}: is no summary of this version ({error}).") from error
+            raise ConfigError(f"{path}: is not a summary of this version ({error}).") from error
     made = {"": make_overview(rows)}
     if len(robots) < len(records):
         made |= {"-spread": tabulate_spread(records), "-choices": tabulate_choices(records)}
@@ -96,10 +97,10 @@ def _list_finished(listed: Path, sweep: Sweep) -> dict[Path, dict[str, Any]]:
     }
     left = [name for name, run in sweep.runs.items() if run.folder not in ended]
     if not ended:
-        raise ArtifactError(f"{listed}: none of its {len(left)} runs has ended.")
+        raise ArtifactError(f"{listed}: none of its {len(left)} runs is finished.")
     if left:
         more = f" and {len(left) - _MOST_NAMED} more" if len(left) > _MOST_NAMED else ""
-        warn_user(f"left out, as they have not ended: {', '.join(left[:_MOST_NAMED])}{more}")
+        warn_user(f"unfinished runs are left out: {', '.join(left[:_MOST_NAMED])}{more}")
     return ended
 
 

@@ -59,7 +59,7 @@ class _Accelerations:
         except np.linalg.LinAlgError as error:
             raise DataError(
                 "the mass matrix of the model fitted to the estimation set is singular, so that "
-                "nothing can be selected by accelerations; bring more exciting samples."
+                "nothing can be selected by accelerations; use more exciting samples."
             ) from error
         K = np.einsum("sijp,sj->sip", data.A, data.ddz) + data.B
         n = K.shape[2]
