@@ -12,7 +12,7 @@ def results(two_link_results):
 
 
 def test_a_model_has_a_row_for_every_parameter(results):
-    table = pr.make_data_frame(results.model)
+    table = pr.frame(results.model)
     assert tuple(table["name"]) == results.model.mechanism.parameter_names
     np.testing.assert_array_equal(table["value"], results.model.values)
     (row,) = table[table["name"] == "mx_fore"].to_dict("records")
@@ -20,7 +20,7 @@ def test_a_model_has_a_row_for_every_parameter(results):
 
 
 def test_trajectories_of_all_sets(results):
-    table = pr.make_data_frame(results.trajectories)
+    table = pr.frame(results.trajectories)
     found = results.trajectories
     sets = {name: getattr(found, name) for name in ("estimation", "validation", "test")}
     assert table["set"].tolist() == [name for name, own in sets.items() for _ in own]
@@ -28,7 +28,7 @@ def test_trajectories_of_all_sets(results):
 
 
 def test_every_model_of_a_reduction_and_of_its_validation(results):
-    reduced, judged = pr.make_data_frame(results.reduction), pr.make_data_frame(results.validation)
+    reduced, judged = pr.frame(results.reduction), pr.frame(results.validation)
     found = results.reduction.heuristics["swap"]
     own = reduced[reduced["heuristic"] == "swap"]
     np.testing.assert_array_equal(own["torque_error"], found.torque_error)
@@ -41,7 +41,7 @@ def test_every_model_of_a_reduction_and_of_its_validation(results):
 
 def test_parameters_of_a_reduced_model(results):
     chosen = pr.chosen(results.reduction, "swap", 3, results.model)
-    table = pr.make_data_frame(chosen)
+    table = pr.frame(chosen)
     assert tuple(table["name"]) == chosen.names
     assert tuple(table["stands_for"]) == chosen.expressions
     np.testing.assert_array_equal(table["value"], chosen.values)
@@ -49,7 +49,7 @@ def test_parameters_of_a_reduced_model(results):
 
 def test_identified_parameters_with_their_deviations(measured_results):
     found = pr.open_results(measured_results / "results").identification
-    table = pr.make_data_frame(found)
+    table = pr.frame(found)
     own = table[table["model"] == "reduced"]
     assert tuple(own["name"]) == found.reduced.names
     np.testing.assert_array_equal(own["deviation"], found.reduced.deviations)
@@ -57,4 +57,4 @@ def test_identified_parameters_with_their_deviations(measured_results):
 
 def test_other_records_are_refused(results):
     with pytest.raises(TypeError, match="no table is made of a Samples"):
-        pr.make_data_frame(results.samples)
+        pr.frame(results.samples)

@@ -251,7 +251,7 @@ def test_ways_keep_to_torques_and_powers(motion, made):
     weakest = dataclasses.replace(
         trajectories, limits=dataclasses.replace(limits, torque=np.full(2, 0.1))
     )
-    with pytest.raises(DataError, match="keeps to the limits"):
+    with pytest.raises(DataError, match="keeps the limits"):
         PathPlanner(model, weakest).plan(hanging, away)
 
 
@@ -266,7 +266,7 @@ def test_a_joint_is_turned_to_where_the_machine_stands(made, upper, turned):
         sample_motion(
             model.mechanism, wide, trajectories.estimation[0], rate=100.0, title="x", **where
         )
-        for where in ({"start_pose": pose, "ways": PathPlanner(model, wide)}, {})
+        for where in ({"start_pose": pose, "planner": PathPlanner(model, wide)}, {})
     )
     first = int(np.searchsorted(found.time, found.lead - 1e-9))
     moved = found.z[first] - usual.z[0]

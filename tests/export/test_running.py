@@ -28,7 +28,7 @@ def test_torques_are_those_of_plain_recursion(robot, compiled, monkeypatch):
     found = RunningModel(model, chosen)
     assert found.language == ("C" if compiled else "Python")
     assert found(*states) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
-    assert found(*states, rounds=3) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
+    assert found(*states, repetitions=3) == pytest.approx(wanted, rel=1e-9, abs=1e-9)
     timed = measure_speeds(
         {"full": found, "again": found}, dict(zip(found.takes, states, strict=True))
     )

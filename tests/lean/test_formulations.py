@@ -289,7 +289,7 @@ def test_varied_formulations_have_one_or_two_other_choices_or_joints_of_another_
 @pytest.mark.parametrize("direct", [False, True])
 def test_the_leanest_formulation_alone_takes_what_the_leanest_of_all_does(puma, direct):
     def operations(lean):
-        function = lean.direct if direct else lean.inverse
+        function = lean.build_direct if direct else lean.build_inverse
         return function(reduced, rewritten=False).n_operations
 
     lean, reduced = LeanModels(puma), whole(puma.mechanism, np.sort(puma.base.columns))

@@ -12,12 +12,12 @@ def test_going_down_once_more_takes_nothing_away_from_what_goes_on_with_more_sam
     searcher, start, monkeypatch
 ):
     found = leanest_program.simplify(searcher, [start], max_rounds=8).ends
-    monkeypatch.setattr(Searcher, "descend_again", lambda self, what: None)
+    monkeypatch.setattr(Searcher, "repeat_descent", lambda self, what: None)
     without = leanest_program.simplify(searcher, [start], max_rounds=8).ends
     assert found[0].program.n_operations <= without[0].program.n_operations
 
 
-@pytest.mark.parametrize("kind", ["descend_nearby", "descend_again"])
+@pytest.mark.parametrize("kind", ["descend_nearby", "repeat_descent"])
 @pytest.mark.parametrize(
     ("rounds", "gains", "expected"),
     [
@@ -38,7 +38,7 @@ def test_less_than_one_operation_in_so_many_is_nothing(
     searcher, start, monkeypatch, gain, expected
 ):
     monkeypatch.setattr(leanest_program, "_HARDLY", searcher.descend(start).fewest / 3)
-    turns, _ = gone_down(searcher, start, monkeypatch, "descend_again", 8, {3: gain})
+    turns, _ = gone_down(searcher, start, monkeypatch, "repeat_descent", 8, {3: gain})
     assert turns == list(range(expected))
 
 
@@ -53,7 +53,7 @@ def gone_down(searcher, start, monkeypatch, kind, rounds, gains):
         fewest[0] -= gains.get(what.turn, 0)
         return replace(way, fewest=fewest[0] if what.turn in gains else way.fewest + 1)
 
-    for name in ("descend_nearby", "descend_again"):
+    for name in ("descend_nearby", "repeat_descent"):
         monkeypatch.setattr(Searcher, name, work if name == kind else lambda self, what: None)
     found = leanest_program.simplify(
         searcher, [start], max_rounds=rounds, progress=lambda share, detail: told.append(share)
@@ -68,7 +68,7 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
     searcher, start, monkeypatch
 ):
     begun = []
-    for name in ("descend", "descend_nearby", "descend_again", "descend_closely"):
+    for name in ("descend", "descend_nearby", "repeat_descent", "descend_closely"):
         work = getattr(Searcher, name)
         monkeypatch.setattr(
             Searcher,
@@ -77,7 +77,7 @@ def test_when_time_is_up_what_was_found_is_gone_on_with_and_nothing_else_begun(
         )
     whole = leanest_program.simplify(searcher, [start], max_rounds=8)
     assert not whole.cut_short
-    assert {"descend_nearby", "descend_again"} < set(begun)
+    assert {"descend_nearby", "repeat_descent"} < set(begun)
     begun.clear()
     found = leanest_program.simplify(searcher, [start], max_rounds=8, seconds=1e-9)
     assert begun == ["descend", "descend_closely"]

@@ -10,7 +10,7 @@ from paramreduce_cli.report.style import FUNCTIONS, make_figure, mark_selected, 
 
 @placed(PageSection.SAVINGS, 2)
 def operations(data: ReportData) -> Figure:
-    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: full model.
+    """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters.
 
     Heuristics that found the same models share a curve. Of large robots only some models are counted.
     """
