@@ -1,8 +1,8 @@
 """paramreduce: the smallest set of dynamic parameters that still predicts a robot's forces.
 
-From Python everything is in :mod:`paramreduce_cli.api` and here by its name::
+The functions of :mod:`paramreduce_cli.api` can be used from here::
 
-    import paramreduce_cli as pr
+    import paramreduce as pr
 
     config = pr.load_config("configs/two_link.yaml")
     model = pr.build_model(config)
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 
 def __getattr__(name: str) -> Any:
-    """Names of the interface, loaded when one is first asked for: the command line does without."""
-    if not name.startswith("_"):
+    """Return a name of the interface, which is loaded at the first one: the command line does without."""
+    if name == "__all__" or not name.startswith("_"):
         import paramreduce_cli.api as api
 
-        if name in api.__all__:
+        if name == "__all__" or name in api.__all__:
             return getattr(api, name)
     raise AttributeError(f"module 'paramreduce_cli' has no attribute {name!r}")
 

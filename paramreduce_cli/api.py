@@ -1,4 +1,4 @@
-"""The pipeline from Python: stages as functions on records, and what a results folder holds.
+"""The pipeline from Python: stages as functions on records, and the contents of a results folder.
 
 The functions call the stages that the commands call, with the sections of the config that these
 name. Records are immutable dataclasses of NumPy arrays, documented in :mod:`paramreduce_cli.records`.
@@ -42,6 +42,7 @@ from paramreduce_cli.reduction.models import make_base_model as base_model
 from paramreduce_cli.reduction.models import make_full_model as full_model
 from paramreduce_cli.reduction.models import make_reduced_model
 from paramreduce_cli.report.data_frames import make_data_frame as frame
+from paramreduce_cli.report.notebook import format_results_html
 from paramreduce_cli.running.in_memory import run_in_memory
 from paramreduce_cli.running.pipeline import find_maker, list_stages_to_run
 from paramreduce_cli.running.runner import Callbacks, Runner, format_arguments, make_provenance
@@ -96,57 +97,57 @@ def build_model(config: Config) -> Model:
     return _run_stage(Model, config)
 
 
-def optimize_trajectories(config: Config, model: Model, *, jobs: int = 0) -> Trajectories:
+def optimize_trajectories(config: Config, model: Model, *, jobs: int = 1) -> Trajectories:
     """Find exciting trajectories, or take those that the config names.
 
     Args:
-        config: What is asked for in ``trajectories``.
-        model: From :func:`build_model`.
-        jobs: Worker processes, which a script starts below ``if __name__ == "__main__":`` alone; 0 for none. The numbers
-            do not depend on them.
+        config: Config; its section is ``trajectories``.
+        model: Model from :func:`build_model`.
+        jobs: Number of worker processes, as --jobs; 1 works in this process. With more, a script needs
+            ``if __name__ == "__main__":``. The results do not depend on it.
     """
     return _run_stage(Trajectories, config, model, jobs=jobs)
 
 
 def process_log(config: Config, model: Model) -> MeasuredLog:
-    """Make the logs ready that ``sampling.log`` names."""
+    """Process the logs that ``sampling.log`` names: clean, filter, differentiate and split them."""
     return _run_stage(MeasuredLog, config, model)
 
 
 def sample(
     config: Config, model: Model, source: Trajectories | MeasuredLog | None = None
 ) -> Samples:
-    """Sample estimation and validation set.
+    """Sample the estimation, validation and test set.
 
     Args:
-        config: What is asked for in ``sampling``.
-        model: From :func:`build_model`.
+        config: Config; its section is ``sampling``.
+        model: Model from :func:`build_model`.
         source: Trajectories or a log; None for recordings that the config names.
 
     Returns:
-        Sets that are computed block by block whenever they are read.
+        Samples whose sets are computed block by block whenever they are read.
     """
     return _run_stage(Samples, config, model, source)
 
 
 def reduce(
-    samples: Samples, config: Config | None = None, model: Model | None = None, *, jobs: int = 0
+    samples: Samples, config: Config | None = None, model: Model | None = None, *, jobs: int = 1
 ) -> Reduction:
     """Select parameters with each heuristic, for every number of them.
 
     Args:
-        samples: From :func:`sample`, or of one's own.
-        config: What is asked for in ``reduction``; the defaults if None.
-        model: Of the robot, for criteria that need one.
-        jobs: Threads of proofs.
+        samples: Samples from :func:`sample`, or user-supplied ones.
+        config: Config; its section is ``reduction``. Defaults if None.
+        model: Model of the robot, for criteria that need one.
+        jobs: Number of worker processes and threads, as --jobs.
     """
     return _run_stage(Reduction, config or Settings(), samples, model, jobs=jobs)
 
 
 def reduce_terms(
-    config: Config, model: Model, samples: Samples, reduction: Reduction, *, jobs: int = 0
+    config: Config, model: Model, samples: Samples, reduction: Reduction, *, jobs: int = 1
 ) -> TermReduction:
-    """Leave terms out of the functions of reduced models, and fit what is left."""
+    """Prune negligible terms of the functions of reduced models, and fit the rest."""
     return _run_stage(TermReduction, config, model, samples, reduction, jobs=jobs)
 
 
@@ -156,17 +157,16 @@ def validate(
     config: Config | None = None,
     model: Model | None = None,
     *,
-    jobs: int = 0,
+    jobs: int = 1,
 ) -> Validation:
-    """Judge all reduced models on both sets, and select one.
+    """Compute errors and costs of all reduced models on all sets, and select one.
 
     Args:
-        samples: Of both sets.
-        reduction: From :func:`reduce`.
-        config: What is asked for in ``selected`` and ``validation``; the defaults if None.
-        model: Of the robot; without it torques alone are judged.
-        jobs: Threads of proofs, where the selection is repeated on other data, and processes that count
-            the operations of hundreds of models; then a script has its code under
+        samples: Samples of all sets.
+        reduction: Subsets from :func:`reduce`.
+        config: Config; its sections are ``selected`` and ``validation``. Defaults if None.
+        model: Model of the robot; without it only torque errors are computed.
+        jobs: Number of worker processes and threads, as --jobs; with more than 1, a script needs
             ``if __name__ == "__main__":``.
     """
     return _run_stage(Validation, config or Settings(), samples, reduction, model, jobs=jobs)
@@ -194,15 +194,15 @@ def make_report(
     """Make the page, figures, tables and the summary.
 
     Args:
-        samples: Of both sets.
-        reduction: From :func:`reduce`.
-        validation: From :func:`validate`.
-        config: What is asked for in ``report``; the defaults if None.
-        model: Of the robot; without it sections of a mechanism are left out.
-        more: What else there is: trajectories, functions with terms left out, a log, what was identified.
+        samples: Samples of all sets.
+        reduction: Subsets from :func:`reduce`.
+        validation: Errors from :func:`validate`.
+        config: Config; its section is ``report``. Defaults if None.
+        model: Model of the robot; without it sections of a mechanism are missing.
+        more: Further records: trajectories, pruned functions, a log, identified values.
 
     Returns:
-        Files by their path, and the summary as a mapping.
+        Report with files by their path, and the summary as a mapping.
     """
     wanted = config or Settings()
     robot = "" if model is None else model.mechanism.robot
@@ -223,17 +223,19 @@ def chosen(
     """Return a reduced model by heuristic and size.
 
     Args:
-        reduction: From :func:`reduce`.
+        reduction: Subsets from :func:`reduce`.
         heuristic: Name of the heuristic, such as ``swap`` or ``swap@operations``.
         n: Number of parameters.
         model: Model of the robot, whose values order the expressions of the parameters.
 
     Raises:
-        KeyError: There is no such model.
+        KeyError: There is no such model; the message lists the models there are.
     """
-    row = reduction.heuristics[heuristic].find_row(n)
+    subsets = reduction.heuristics[heuristic]
+    row = subsets.find_row(n)
     if row is None:
-        raise KeyError(f"{heuristic}:{n}")
+        sizes = ", ".join(map(str, subsets.n.tolist()))
+        raise KeyError(f"{heuristic} has no model with {n} parameters. Choose from: {sizes}")
     return make_reduced_model(reduction, heuristic, row, None if model is None else model.values)
 
 
@@ -256,11 +258,16 @@ def code(
         title: Title of the model in the files; the number of its parameters if empty.
         constant: Whether the values are part of the code.
         single: Whether numbers have single precision, in C.
-        validation: Says in which ranges errors were measured.
+        validation: Validation, for the ranges of motion in the header.
 
     Raises:
-        ParamreduceError: The functions do not compute what the straightforward model does.
+        KeyError: The language is unknown; the message lists all languages.
+        ParamreduceError: The functions differ from textbook recursion.
     """
+    if language not in languages:
+        raise KeyError(
+            f"unknown language {language!r}. Choose from: {', '.join(sorted(languages))}"
+        )
     exported = make_exported_model(
         model, parameters, title=title or f"{parameters.n} parameters",
         constant=constant, single=single, origin="from Python", validation=validation,
@@ -279,7 +286,7 @@ def inverse_dynamics(
         parameters: Model from :func:`chosen`, :func:`full_model` or :func:`base_model`.
 
     Returns:
-        A function of q, dq, ddq, (n_samples, n_q) each, rad or m and their rates, that gives
+        Function of q, dq and ddq, (n_samples, n_q) each, rad or m and their rates; it returns torques,
         (n_samples, n_dof), N m or N.
     """
     regressor, standard = Dynamics(model.mechanism).compute_regressor, parameters.standard
@@ -294,11 +301,7 @@ def inverse_dynamics(
 
 
 def _check_states(model: Model, arrays: Sequence[FloatArray]) -> None:
-    """Refuse states that are not of all coordinates.
-
-    Raises:
-        DataError: One of q, dq and ddq has another shape.
-    """
+    """Raise DataError if q, dq or ddq has the wrong shape."""
     names = model.mechanism.generalised_names
     for name, array in zip(("q", "dq", "ddq"), arrays, strict=True):
         if array.ndim != 2 or array.shape[1] != len(names) or array.shape != arrays[0].shape:
@@ -313,17 +316,17 @@ def run(
     results: Path | str | None = None,
     overrides: Sequence[str] = (),
     *,
-    jobs: int = 0,
+    jobs: int = 1,
     progress: Callable[[Progress], None] = lambda _: None,
 ) -> Results:
     """Run all stages in order, skipping what is up to date, as ``paramreduce run`` does.
 
     Args:
-        config: The YAML.
+        config: YAML file of the robot.
         results: Folder of the artifacts; results/ROBOT if None.
         overrides: ``key.key=value`` texts that replace what the file says.
-        jobs: Worker processes; 0 for none.
-        progress: Told of long work.
+        jobs: Number of worker processes, as --jobs; 1 works in this process.
+        progress: Progress callback.
 
     Raises:
         ParamreduceError: A stage fails; what was finished is kept.
@@ -365,7 +368,7 @@ class Results:
 
     @cached_property
     def samples(self) -> Samples:
-        """Both sets, read from the file block by block."""
+        """Samples of all sets, read from the file block by block."""
         return self._record(Samples)
 
     @cached_property
@@ -380,19 +383,23 @@ class Results:
 
     @cached_property
     def identification(self) -> Identification:
-        """From measured torques."""
+        """Values identified from measured torques."""
         return self._record(Identification)
 
     @cached_property
     def terms(self) -> TermReduction:
-        """Functions with terms left out."""
+        """Functions with pruned terms."""
         return self._record(TermReduction)
+
+    def _repr_html_(self) -> str:
+        """Return the selected model and all heuristics at its size as HTML, for notebooks."""
+        return format_results_html(self.summary)
 
     def _record(self, kind: type) -> Any:
         return load_file(Store(self.folder).get_path(kind), kind, None, find_maker(kind).name)[0]
 
 
-def _run_stage(kind: type, config: Config | Settings, *records: Any, jobs: int = 0) -> Any:
+def _run_stage(kind: type, config: Config | Settings, *records: Any, jobs: int = 1) -> Any:
     """Run the stage that makes a kind of record."""
     stage = find_maker(kind)
     if not isinstance(config, Config | Settings):

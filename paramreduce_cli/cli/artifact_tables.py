@@ -18,18 +18,25 @@ from paramreduce_cli.records import (
     Trajectories,
     Validation,
 )
-from paramreduce_cli.running.pipeline import describe_stage
-from paramreduce_cli.stages import stages
 from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.measured_values import format_measured
 from paramreduce_cli.texts.table import Table
 
+_RECORDS: dict[str, type] = {
+    "build-model": Model,
+    "optimize-trajectories": Trajectories,
+    "reduce": Reduction,
+    "validate": Validation,
+    "identify": Identification,
+}
+"""Record in the artifact of a stage; the stages themselves are slow to load."""
+
 
 def load_artifact(file: Path, stage: str) -> Any:
-    """Return the record in an artifact, or None if no stage of this version makes such a file."""
-    if stage not in stages:
+    """Return the record in an artifact, or None if the artifact of the stage has no table."""
+    if stage not in _RECORDS:
         return None
-    return load_file(file, describe_stage(stage, stages[stage]).output, None, stage)[0]
+    return load_file(file, _RECORDS[stage], None, stage)[0]
 
 
 @singledispatch

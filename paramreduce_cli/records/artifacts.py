@@ -1,16 +1,15 @@
 """Artifacts that the stages have made of one robot."""
 
-from dataclasses import dataclass
-
 from paramreduce_cli.records.logs import Identification, MeasuredLog
 from paramreduce_cli.records.model import Model
 from paramreduce_cli.records.reduction import Reduction
+from paramreduce_cli.records.representation import record
 from paramreduce_cli.records.terms import TermReduction
 from paramreduce_cli.records.trajectories import Trajectories
 from paramreduce_cli.records.validation import Validation
 
 
-@dataclass(frozen=True)
+@record
 class Artifacts:
     """The artifacts of one robot without its samples; None where a stage has nothing to do."""
 

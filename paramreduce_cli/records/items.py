@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import MutableMapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, TypeVar
+
+from paramreduce_cli.records.representation import record
 
 T = TypeVar("T")
 
 
-@dataclass(frozen=True)
+@record
 class Part:
     """A part of a stage's items, written ``3/8``: every eighth item from the third on; by default all items."""
 
@@ -49,7 +51,7 @@ WHOLE = Part()
 """All items."""
 
 
-@dataclass(frozen=True)
+@record
 class Items:
     """The items of a stage."""
 

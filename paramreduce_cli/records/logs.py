@@ -1,13 +1,14 @@
 """Logs of a machine as recorded, motions made from logs, and what is identified from motions."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import ClassVar
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
 from paramreduce_cli.records.reduction import ReducedModel
+from paramreduce_cli.records.representation import record
 
 _SAME_VALUES = 0.05
 """Standard deviations by which values of the same fit may differ."""
@@ -15,7 +16,7 @@ _ROUNDING = 1e-4
 """The same as a share of a value, where a deviation is next to nothing."""
 
 
-@dataclass(frozen=True)
+@record
 class RawLog:
     """A log file as it was recorded."""
 
@@ -34,7 +35,7 @@ class RawLog:
         return f"{self.source}, line {self.first_line + row}"
 
 
-@dataclass(frozen=True)
+@record
 class RawLogs:
     """The user's log files: files to train on and files that are held out.
 
@@ -45,7 +46,7 @@ class RawLogs:
     held_out: Iterable[RawLog]
 
 
-@dataclass(frozen=True)
+@record
 class MeasuredMotions:
     """A sequence of measured motions, evenly spaced in time within each piece.
 
@@ -68,7 +69,7 @@ class MeasuredMotions:
     filters: before and after what is used, (n_samples,)."""
 
 
-@dataclass(frozen=True)
+@record
 class ShownSignals:
     """The signals before and after processing, downsampled for figures: of the longest training motion, and of the
     held-out part of the same motion.
@@ -97,7 +98,7 @@ class ShownSignals:
     """Replaced samples in a row each, (n_outliers, 3): 0 of a position, 1 of a torque; joint from 0; time, s."""
 
 
-@dataclass(frozen=True)
+@record
 class Spectra:
     """The power spectral densities of recorded signals."""
 
@@ -109,7 +110,7 @@ class Spectra:
     """Of the torques, (n_frequencies, n_dof)."""
 
 
-@dataclass(frozen=True)
+@record
 class MeasuredLog:
     """A log made ready: motions to train on and motions held out, and what was done to them."""
 
@@ -141,7 +142,7 @@ class MeasuredLog:
     """What looks wrong, one sentence each."""
 
 
-@dataclass(frozen=True)
+@record
 class Estimate:
     """The values of a model's parameters identified from measured torques, with their uncertainty and the errors that
     remain.
@@ -177,7 +178,7 @@ class Estimate:
         return deviations if np.all(np.abs(own - model.values) <= near) else {}
 
 
-@dataclass(frozen=True)
+@record
 class Residuals:
     """The statistics of the residuals that all base parameters leave on the training data."""
 
@@ -191,7 +192,7 @@ class Residuals:
     """Probability of residuals like these if they were white (Ljung-Box), (n_dof,)."""
 
 
-@dataclass(frozen=True)
+@record
 class Consistency:
     """The standard parameters nearest to the data that a machine can have."""
 
@@ -213,7 +214,7 @@ class Consistency:
         return bool(np.all(self.smallest_eigenvalues > 0)) and self.smallest_drive >= 0
 
 
-@dataclass(frozen=True)
+@record
 class Identification:
     """The parameters identified from measured torques, with residuals, consistency and hints."""
 

@@ -1,7 +1,6 @@
 """Mechanisms: bodies, joints, drives, and closures of loops."""
 
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
@@ -16,6 +15,7 @@ from paramreduce_cli.records.parameters import (
     order_by_preference,
     to_latex_subscript,
 )
+from paramreduce_cli.records.representation import record
 
 BASE = -1
 """Index of the fixed base in :attr:`Body.parent`."""
@@ -27,7 +27,7 @@ JOINT_AXES = {"revolute": 1, "prismatic": 1, "universal": 2, "spherical": 0, "fr
 """How many axes each kind of joint can be given."""
 
 
-@dataclass(frozen=True)
+@record
 class Body:
     """A body and the joint that connects it to its parent.
 
@@ -63,7 +63,7 @@ ClosureKind = Literal[
 ]  # fmt: skip
 
 
-@dataclass(frozen=True)
+@record
 class Closure:
     """A closure that holds two bodies of the tree together and makes a loop.
 
@@ -95,7 +95,7 @@ class Closure:
     """Of a ``coupling``, rad or m."""
 
 
-@dataclass(frozen=True)
+@record
 class Loops:
     """The closures of a mechanism's loops, and the coordinates that describe the mechanism."""
 
@@ -108,7 +108,7 @@ class Loops:
     """Which of the closures' equations, counted through, all others follow from; None for all."""
 
 
-@dataclass(frozen=True)
+@record
 class Payload:
     """A payload: a rigid body with parameters of its own, in a frame fixed to the body that carries it."""
 
@@ -119,7 +119,7 @@ class Payload:
     """Homogeneous transform of its frame in the body's, (4, 4), m."""
 
 
-@dataclass(frozen=True)
+@record
 class Drive:
     """A drive: rotor, friction, constant force and spring along one motion.
 
@@ -136,7 +136,7 @@ class Drive:
     """Where the spring is slack, rad or m."""
 
 
-@dataclass(frozen=True)
+@record
 class Rigid:
     """A rigid body in a mechanism: one of its bodies, or a payload."""
 
@@ -149,7 +149,7 @@ class Rigid:
     """Columns of its parameters by kind."""
 
 
-@dataclass(frozen=True)
+@record
 class Length:
     """A length of the geometry, such as a_3 of a Denavit-Hartenberg table."""
 
@@ -170,7 +170,7 @@ class Length:
         return f"{self.symbol}_{{{to_latex_subscript(self.owner)}}}"
 
 
-@dataclass(frozen=True)
+@record
 class Mechanism:
     """A tree of bodies on a fixed base, perhaps with loops; parents come before their children."""
 

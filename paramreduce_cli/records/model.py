@@ -1,7 +1,6 @@
 """The model of a robot: mechanism, values of parameters, base parameters, and lean formulations."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
@@ -9,9 +8,10 @@ import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
 from paramreduce_cli.records.mechanism import Mechanism
+from paramreduce_cli.records.representation import record
 
 
-@dataclass(frozen=True)
+@record
 class BaseParameters:
     """A choice of independent columns of W and the relations of the others to them."""
 
@@ -31,7 +31,7 @@ Formulation = tuple[Mapping[str, str | bool], ...]
 """What is chosen at every joint."""
 
 
-@dataclass(frozen=True)
+@record
 class Formulations:
     """The choices between equivalent lean ways to write a mechanism's dynamics."""
 
@@ -39,7 +39,7 @@ class Formulations:
     direct: tuple[Formulation, ...]
 
 
-@dataclass(frozen=True)
+@record
 class Model:
     """A mechanism with its standard parameters and their base."""
 

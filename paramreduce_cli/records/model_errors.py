@@ -1,11 +1,11 @@
 """Errors of models by set, and operations by function."""
 
-from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import FloatArray
+from paramreduce_cli.records.representation import record
 
 
 class ErrorRange(NamedTuple):
@@ -26,7 +26,7 @@ class ErrorRange(NamedTuple):
 NO_MOTIONS = ErrorRange(np.nan, np.nan, np.nan)
 
 
-@dataclass(frozen=True)
+@record
 class _Named:
     """A record whose fields can be taken by a name that is known only at run time."""
 
@@ -34,7 +34,7 @@ class _Named:
         return getattr(self, name)
 
 
-@dataclass(frozen=True)
+@record
 class ModelErrors(_Named):
     """The relative errors of one model on each set."""
 
@@ -44,7 +44,7 @@ class ModelErrors(_Named):
     """Errors on every motion of the test set, which no search looks at, (n_motions,)."""
 
 
-@dataclass(frozen=True)
+@record
 class SetErrors(_Named):
     """The relative errors of several models on each set, one row per model."""
 
@@ -56,7 +56,7 @@ class SetErrors(_Named):
     """Errors on every motion of the test set, (m, n_motions); no columns where there is no test set."""
 
 
-@dataclass(frozen=True)
+@record
 class JointErrors(_Named):
     """The relative errors of single joints on each set, (m, n_dof); over all motions of the test set together."""
 
@@ -65,7 +65,7 @@ class JointErrors(_Named):
     test: FloatArray
 
 
-@dataclass(frozen=True)
+@record
 class Operations(_Named):
     """The operations of the lean functions, (m,); NaN where a model is not shown, and so not counted."""
 
@@ -73,7 +73,7 @@ class Operations(_Named):
     direct: FloatArray
 
 
-@dataclass(frozen=True)
+@record
 class MassMatrices(_Named):
     """The properties of models' mass matrices over all samples, (m,)."""
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import IntArray
+from paramreduce_cli.records.representation import record
 
 
 class Kind(Enum):
@@ -83,7 +83,7 @@ LAST = max(kind.preference for kind in Kind) + 1
 """Rank of preference of columns of which nothing is known."""
 
 
-@dataclass(frozen=True)
+@record
 class Parameter:
     """One dynamic parameter, and so one column of the observation matrix."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from functools import cached_property
 from typing import ClassVar
@@ -11,7 +11,9 @@ from typing import ClassVar
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray, IntArray
+from paramreduce_cli.records.choices import Choices
 from paramreduce_cli.records.parameters import Parameter
+from paramreduce_cli.records.representation import record
 
 PROVING = "best-subset"
 """The heuristic that proves."""
@@ -19,7 +21,7 @@ NOT_KEPT = -1
 """Position of a standard parameter that a reduced model does without."""
 
 
-@dataclass(frozen=True)
+@record
 class SelectionMethod:
     """A heuristic and the criterion it selects by, written ``HEURISTIC`` or ``HEURISTIC@CRITERION``."""
 
@@ -41,7 +43,7 @@ class SelectionMethod:
         return self.heuristic if self.by_torque else f"{self.heuristic}@{self.criterion}"
 
 
-@dataclass(frozen=True)
+@record
 class ReducedModel:
     """A model that keeps some values: which standard parameter has which of them.
 
@@ -114,7 +116,7 @@ class ReducedModel:
         return replace(self, position=np.where(affecting, self.position, NOT_KEPT))
 
 
-@dataclass(frozen=True)
+@record
 class Columns:
     """The columns that a selection chooses among: standard parameters, or several that share one value."""
 
@@ -140,7 +142,7 @@ class Columns:
         return ReducedModel(tuple(self.names[k] for k in subset), values, position[self.column])
 
 
-@dataclass(frozen=True)
+@record
 class BySize:
     """A record of arrays with one row for every size of subset."""
 
@@ -153,7 +155,7 @@ class BySize:
         return int(rows[0]) if rows.size else None
 
 
-@dataclass(frozen=True)
+@record
 class Subsets(BySize):
     """The subsets of parameters that one heuristic has found, one for every size."""
 
@@ -201,7 +203,7 @@ class ProofStatus(StrEnum):
     """The size exceeds the rank of the columns: the error is that of all columns together."""
 
 
-@dataclass(frozen=True)
+@record
 class Proofs(BySize):
     """The proofs of the best subset of at most each size; arrays have one row per size."""
 
@@ -256,7 +258,7 @@ class Proofs(BySize):
         return self.n.size - self.status.count(ProofStatus.BEYOND_RANK)
 
 
-@dataclass(frozen=True)
+@record
 class ProofItem:
     """An item of proofs: the sizes that one job has proven, and the data on which the proofs hold."""
 
@@ -265,7 +267,7 @@ class ProofItem:
     proofs: Proofs
 
 
-@dataclass(frozen=True)
+@record
 class Reduction:
     """The subsets of all heuristics on one estimation set."""
 
@@ -279,6 +281,9 @@ class Reduction:
     """By the text of their :class:`SelectionMethod`."""
     proofs: Proofs | None
     """Of the best subsets by torque, where they were looked for."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "heuristics", Choices(self.heuristics))
 
     @property
     def n_affecting(self) -> int:
@@ -297,7 +302,7 @@ class Reduction:
         return self.columns.make_model(found.subsets[row][order], found.parameters[row][order])
 
 
-@dataclass(frozen=True)
+@record
 class ModelChoice:
     """A model of a reduction, written ``HEURISTIC:N``."""
 

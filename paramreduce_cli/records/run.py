@@ -1,8 +1,9 @@
 """Workers, callbacks and provenance that a run gives to its stages."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol
+
+from paramreduce_cli.records.representation import record
 
 
 class Stored(Protocol):
@@ -12,7 +13,7 @@ class Stored(Protocol):
     """Name of the file below the results folder."""
 
 
-@dataclass(frozen=True)
+@record
 class Report:
     """The files of the report by their path below ``report/``."""
 
@@ -20,7 +21,7 @@ class Report:
     files: Mapping[str, bytes]
 
 
-@dataclass(frozen=True)
+@record
 class Progress:
     """One step of a long piece of work, for whoever shows it."""
 
@@ -34,7 +35,7 @@ ProgressCallback = Callable[[Progress], None]
 """An audience of long work."""
 
 
-@dataclass(frozen=True)
+@record
 class Provenance:
     """The provenance of an artifact: config, versions, times and warnings."""
 
@@ -50,7 +51,7 @@ class Provenance:
     """What the config says that is not so by default."""
 
 
-@dataclass(frozen=True)
+@record
 class Run:
     """The worker processes and callbacks that the caller of a stage provides."""
 

@@ -1,16 +1,16 @@
 """Samples: states, torques and observation matrices."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.representation import record
 
 SETS = ("estimation", "validation", "test")
 """What a search fits to, what it chooses by, and what none looks at."""
 
 
-@dataclass(frozen=True)
+@record
 class Recording:
     """A user's recording of states, and perhaps of torques; each array (n_samples, n_dof)."""
 
@@ -22,7 +22,7 @@ class Recording:
     tau: FloatArray | None
 
 
-@dataclass(frozen=True)
+@record
 class Recordings:
     """The user's recordings by set; None where there is none."""
 
@@ -31,7 +31,7 @@ class Recordings:
     test: Recording | None
 
 
-@dataclass(frozen=True)
+@record
 class Block:
     """A block of consecutive samples of one trajectory."""
 
@@ -71,7 +71,7 @@ class SampleSet(Protocol):
         """
 
 
-@dataclass(frozen=True)
+@record
 class Samples:
     """The estimation, validation and test sets with the scales their errors are measured in."""
 

@@ -1,11 +1,12 @@
 """Reduced models of which terms are removed too."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.choices import Choices
 from paramreduce_cli.records.model_errors import ModelErrors, SetErrors
+from paramreduce_cli.records.representation import record
 
 TERMS = "terms"
 """What the model is called of which each function has terms left out."""
@@ -13,7 +14,7 @@ NO_OPERAND = -1
 """Where an operation has fewer than two operands."""
 
 
-@dataclass(frozen=True)
+@record
 class StoredProgram:
     """A straight-line program: nodes, each made of those before it."""
 
@@ -27,7 +28,7 @@ class StoredProgram:
     """Like operands, (n_outputs,)."""
 
 
-@dataclass(frozen=True)
+@record
 class TermFront:
     """The Pareto front of one function's models, by operations and error; one row per model."""
 
@@ -37,7 +38,7 @@ class TermFront:
     """Not numbers for the inverse dynamics."""
 
 
-@dataclass(frozen=True)
+@record
 class TermModel:
     """A function of the dynamics without small terms, some nodes standing for others; what that does."""
 
@@ -92,7 +93,7 @@ class TermModel:
     front: TermFront
 
 
-@dataclass(frozen=True)
+@record
 class TermReduction:
     """The functions whose terms were removed within a budget."""
 
@@ -105,3 +106,6 @@ class TermReduction:
     """Whether budgets are on the estimation set alone, the other one being held out, or absent."""
     functions: Mapping[str, TermModel]
     """``inverse`` and ``direct``."""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "functions", Choices(self.functions))

@@ -1,14 +1,14 @@
 """Speed and tracking errors of a controller that uses a reduced model."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import FloatArray, IntArray
+from paramreduce_cli.records.representation import record
 
 
-@dataclass(frozen=True)
+@record
 class Speed:
     """The time that an exported function takes on the machine at hand."""
 
@@ -18,7 +18,7 @@ class Speed:
     """In which they were evaluated."""
 
 
-@dataclass(frozen=True)
+@record
 class Paths:
     """A set of motions at the times of a controller; each rests at its end while others still move.
 
@@ -34,7 +34,7 @@ class Paths:
     ddz: FloatArray
 
 
-@dataclass(frozen=True)
+@record
 class Tracking:
     """The tracking errors of a controller with each of several models."""
 

@@ -1,16 +1,16 @@
 """Trajectories, with the limits and constraints that they keep."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from paramreduce_cli.records.arrays import FloatArray
+from paramreduce_cli.records.representation import record
 
 DISTANCES = frozenset({"distance", "distance-from-axis"})
 """Kinds of constraints that are distances."""
 
 
-@dataclass(frozen=True)
+@record
 class Constraint:
     """A bound on a quantity of the mechanism along a trajectory.
 
@@ -38,7 +38,7 @@ class Constraint:
     upper: float
 
 
-@dataclass(frozen=True)
+@record
 class JointLimits:
     """The limits of the independent coordinates, (n_dof,) each, rad or m, per s, per s^2."""
 
@@ -63,7 +63,7 @@ class JointLimits:
         return (self.upper - self.lower) / 2
 
 
-@dataclass(frozen=True)
+@record
 class Trajectory:
     """One optimised finite Fourier series with what was asked of it and how it went."""
 
@@ -90,7 +90,7 @@ class Trajectory:
     status: str
 
 
-@dataclass(frozen=True)
+@record
 class PointToPoint:
     """A motion from rest to rest along a straight line in joint space, with the least jerk."""
 
@@ -102,7 +102,7 @@ class PointToPoint:
     """Time from rest to rest, s."""
 
 
-@dataclass(frozen=True)
+@record
 class Trajectories:
     """The trajectories of the estimation, the validation and the test set."""
 
@@ -129,7 +129,7 @@ class Trajectories:
     test_point_to_point: tuple[PointToPoint, ...]
 
 
-@dataclass(frozen=True)
+@record
 class Coefficients:
     """The user's Fourier coefficients, (n_trajectories, n_dof, 1 + 2 harmonics) for each set."""
 

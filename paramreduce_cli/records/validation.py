@@ -1,13 +1,13 @@
 """Errors and costs of reduced models, and the selected model."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from enum import StrEnum
 from typing import ClassVar
 
 import numpy as np
 
 from paramreduce_cli.records.arrays import BoolArray, FloatArray
+from paramreduce_cli.records.choices import Choices
 from paramreduce_cli.records.model_errors import (
     JointErrors,
     MassMatrices,
@@ -16,9 +16,10 @@ from paramreduce_cli.records.model_errors import (
     SetErrors,
 )
 from paramreduce_cli.records.reduction import BySize, ModelChoice, ReducedModel
+from paramreduce_cli.records.representation import record
 
 
-@dataclass(frozen=True)
+@record
 class HeuristicValidation(BySize):
     """The errors and costs of one heuristic's subsets; every array has one row per subset."""
 
@@ -34,7 +35,7 @@ class HeuristicValidation(BySize):
         return self.torque_error if quantity == "torque" else self.acceleration_error
 
 
-@dataclass(frozen=True)
+@record
 class Selected:
     """The model that the config asks for."""
 
@@ -52,7 +53,7 @@ class Selected:
         return self.model.n
 
 
-@dataclass(frozen=True)
+@record
 class Leanest:
     """The function with the fewest operations within what is asked for."""
 
@@ -72,7 +73,7 @@ class DataChange(StrEnum):
     """Every so many samples only."""
 
 
-@dataclass(frozen=True)
+@record
 class DataVariant:
     """A variant of the data on which a selection is repeated."""
 
@@ -88,7 +89,7 @@ class DataVariant:
         return "all"
 
 
-@dataclass(frozen=True)
+@record
 class Stability:
     """The selections on variants of the data; arrays have one row per variant."""
 
@@ -101,7 +102,7 @@ class Stability:
     """Of each subset on its own data, (n_variants,)."""
 
 
-@dataclass(frozen=True)
+@record
 class CrossValidation(BySize):
     """The errors of one heuristic's subsets in cross-validation: on parts of the data that were left out of the fit."""
 
@@ -131,7 +132,7 @@ class About(StrEnum):
     """Subsets of one or several heuristics."""
 
 
-@dataclass(frozen=True)
+@record
 class ModelWarning:
     """A reason not to trust a model everywhere."""
 
@@ -139,7 +140,7 @@ class ModelWarning:
     text: str
 
 
-@dataclass(frozen=True)
+@record
 class Validation:
     """The errors and costs of all reduced models, the selected model, and whether it is accepted."""
 
@@ -165,3 +166,6 @@ class Validation:
     verdict: str
     """One sentence that says why."""
     warnings: tuple[ModelWarning, ...]
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "heuristics", Choices(self.heuristics))

@@ -87,6 +87,9 @@ class Robot(Section):
         """Number of independent coordinates."""
         return len(self.description.bodies.list_independent_coordinates())
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}(robot={self.robot!r}, n_dof={self.n_dof})"
+
     def build_mechanism(self) -> Mechanism:
         """Return the mechanism as it is described; loops are not assembled yet."""
         bodies = self.description.bodies

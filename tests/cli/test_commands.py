@@ -331,3 +331,43 @@ def test_init_asks_for_the_motion_of_a_base_that_floats(invoke, tmp_path):
     assert "leave --floating out" in refused
     assert not path.exists()
     invoke(*words)
+
+
+def test_inspect_begins_with_results_and_keeps_digests_for_later(invoke, two_link_results):
+    for name, heading in (
+        ("validation.h5", "Torque error on the test set, median of its motions"),
+        ("reduction.h5", "Torque error on the estimation set"),
+        ("trajectories.h5", "Trajectories of"),
+        ("model.h5", "20 parameters, 7 act on the torques, 6 base parameters"),
+    ):
+        shown = invoke("inspect", two_link_results / name).out
+        assert shown.startswith(heading)
+        assert "digest: " in shown
+    errors = invoke("inspect", two_link_results / "reduction.h5").out
+    reduction = load_file(two_link_results / "reduction.h5", Reduction, None, "")[0]
+    row = next(line for line in errors.splitlines() if line.startswith("3 "))
+    assert row.split()[1] == f"{100 * reduction.heuristics['qr'].torque_error[2]:.3g}"
+
+
+def test_records_of_tables_are_those_that_the_stages_make():
+    from paramreduce_cli.cli.artifact_tables import _RECORDS
+    from paramreduce_cli.running.pipeline import describe_stage
+    from paramreduce_cli.stages import stages
+
+    made = {name: describe_stage(name, stages[name]).output for name in _RECORDS}
+    assert made == _RECORDS
+
+
+def test_compare_says_the_worst_of_each_quantity(invoke, two_link_results, tmp_path):
+    other = tmp_path / "other.json"
+    summary = json.loads((two_link_results / "report/summary.json").read_text())
+    assert summary.pop("provenance")  # whose digest would not fit
+    for n, row in enumerate(summary["validation"]["qr"][:4], 1):
+        row["torque_error"]["estimation"] *= 1 + n
+    other.write_text(json.dumps(summary))
+    short = invoke("compare", two_link_results, other, "--only", "torque_error", code=1).out
+    assert "differ: 4 differences beyond tolerance, 0 within" in short
+    assert len(short.splitlines()) == 3
+    assert "qr, n = 4" in short, "the worst one"
+    long = invoke("compare", two_link_results, other, "--only", "torque_error", "-v", code=1).out
+    assert [f"qr, n = {n}:" in long for n in (1, 2, 3, 4)] == [True] * 4

@@ -7,7 +7,8 @@ import rich.box
 import rich.table
 
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.options import SET, FilePath
+from paramreduce_cli.cli.options import SET
+from paramreduce_cli.cli.path_types import ConfigPath
 from paramreduce_cli.cli.terminal import LOG, say, say_table, warn_user
 from paramreduce_cli.config import load_config, locate_errors
 from paramreduce_cli.config.column_matching import guess_columns, list_named_joints
@@ -27,7 +28,7 @@ _TABLE_WIDTH = 100
     config="configs/ur10.yaml",
 )
 @click.argument("file", type=click.Path(path_type=Path))
-@click.argument("config", type=FilePath(), required=False)
+@click.argument("config", type=ConfigPath(), required=False)
 @SET
 @LOG
 def check_data(file: Path, config: Path | None, overrides: tuple[str, ...]) -> None:

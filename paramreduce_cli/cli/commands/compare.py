@@ -8,7 +8,7 @@ import click
 
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.options import ResultsPath
+from paramreduce_cli.cli.path_types import ResultsPath
 from paramreduce_cli.cli.terminal import JSON, LOG, VERBOSE, emit, journal, say
 from paramreduce_cli.errors import ConfigError
 from paramreduce_cli.report.summary_comparison import QUANTITIES, TOLERANCES, Difference, Tolerance

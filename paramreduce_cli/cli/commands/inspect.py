@@ -18,7 +18,7 @@ from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.inspection import list_contents
 from paramreduce_cli.artifacts.report_files import load_summary, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.options import ResultsPath
+from paramreduce_cli.cli.path_types import ResultsPath
 from paramreduce_cli.cli.project_state import list_results_below, make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, escape_controls, out, say, say_table
 from paramreduce_cli.errors import ArtifactError, ConfigError, ParamreduceWarning

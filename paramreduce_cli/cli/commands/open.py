@@ -7,7 +7,7 @@ import click
 
 from paramreduce_cli.artifacts.report_files import list_newer_artifacts, verify_report
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.options import ResultsPath
+from paramreduce_cli.cli.path_types import ResultsPath
 from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import print_error, say
 

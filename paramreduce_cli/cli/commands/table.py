@@ -11,7 +11,7 @@ from paramreduce_cli.artifacts.atomic import replace_atomically
 from paramreduce_cli.artifacts.folder_layout import SUMMARY
 from paramreduce_cli.artifacts.report_files import load_summary
 from paramreduce_cli.cli.example_command import ExampleCommand
-from paramreduce_cli.cli.options import ResultsPath
+from paramreduce_cli.cli.path_types import ResultsPath
 from paramreduce_cli.cli.project_state import make_no_results_error
 from paramreduce_cli.cli.terminal import JSON, LOG, emit, say, warn_user
 from paramreduce_cli.errors import ArtifactError, ConfigError
