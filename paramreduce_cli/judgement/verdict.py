@@ -6,6 +6,7 @@ import numpy as np
 
 from paramreduce_cli.config.schema import Acceptance
 from paramreduce_cli.records import (
+    INVERSE_ONLY,
     About,
     BoolArray,
     ErrorRange,
@@ -91,7 +92,7 @@ def _check_subsets(
         unsafe,
         f"n ≤ {last}: do not simulate; the mass matrix is indefinite on some samples, or more than "
         f"{_CONDITION_FACTOR:g} times nearer to singular than with all parameters.",
-        "is good for inverse dynamics only; do not simulate with it.",
+        INVERSE_ONLY,
     )
     for what in ("torque", "acceleration"):
         apart = _find_overfitted(result, what)

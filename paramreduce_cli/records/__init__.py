@@ -92,6 +92,7 @@ from paramreduce_cli.records.trajectories import (
     Trajectory,
 )
 from paramreduce_cli.records.validation import (
+    INVERSE_ONLY,
     About,
     CrossValidation,
     DataChange,

@@ -4,8 +4,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paramreduce_cli.records import ReducedModel, Speed
+from paramreduce_cli.records import INVERSE_ONLY, About, ErrorRange, ReducedModel, Speed, Validation
 from paramreduce_cli.report.data import NO_TORQUE, ReportData
+from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.measured_values import format_measured
 
 _WEIGHTED = {
@@ -46,7 +47,13 @@ class Answer:
     weighted: str
     """How errors weight the joints elsewhere on the page; empty where they do not."""
     command: str
-    """That writes the model as code."""
+    """Command that writes the model as code."""
+    kind: str
+    """Class of the verdict's box: empty if the model is accepted, mixed with warnings, no if not, open if not judged."""
+    headline: str
+    """Advice in a few words; empty where the verdict is enough."""
+    neighbours: str
+    """Errors with one parameter more and less; empty where there are no such models."""
 
 
 def gather_answer(data: ReportData, options: str) -> Answer:
@@ -69,7 +76,47 @@ def gather_answer(data: ReportData, options: str) -> Answer:
         as_identified=_has_identified_values(data),
         weighted=_WEIGHTED[data.weighting],
         command=export if data.model is not None else f"{export} --format values",
+        kind=_choose_kind(data.validation),
+        headline=_choose_headline(data.validation),
+        neighbours=_describe_neighbours(data.validation),
     )
+
+
+def _choose_kind(validation: Validation) -> str:
+    """Return the class of the verdict's box."""
+    if validation.accepted is False:
+        return "no"
+    if any(warning.about is About.SELECTED for warning in validation.warnings):
+        return "mixed"
+    return "open" if validation.accepted is None else ""
+
+
+def _choose_headline(validation: Validation) -> str:
+    """Return what the selected model is good for, if it is good for one function only."""
+    unsafe = any(
+        warning.about is About.SELECTED and warning.text.endswith(INVERSE_ONLY)
+        for warning in validation.warnings
+    )
+    if validation.accepted is False:
+        return "Not accepted."
+    return "Good for feed-forward; do not simulate with it." if unsafe else ""
+
+
+def _describe_neighbours(validation: Validation) -> str:
+    """Return the errors of the selected heuristic with one parameter less and one more."""
+    n, result = validation.selected.n, validation.heuristics[validation.selected.heuristic]
+    errors, part = result.torque_error.validation, "validation"
+    if result.torque_error.test.size:
+        errors = np.array([ErrorRange.summarise(row).median for row in result.torque_error.test])
+        part = "test"
+    elif np.isnan(errors).all():
+        errors, part = result.torque_error.estimation, "estimation"
+    known = [
+        f"with {size} {'parameter' if size == 1 else 'parameters'} {format_percent(float(errors[row]))}"
+        for size in (n - 1, n + 1)
+        if (row := result.find_row(size)) is not None
+    ]
+    return f"Torque error on the {part} set: {', '.join(known)}." if known else ""
 
 
 def _list_parameters(data: ReportData, model: ReducedModel) -> tuple[ShownParameter, ...]:

@@ -7,11 +7,19 @@ import numpy as np
 from paramreduce_cli.records import BoolArray, FloatArray, HeuristicValidation, ModelChoice
 from paramreduce_cli.report.data import ReportData
 
-COLOURS = (
-    "#7d8590", "#0b62c4", "#d9730d", "#8e5bb5", "#2f8f5b", "#a97a0c", "#c2384f", "#3a88c8", "#7a6a53",
-    "#0b8f8f",
-)  # fmt: skip
-"""Of heuristics in their order, neighbours far apart; all of them stand out from white by 3 to 1."""
+COLOURS = ("#6a002a", "#1500bf", "#954000", "#00956a", "#aa15ea", "#ff2a15", "#ff40bf", "#006a6a")
+"""Colours of curves on white; any two differ by a CIEDE2000 distance of 20, also for deuteranopes."""
+DARK_COLOURS = (
+    "#ffff15",
+    "#5555ff",
+    "#ff6a00",
+    "#008000",
+    "#ff55ff",
+    "#ff0080",
+    "#00ffd4",
+    "#2a8080",
+)
+"""Colours of the same curves on a dark page, as far apart."""
 MARKERS = ("s", "o", "v", "P", "^", "X", "D", "*", "p")
 EQUAL = 1e-4
 """Relative difference of values that single precision and other orders of columns explain."""
@@ -24,6 +32,8 @@ class Curve:
     names: tuple[str, ...]
     result: HeuristicValidation
     colour: str
+    dark_colour: str
+    """Colour on a dark page."""
     marker: str
     own: BoolArray
     """Which rows to draw: those that no curve before has, and where they meet it, (n_rows,)."""
@@ -43,7 +53,7 @@ def gather_curves(data: ReportData) -> list[Curve]:
     found: list[Curve] = []
     seen: dict[int, list[_Values]] = {}
     models: list[list[_Values]] = []
-    for k, (name, result) in enumerate(data.validation.heuristics.items()):
+    for name, result in data.validation.heuristics.items():
         sizes = result.n.tolist()
         own = [_find_values(data, ModelChoice(name, n)) for n in sizes]
         place = _find_same_curve(own, sizes, found, models)
@@ -57,8 +67,10 @@ def gather_curves(data: ReportData) -> list[Curve]:
         for n, values in zip(sizes, own, strict=True):
             seen.setdefault(n, []).append(values)
         models.append(own)
-        colour, marker = COLOURS[k % len(COLOURS)], MARKERS[k % len(MARKERS)]
-        found.append(Curve((name,), result, colour, marker, _mark_neighbours(np.array(fresh))))
+        k = len(found)
+        colours = COLOURS[k % len(COLOURS)], DARK_COLOURS[k % len(DARK_COLOURS)]
+        marker = MARKERS[k % len(MARKERS)]
+        found.append(Curve((name,), result, *colours, marker, _mark_neighbours(np.array(fresh))))
     return found
 
 

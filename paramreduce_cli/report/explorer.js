@@ -13,8 +13,8 @@
     return made;
   };
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  // Colours of curves stand out from white; on a dark page they are lightened, but not on paper.
-  const shade = (own) => (dark.matches ? `color-mix(in srgb, ${own} 60%, white)` : own);
+  // Curves have a colour for each ground.
+  const shade = (curve) => (dark.matches ? curve.dark : curve.colour);
   // A canvas as PNG, on the ground that it lies on.
   // One or several, one below the other, and what their colours mean.
   function picture(canvases, names = []) {
@@ -60,7 +60,8 @@
     motion: await unpacked(data.motion),
     figure: await unpacked(data.figure),
   });
-  root.hidden = document.querySelector("nav .live").hidden = false;
+  root.hidden = false;
+  document.querySelectorAll("nav .live").forEach((link) => { link.hidden = false; });
   const nSamples = motion.time.length;
   const nDof = motion.tau.length / nSamples;
   const DASHED = { estimation: "— estimation", validation: "- - validation", test: "··· test, median" };
@@ -94,7 +95,13 @@
 
   // ---- state
 
-  const state = { curve: 0, row: 0, hidden: new Set(), sets: new Set(SETS) };
+  // Three heuristics and one set at first, so that the curves can be told apart: the selected one, the best, the usual one.
+  const FIRST = [data.selected.heuristic, "best-subset", "forward-selection", ...curves.flatMap((c) => c.names)];
+  const firstCurves = [...new Set(FIRST.map((name) => curves.findIndex((c) => c.names.includes(name))))].filter((k) => k >= 0).slice(0, 3);
+  const state = {
+    curve: 0, row: 0, other: null, sets: new Set(SETS.slice(0, 1)),
+    hidden: new Set(curves.map((_, k) => k).filter((k) => !firstCurves.includes(k))),
+  };
   const named = (name) => Math.max(0, curves.findIndex((c) => c.names.includes(name)));
   const rowOf = (curve, n) => {
     const all = curves[curve].n;
@@ -102,17 +109,18 @@
     all.forEach((m, k) => { if (Math.abs(m - n) < Math.abs(all[best] - n)) best = k; });
     return best;
   };
+  const MODEL = /^#(.+):(\d+)$/; // of an address that shows a model, such as #best-subset:18
+  const nameOf = (curve, row) => `${curves[curve].names[0]}:${curves[curve].n[row]}`;
   function fromAddress() {
-    const asked = new URLSearchParams(location.hash.slice(1));
-    state.curve = named(asked.get("heuristic") ?? data.selected.heuristic);
-    state.row = rowOf(state.curve, Number(asked.get("n") ?? data.selected.n));
+    const [, heuristic, n] = decodeURIComponent(location.hash).match(MODEL) ?? [];
+    state.curve = named(heuristic ?? data.selected.heuristic);
+    state.row = rowOf(state.curve, Number(n ?? data.selected.n));
   }
   const followers = [];
   function go(curve, row) {
     state.curve = curve;
     state.row = Math.min(Math.max(row, 0), curves[curve].n.length - 1);
-    const own = curves[state.curve];
-    history.replaceState(null, "", `#heuristic=${encodeURIComponent(own.names[0])}&n=${own.n[state.row]}`);
+    history.replaceState(null, "", `#${nameOf(state.curve, state.row)}`);
     follow();
   }
   function follow() {
@@ -130,12 +138,40 @@
   slider.addEventListener("input", () => go(state.curve, +slider.value));
   const tolerance = part("tolerance");
   tolerance.addEventListener("change", () => {
-    if (tolerance.value === "") return;
-    const limit = Math.max(+tolerance.value / 100, 1e-10);
-    const rows = curves[state.curve].n.map((_, k) => k);
-    const kept = rows.find((k) => SETS.every((s) => s === "test" ||  curves[state.curve].torque[s][k] <= limit));
-    if (kept !== undefined) go(state.curve, kept);
-    else part("no-such").hidden = false;
+    const text = tolerance.value.trim().replace(/ ?%$/, "").replace(",", ".");
+    if (text === "") return;
+    if (!(Number(text) > 0)) return refuse(`"${tolerance.value}" is not a positive number; write one such as 1.5`);
+    const own = curves[state.curve], limit = Math.max(Number(text) / 100, 1e-10);
+    const worst = own.n.map((_, k) => Math.max(...SETS.filter((s) => s !== "test").map((s) => own.torque[s][k]).filter((e) => !Number.isNaN(e))));
+    const kept = worst.findIndex((error) => error <= limit);
+    if (kept >= 0) go(state.curve, kept);
+    else refuse(`no model of ${own.names[0]} is within ${text} %; the least error is ${percent(Math.min(...worst))}`);
+  });
+  function refuse(text) {
+    Object.assign(part("no-such"), { hidden: false, textContent: text });
+  }
+  const pin = part("pin");
+  pin.addEventListener("click", () => {
+    state.other = state.other ? null : { curve: state.curve, row: state.row };
+    pin.textContent = state.other ? `Stop comparing with ${nameOf(state.other.curve, state.other.row)}` : "Compare with another model";
+    follow();
+  });
+  // Two models side by side: numbers, and parameters of one alone.
+  function versus(curve, row) {
+    const c = curves[curve], count = (key) => `${c.operations[key]?.[row] ?? "–"}`;
+    const counted = data.counted ? [["acceleration error", pair(c.acceleration, row)], ["operations, inverse dynamics", count("inverse")], ["operations, direct dynamics", count("direct")]] : [];
+    return [["parameters", `${c.n[row]}`], [`torque error, ${SETS.join(" / ")}`, pair(c.torque, row)], ...counted];
+  }
+  followers.push((curve, row, model) => {
+    const place = part("versus"), other = state.other;
+    place.hidden = part("pinned-key").hidden = !other;
+    if (!other) return;
+    const [mine, theirs] = [model, modelOf(curves[other.curve], other.row)].map((one) => new Set(one.columns));
+    const alone = (a, b) => [...a].filter((k) => !b.has(k)).map((k) => columns[k].name).join(" ") || "none";
+    const left = versus(state.curve, row), right = versus(other.curve, other.row);
+    const lines = [["", nameOf(state.curve, row), nameOf(other.curve, other.row)], ...left.map(([what, value], k) => [what, value, right[k][1]]),
+      ["parameters of one alone", alone(mine, theirs), alone(theirs, mine)]];
+    place.querySelector("table").replaceChildren(...lines.map((line, k) => element("tr", {}, ...line.map((text) => element(k ? "td" : "th", { textContent: text, className: text.length > 60 ? "long" : "" })))));
   });
   followers.push((curve, row, model) => {
     part("no-such").hidden = true;
@@ -157,9 +193,10 @@
     const values = new Map(Array.from(model.columns, (k, i) => [k, model.values[i]]));
     const told = ([k, value]) => `${columns[k].name} = ${Number(value.toPrecision(6))} ${columns[k].unit.replace("^2", "²")}`.trimEnd();
     part("values").textContent = [...values].map(told).join("; ");
+    const others_ = new Set(state.other ? modelOf(curves[state.other.curve], state.other.row).columns : []);
     columns.forEach((column, k) => {
       const kept = values.has(k);
-      column.chip.className = kept ? "chip kept" : "chip";
+      column.chip.className = `chip${kept ? " kept" : ""}${others_.has(k) ? " other" : ""}`;
       const value = kept ? `${column.name} = ${Number(values.get(k).toPrecision(6))} ${column.unit}` : `${column.name}: dropped`;
       column.chip.title = value;
     });
@@ -204,12 +241,13 @@
   });
   const isPower = (v) => Math.abs(Math.log10(v) - Math.round(Math.log10(v))) < 1e-6;
   const powersOnly = (u, ticks) => ticks.map((v) => (isPower(v) ? v : null));
-  const spelled = (v) => (v >= 0.9e-5 ? `${Number((100 * v).toPrecision(3))} %` : `1e${Math.round(Math.log10(v)) + 2} %`);
+  const FLOOR = 1e-5; // errors below are drawn there: what is exact, but for rounding
+  const spelled = (v) => `${Number((100 * v).toPrecision(3))} %`;
   const errorAxis = (label) => {
     const lines = { stroke: () => colour("--line"), width: 1, filter: powersOnly };
     return axis(label, { filter: powersOnly, grid: lines, ticks: lines, size: 66, values: (u, ticks) => ticks.map((v) => (v === null ? null : spelled(v))) });
   };
-  const errorScale = { distr: 3, range: (u, low, high) => [Math.max(low || 1e-7, 1e-7) / 1.5, Math.min(high || 1, 10) * 1.5] };
+  const errorScale = { distr: 3, range: (u, low, high) => [Math.max(low || FLOOR, FLOOR) / 1.5, Math.min(high || 1, 10) * 1.5] };
   function plot(place, height, options, values) {
     const made = new uPlot({
       width: Math.max(place.clientWidth, 200), height, legend: { show: false }, cursor: { drag: { x: false, y: false } }, ...options,
@@ -221,7 +259,7 @@
     drawn.push(made);
     return made;
   }
-  const visible = (value) => (Number.isFinite(value) ? Math.max(value, 1e-7) : null);
+  const visible = (value) => (Number.isFinite(value) ? Math.max(value, FLOOR) : null);
 
   // Points of a chart that can be pointed at: what is nearest is named, and a click goes there.
   function pointing(u, points, spot) {
@@ -257,14 +295,18 @@
   // Error against the number of parameters. What several heuristics found is drawn once, for the first one that is shown.
   const largest = Math.max(...curves.flatMap((c) => c.n));
   const ns = Array.from({ length: largest }, (_, k) => k + 1);
-  const lines = curves.flatMap((c, k) => SETS.map((set) => ({ curve: k, set })));
+  // The best subset is the headline: drawn last, and thick.
+  const isBest = (k) => curves[k].names.includes("best-subset");
+  const order = curves.map((_, k) => k).reverse().sort((a, b) => isBest(a) - isBest(b));
+  const lines = order.flatMap((k) => SETS.map((set) => ({ curve: k, set })));
   function ownRows() {
-    const seen = new Set();
-    return curves.map((c, k) => {
-      const fresh = Array.from(c.model, (model) => model < 0 || !seen.has(model));
-      if (!state.hidden.has(k)) c.model.forEach((model) => seen.add(model));
-      return fresh.map((own, row) => own || fresh[row - 1] || fresh[row + 1]);  // lines go on to where curves meet
-    });
+    const seen = new Set(), rows = [];
+    for (const k of [...order].reverse()) { // the best subset first: it is drawn last
+      const fresh = Array.from(curves[k].model, (model) => model < 0 || !seen.has(model));
+      if (!state.hidden.has(k)) curves[k].model.forEach((model) => seen.add(model));
+      rows[k] = fresh.map((own, row) => own || fresh[row - 1] || fresh[row + 1]);  // lines go on to where curves meet
+    }
+    return rows;
   }
   function against() {
     const own = ownRows();
@@ -295,16 +337,17 @@
     u.ctx.stroke();
     u.ctx.restore();
   };
-  const errorChart = plot(part("error-chart"), 300, {
+  const errorChart = plot(part("error-chart"), 280, {
     scales: { x: { time: false, range: [0, largest + 1] }, y: errorScale },
     axes: [axis("number of parameters n", { incrs: [1, 2, 5, 10, 20, 50, 100] }), errorAxis("torque error")],
     series: [{}, ...lines.map(({ curve, set }) => ({
-      stroke: () => shade(curves[curve].colour), width: 1.6, dash: { validation: [5, 4], test: [1, 3] }[set], spanGaps: false, points: { show: set === "estimation", size: 4 },
+      show: !state.hidden.has(curve) && state.sets.has(set),
+      stroke: () => shade(curves[curve]), width: isBest(curve) && set === "estimation" ? 3.2 : 1.6, dash: { validation: [5, 4], test: [1, 3] }[set], spanGaps: false, points: { show: set === "estimation", size: 4 },
     }))],
     hooks: { draw: [(u) => {
       const own = curves[state.curve];
       upright(u, own.n[state.row]);
-      ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), shade(own.colour));
+      ring(u, own.n[state.row], visible(own.torque.estimation[state.row]), shade(own));
     }] },
   }, [ns, ...against()]);
   pointing(errorChart, () => shownCurves().flatMap((k) => SETS.filter((s) => state.sets.has(s)).flatMap((set) =>
@@ -327,10 +370,10 @@
   }
   curves.forEach((c, k) => {
     const mark = element("i");
-    mark.style.background = shade(c.colour);
-    dark.addEventListener("change", () => { mark.style.background = shade(c.colour); });
+    mark.style.background = shade(c);
+    dark.addEventListener("change", () => { mark.style.background = shade(c); });
     const button = element("button", { type: "button" }, mark, c.names.join(", "));
-    toggled(button, true);
+    toggled(button, !state.hidden.has(k));
     button.addEventListener("click", () => {
       const off = state.hidden.has(k);
       off ? state.hidden.delete(k) : state.hidden.add(k);
@@ -341,7 +384,7 @@
   });
   SETS.forEach((set) => {
     const button = element("button", { type: "button", className: "set" }, DASHED[set]);
-    toggled(button, true);
+    toggled(button, state.sets.has(set));
     button.addEventListener("click", () => {
       const on = state.sets.has(set);
       on ? state.sets.delete(set) : state.sets.add(set);
@@ -356,22 +399,22 @@
   function costChart(key, label) {
     const all = curves.flatMap((c, k) => c.n.map((_, row) => ({ x: c.operations[key][row], y: visible(c.torque.estimation[row]), curve: k, row, text: spoken(k, row) }))).filter((p) => p.x !== null && p.y !== null);
     const [counts, found] = data.terms[key] ?? [[], []];
-    const terms = counts.map((x, k) => ({ x, y: visible(found[k]), terms: true, text: `terms left out: ${x} operations, ${percent(found[k])}` }));
+    const terms = counts.map((x, k) => ({ x, y: visible(found[k]), terms: true, text: `pruned terms: ${x} operations, ${percent(found[k])}` }));
     const points = [...all, ...terms].sort((a, b) => a.x - b.x || b.y - a.y);
     let best = Infinity;
     const front = points.map((p) => (p.terms || p.y >= best ? null : (best = p.y)));
     const series = curves.map((_, k) => points.map((p) => (p.curve === k ? p.y : null)));
     const dots = (stroke) => ({ stroke, paths: () => null, points: { show: true, size: 5, stroke, fill: stroke } });
     const line = (stroke, dash) => ({ stroke, width: 1.6, dash, spanGaps: true, points: { show: false } });
-    const chart = plot(part(`${key}-chart`), 300, {
+    const chart = plot(part(`${key}-chart`), 260, {
       scales: { x: { time: false }, y: errorScale },
       axes: [axis(`operations of ${label}`), errorAxis("torque error, estimation")],
-      series: [{}, ...curves.map((c) => dots(() => shade(c.colour))),
+      series: [{}, ...curves.map((c, k) => ({ ...dots(() => shade(c)), show: !state.hidden.has(k) })),
         { ...line(() => colour("--ink")), paths: uPlot.paths.stepped({ align: 1 }) },
         { ...line(() => colour("--blue"), [2, 3]), points: { show: true, size: 5, stroke: () => colour("--blue"), fill: () => colour("--card") } }],
       hooks: { draw: [(u) => {
         const own = curves[state.curve];
-        ring(u, own.operations[key][state.row], visible(own.torque.estimation[state.row]), shade(own.colour));
+        ring(u, own.operations[key][state.row], visible(own.torque.estimation[state.row]), shade(own));
       }] },
     }, [points.map((p) => p.x), ...series, front, points.map((p) => (p.terms ? p.y : null))]);
     pointing(chart, () => points.filter((p) => p.terms || !state.hidden.has(p.curve)), part(`${key}-spot`));
@@ -384,7 +427,7 @@
   }
   for (const name of ["error-chart", "inverse-chart", "direct-chart"]) {
     const place = part(name);
-    const names = () => curves.flatMap((c, k) => (state.hidden.has(k) ? [] : [[c.names.join(", "), shade(c.colour)]]));
+    const names = () => curves.flatMap((c, k) => (state.hidden.has(k) ? [] : [[c.names.join(", "), shade(c)]]));
     if (place) savable(place, `${name}.png`, () => picture([place.querySelector("canvas")], names()));
   }
 
@@ -399,23 +442,24 @@
     place.append(upper, lower);
     part("torques").append(place);
     const given = Float64Array.from({ length: nSamples }, (_, t) => motion.tau[t * nDof + joint.index]);
-    const names = () => [[`${joint.name}${unit}, ${first}`, colour("--blue")], [`${curves[state.curve].names[0]}:${curves[state.curve].n[state.row]}`, colour("--ink")], ["what it misses", colour("--bad")]];
+    const names = () => [[`${joint.name}${unit}, ${first}`, colour("--blue")], [`${curves[state.curve].names[0]}:${curves[state.curve].n[state.row]}`, colour("--ink")], ["error", colour("--bad")]];
     savable(place, `torque-${joint.name}.png`, () => picture([upper, lower].map((one) => one.querySelector("canvas")), names()));
     let charts = null;
     const show = (model) => {
-      const values = torque(model, joint.index);
+      const values = torque(model, joint.index), other = state.other;
+      const pinned = other ? torque(modelOf(curves[other.curve], other.row), joint.index) : new Array(nSamples).fill(null);
       const missed = values.map((v, t) => given[t] - v);
       if (charts) {
-        charts[0].setData([motion.time, given, values]);
+        charts[0].setData([motion.time, given, pinned, values]);
         charts[1].setData([motion.time, missed]);
         return;
       }
       const numbers = (u, ticks) => ticks.map((v) => `${Number(v.toPrecision(3))}`);
       const shared = { scales: { x: { time: false } }, cursor: { drag: { x: true, y: false }, sync: { key: "time" } } };
       charts = [
-        plot(upper, 130, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 60, values: numbers })],
-          series: [{}, { stroke: () => colour("--blue"), width: 1.8 }, { stroke: () => colour("--ink"), width: 1.2, dash: [5, 4] }] }, [motion.time, given, values]),
-        plot(lower, 80, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 60, space: 11, values: numbers })],
+        plot(upper, 120, { ...shared, axes: [axis(undefined, { values: (u, t) => t.map(() => ""), size: 8 }), axis(undefined, { size: 60, values: numbers })],
+          series: [{}, { stroke: () => colour("--blue"), width: 1.8 }, { stroke: () => colour("--orange"), width: 1.4 }, { stroke: () => colour("--ink"), width: 1.2, dash: [5, 4] }] }, [motion.time, given, pinned, values]),
+        plot(lower, 70, { ...shared, axes: [axis(undefined, { size: 26 }), axis(undefined, { size: 60, space: 11, values: numbers })],
           series: [{}, { stroke: () => colour("--bad"), width: 1.2 }] }, [motion.time, missed]),
       ];
     };
@@ -595,10 +639,10 @@
   }
 
   dark.addEventListener("change", () => drawn.forEach((chart) => chart.redraw()));
-  addEventListener("hashchange", () => { if (/[#&](heuristic|n)=/.test(location.hash)) { fromAddress(); follow(); } });
+  addEventListener("hashchange", () => { if (MODEL.test(decodeURIComponent(location.hash))) { fromAddress(); follow(); } });
   fromAddress();
   follow();
   // The browser has gone to a section before there was an explorer above it, or when it was hidden.
-  document.getElementById(location.hash.slice(1))?.scrollIntoView();
+  document.getElementById(MODEL.test(decodeURIComponent(location.hash)) ? "explorer" : location.hash.slice(1))?.scrollIntoView();
   root.dataset.ready = "true";
 })();

@@ -96,6 +96,7 @@ def _list_curves(data: ReportData, library: _Models) -> list[dict[str, Any]]:
         {
             "names": curve.names,
             "colour": curve.colour,
+            "dark": curve.dark_colour,
             "n": curve.result.n.tolist(),
             "model": [
                 library.number_model(ModelChoice(curve.names[0], n))

@@ -10,8 +10,8 @@ from paramreduce_cli.texts.table import Table
 Summary = Mapping[str, Any]
 
 HEADER = (
-    "heuristic", "n_φ", "r", "n", "d", "d, n", "saved", "ε_τ E", "ε_τ V", "ε_τ T",
-    "M, δ", "M, δ, n", "saved", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T",
+    "heuristic", "acting", "base", "n", "operations inverse, full", "operations inverse", "saved, inverse", "torque error est.", "torque error val.", "torque error test",
+    "operations direct, full", "operations direct", "saved, direct", "accel. error est.", "accel. error val.", "accel. error test",
 )  # fmt: skip
 
 

@@ -69,10 +69,11 @@ def render_page(
             "title": section.title,
             "anchor": section.name.lower(),
             "text": environment.from_string(section.text).render(context),
+            "unfolded": section.unfolded,
             "items": items[section],
         }
         for section in PageSection
-        if items[section]
+        if items[section] or section is PageSection.PAPER
     ]
     page = environment.from_string(_read_text("page.html"))
     told, bibtex = write_methods(data)

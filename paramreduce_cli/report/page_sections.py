@@ -9,74 +9,76 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 
 class PageSection(Enum):
-    """A heading and what is said under it, a template over the summary ``s``; in this order.
+    """A section of the page, in order: title, text (a template over the summary ``s``), and two flags.
 
-    Some tell of a mechanism, and stand on the page only where there is one.
+    The flags are whether the section needs a mechanism, and whether it is unfolded at first.
     """
 
-    HEURISTICS = ("All heuristics", "")
+    HEURISTICS = ("Heuristics at the selected size", "", False, True)
     IDENTIFICATION = (
-        "What the measurements say",
-        "Measured torques of the part that was held out: nothing was learned from it, nor the number of "
-        "parameters chosen by it. Standard deviations are for noise as coloured as the residuals.",
+        "Identified parameters",
+        "Errors are on the held-out part of the log, which was used neither for training nor to choose n. "
+        "Standard deviations hold for noise as coloured as the residuals.",
+        False,
+        True,
     )
-    LOG = (
-        "The log",
-        "What was recorded, and what became of it before anything was learned from it.",
-    )
+    LOG = ("Log", "The recorded signals and their processing.")
     SELECTED = (
-        "The selected model",
-        "Each parameter below stands for itself and takes over a share of those that were dropped.",
+        "Parameters of the selected model",
+        "Each parameter is lumped: it also stands for a part of the removed parameters.",
     )
     PROOFS = (
-        "How good it could be",
-        "No subset of n parameters has a torque error below the bound; where the bound meets a "
-        "heuristic, that is the best there is.",
+        "Proven bounds",
+        "No subset of n parameters has a torque error below the bound. Where the bound meets a heuristic, its subset is "
+        "optimal.",
     )
     STABILITY = (
-        "How much it depends on the data",
-        "The selection repeated by torque with each trajectory left out and with fewer samples. Blue: "
-        "chosen with all data; bars of the values run from the smallest to the largest that came out.",
+        "Sensitivity to the data",
+        "The selection is repeated with each trajectory left out, and with fewer samples. Blue: selected with all data. "
+        "Bars range from the smallest to the largest value.",
     )
     SAVINGS = (
-        "What it saves",
-        "Non-repeated sums, products and function calls, parameters as run-time inputs. <b>Lean</b>: of "
-        "the leanest formulation found, as <code>paramreduce export</code> writes it; all other counts "
-        "on this page are of this kind. <b>Plain recursion</b>: Newton-Euler as in a textbook, with "
-        "common subexpressions. <b>The paper's rule</b>: plain recursion with sign changes counted. "
-        "{{ 'With loops, d and [M, δ] are those of the open tree; exported functions, which also "
-        "project, say their own count.' if loops }}",
+        "Operations",
+        "Counted are distinct sums, products and function calls, with parameters as run-time inputs. <b>Lean</b>: the "
+        "leanest formulation found, as <code>paramreduce export</code> writes it; all other counts on this page are lean. "
+        "<b>Textbook recursion</b>: Newton-Euler with common subexpressions. <b>The paper's rule</b>: textbook recursion, "
+        "sign changes counted too. {{ 'With loops, d and [M, δ] are those of the open tree; exported functions include "
+        "the projection and state their own count.' if loops }}",
+        True,
         True,
     )
     TERMS = (
-        "Without small terms",
-        "Addends of the lean functions were left out too, nodes that hardly differ from a multiple of others replaced by "
-        "it, and the parameters that remain fitted again; each "
-        "function has values of its own. Such a function holds where it was fitted: inside the ranges of the "
-        "estimation set. <code>paramreduce export --model terms --what idm</code> (or <code>ddm</code>) writes it.",
+        "Pruned terms",
+        "Negligible terms of the lean functions are removed, nodes close to a multiple of another node are replaced, and "
+        "the remaining parameters are fitted again. Each function has its own values, and holds only inside the ranges "
+        "of the estimation set. <code>paramreduce export --model terms --what idm</code> (or <code>ddm</code>) writes it.",
         True,
     )
     TRACKING = (
-        "What it is for",
-        "The arm follows the full model; the controller evaluates exported code, whose torques are held "
-        "for one period.",
+        "Control with the reduced model",
+        "The simulated arm follows the full model. The controller evaluates exported code, and its torques are held for "
+        "one period.",
         True,
     )
-    ACCELERATIONS = ("Accelerations", "", True)
-    MECHANISM = ("The mechanism", "", True)
+    ACCELERATIONS = ("Accelerations and mass matrix", "", True)
+    MECHANISM = ("Mechanism", "", True)
     BASE = (
         "Base parameters",
-        "Rank {{ s.model.n_base }}; the singular values drop by a factor of "
+        "The rank is {{ s.model.n_base }}. The singular values drop by a factor of "
         "{{ '%.2g'|format(s.model.rank_gap) if s.model.rank_gap else '∞' }} after it.",
         True,
     )
     TRAJECTORIES = ("Exciting trajectories", "", True)
-    ORDERING = ("Parameter ordering", "")
+    ORDERING = ("Order of the parameters", "")
+    PAPER = ("For a paper", "Text, citations, and figures without interaction.")
 
-    def __init__(self, title: str, text: str, of_mechanism: bool = False) -> None:
+    def __init__(
+        self, title: str, text: str, of_mechanism: bool = False, unfolded: bool = False
+    ) -> None:
         self.title = title
         self.text = text
         self.of_mechanism = of_mechanism
+        self.unfolded = unfolded
 
 
 @dataclass(frozen=True)

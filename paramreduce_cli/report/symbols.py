@@ -1,27 +1,23 @@
-"""What short headings of tables stand for, said under the tables that have them."""
+"""Meanings of short headings, printed under the tables that have them."""
 
 from collections.abc import Mapping
 
 _EVERYWHERE = {
     "n": "number of parameters of the reduced model",
-    "n_φ": "standard parameters that act on the torques",
-    "r": "base parameters: the rank of the observation matrix",
-    "d": "sums, products and function calls of the inverse dynamics with all parameters",
-    "d, n": "the same with n parameters",
-    "M, δ": "sums, products and function calls of mass matrix and remainder, gravity included, with all parameters",
-    "M, δ, n": "the same with n parameters",
-    "ε_τ": "weighted torque error on the estimation set, of the torques' norm",
-    "ε_τ E": "weighted torque error on the estimation set, of the torques' norm",
-    "ε_τ V": "the same on the validation set",
-    "ε_z̈ E": "weighted error of the accelerations on the estimation set",
-    "ε_z̈ V": "the same on the validation set",
-    "φ' value": "value of the parameter, which stands for those that were dropped too",
+    "acting": "standard parameters that act on the torques",
+    "base": "base parameters: the rank of the observation matrix",
+    "operations inverse, full": "sums, products and function calls of the inverse dynamics with all parameters",
+    "operations inverse": "sums, products and function calls of the inverse dynamics",
+    "operations direct, full": "operations of the mass matrix M and the bias δ (gravity included) with all parameters",
+    "operations direct": "operations of the mass matrix M and the bias δ, gravity included",
+    "torque error": "weighted torque error on the estimation set, relative to the norm of the torques",
+    "torque error est.": "weighted torque error on the estimation set, relative to the norm of the torques",
+    "torque error val.": "on the validation set",
+    "torque error test": "on the test set: median and range of its motions",
+    "accel. error est.": "weighted error of the accelerations on the estimation set",
+    "φ' value": "lumped value of the parameter, which also stands for a part of the removed parameters",
 }
 _OF_TABLES: Mapping[str, Mapping[str, str]] = {
-    "pareto-front": {
-        "d": "operations of the inverse dynamics",
-        "M, δ": "operations of mass matrix and remainder, gravity included",
-    },
     "kinematics": {
         "a": "distance of neighbouring joint axes along x, m",
         "alpha": "angle between them about x, rad",
@@ -44,34 +40,34 @@ _OF_TABLES: Mapping[str, Mapping[str, str]] = {
     },
     "proofs": {
         "no subset below": "proven: no subset of at most n parameters has a smaller torque error",
-        "gap": "how far ε_τ is above that bound",
-        "nodes": "branches that were looked at",
+        "gap": "distance of the torque error to that bound",
+        "nodes": "nodes of the search tree that were evaluated",
         "s": "seconds of one core",
     },
     "operations": {
-        "d, lean": "inverse dynamics as exported",
-        "d, plain recursion": "by the recursion in body frames, each subexpression once",
-        "d, the paper's rule": "as the paper of the method counts",
-        "[M, δ], lean": "mass matrix and remainder, gravity included, in the same three ways",
+        "inverse, lean": "inverse dynamics as exported",
+        "inverse, textbook": "recursion in body frames, each subexpression once",
+        "inverse, paper's rule": "counted like the paper of the method",
+        "direct, lean": "mass matrix and bias, gravity included",
     },
     "terms": {
-        "before": "operations, heuristic and number of parameters that it started from",
-        "ε_τ random": "torque error on random states inside the limits of the config",
-        "ε_z̈ random": "error of the accelerations on these",
-        "smallest eigenvalue": "of all mass matrices; positive where motions can be simulated",
+        "before": "operations, heuristic and number of parameters of the start",
+        "torque error random": "torque error on random states inside the limits of the config",
+        "accel. error random": "error of the accelerations on random states inside the limits",
+        "smallest eigenvalue": "of all mass matrices; it must be positive to simulate",
     },
     "trajectories": {
         "κ column-normalised": "condition number of the base columns of W, torques over their nominal values, columns of unit length",
         "κ equilibrated": "columns, then rows over their largest entries",
         "κ full": "of all columns, not of the base alone: the singular values that are not zero",
         "κ weighted": "columns as they are",
-        "κ at start": "before the optimiser moved it",
-        "share of limits": "of the way to the limits that each coordinate uses",
+        "κ at start": "condition number at the start of the optimisation",
+        "share of limits": "largest fraction of the limits that each coordinate uses",
     },
     "identified-errors": {
         "noise": "of the recording above the band of the model, N m",
-        "lag-1": "correlation of a residual with the one before; white residuals have 0",
-        "eff. samples": "white samples that would tell as much of a constant",
+        "lag-1": "correlation of a residual with the previous one; 0 for white residuals",
+        "eff. samples": "equivalent number of white samples",
     },
 }
 

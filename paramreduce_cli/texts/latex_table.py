@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 from paramreduce_cli.texts import to_latex
@@ -17,6 +18,13 @@ _LONG = 45
 """Characters of a cell from which on its text is broken into lines."""
 _SPACE = 3
 """Characters that the gap between two columns takes."""
+_SYMBOLS = {
+    "torque error": "ε_τ",
+    "accel. error": "ε_z̈",
+    "operations inverse": "d",
+    "operations direct": "[M, δ]",
+}
+"""Symbols that replace words of headings, as papers have them."""
 _NUMBER = re.compile(r"-?(\d*)(?:\.(\d*))?(?:e(-?)\+?(\d+))?")
 
 
@@ -30,7 +38,7 @@ def format_latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyTy
         table: Table to format.
         symbols: LaTeX formulas by the name that each replaces.
     """
-    table = _move_percent_signs(table)
+    table = _move_percent_signs(_abbreviate_headings(table))
     columns = [[row[k] for row in table.rows] for k in range(len(table.header))]
     kinds = [_choose_column_type(cells) for cells in columns]
     # siunitx takes what is in braces for text, and sets what is not.
@@ -52,6 +60,14 @@ def format_latex_table(table: Table, symbols: Mapping[str, str] = MappingProxyTy
     lines = [r"\hline", head, r"\hline", *rows, r"\hline"]
     whole = _format_longtable if height > _PAGE else _format_tabular
     return "\n".join(whole("".join(kinds), caption, lines, width)) + "\n"
+
+
+def _abbreviate_headings(table: Table) -> Table:
+    """Return the table with symbols in place of words in its headings."""
+    header = list(table.header)
+    for words, symbol in _SYMBOLS.items():
+        header = [cell.replace(words, symbol) for cell in header]
+    return replace(table, header=tuple(header))
 
 
 def _format_longtable(kinds: str, caption: str, lines: Sequence[str], width: int) -> list[str]:

@@ -2,8 +2,10 @@
 
 import csv
 import io
+import textwrap
 import unicodedata
 from dataclasses import dataclass
+from itertools import zip_longest
 
 
 @dataclass(frozen=True)
@@ -15,9 +17,20 @@ class Table:
     rows: tuple[tuple[str, ...], ...]
 
     def to_text(self) -> str:
-        """Return the table as text, with aligned columns under the title."""
-        lines = [self.header, *self.rows]
-        widths = [max(_count_columns(line[k]) for line in lines) for k in range(len(self.header))]
+        """Return the table as text, with aligned columns under the title; long headings take several lines."""
+        columns = range(len(self.header))
+        widths = [
+            max(
+                [
+                    *map(_count_columns, self.header[k].split()),
+                    *(_count_columns(row[k]) for row in self.rows),
+                ],
+                default=0,
+            )
+            for k in columns
+        ]
+        wrapped = [textwrap.wrap(self.header[k], max(widths[k], 1)) for k in columns]
+        heading = [tuple(column) for column in zip_longest(*wrapped, fillvalue="")]
 
         def aligned(cells: tuple[str, ...]) -> str:
             padded = (
@@ -27,7 +40,7 @@ class Table:
             return "  ".join(padded).rstrip()
 
         rule = "  ".join("-" * width for width in widths)
-        body = [aligned(self.header), rule, *map(aligned, self.rows)]
+        body = [*map(aligned, heading), rule, *map(aligned, self.rows)]
         return "\n".join([self.title, "", *body]) + "\n"
 
     def to_csv(self) -> str:

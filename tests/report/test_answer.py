@@ -20,7 +20,7 @@ from paramreduce_cli.texts import format_percent
 
 def paragraph(results):
     page = (results / "report" / "index.html").read_text()
-    return html.unescape(re.search(r"<h2>For a paper</h2>\n<p>(.*?)</p>", page, re.DOTALL)[1])
+    return html.unescape(re.search(r'id="paper".*?</p>\s*<p>(.*?)</p>', page, re.DOTALL)[1])
 
 
 def test_methods_tell_of_trajectories(two_link_results, summary):

@@ -140,7 +140,7 @@ def test_the_code_is_in_the_page(page):
 
 @in_browser
 def test_every_step_of_the_slider_shows_its_model(page, summary):
-    with opened(page, place="heuristic=qr&n=2") as driver:
+    with opened(page, place="qr:2") as driver:
 
         def text(part):
             return driver.find_element("css selector", f'[data-part="{part}"]').text
@@ -164,7 +164,7 @@ def test_every_step_of_the_slider_shows_its_model(page, summary):
         field.send_keys("50\t")
         least = min(n for n in rows if max(rows[n]["torque_error"][s] for s in sets) <= 0.5)
         assert text("count") == str(least)
-        assert driver.execute_script("return location.hash") == f"#heuristic=qr&n={least}"
+        assert driver.execute_script("return location.hash") == f"#qr:{least}"
         assert complaints(driver) == []
 
 

@@ -26,14 +26,101 @@ def picture(driver, place):
 def test_the_legend_switches_curves_and_sets(driver):
     whole = picture(driver, _ERRORS)
     buttons = driver.find_elements("css selector", "[data-part=legend] button")
-    assert len(buttons) > 3
-    for button in buttons:
+    pressed = [button.get_attribute("aria-pressed") for button in buttons]
+    sets = [button.get_attribute("class") == "set" for button in buttons]
+    assert sum(p == "true" for p, s in zip(pressed, sets, strict=True) if not s) <= 3, (
+        "heuristics at first"
+    )
+    assert sum(p == "true" for p, s in zip(pressed, sets, strict=True) if s) == 1
+    for button, before in zip(buttons, pressed, strict=True):
         button.click()
-        assert button.get_attribute("aria-pressed") == "false"
+        assert button.get_attribute("aria-pressed") != before
         assert picture(driver, _ERRORS) != whole
         button.click()
-        assert button.get_attribute("aria-pressed") == "true"
+        assert button.get_attribute("aria-pressed") == before
         assert picture(driver, _ERRORS) == whole
+
+
+def part(driver, name):
+    return driver.find_element("css selector", f"[data-part={name}]")
+
+
+def step_to(driver, row):
+    driver.execute_script(
+        "const s = document.querySelector('[data-part=n]'); s.value = arguments[0]; s.dispatchEvent(new Event('input'));",
+        row,
+    )
+
+
+def test_two_models_stand_side_by_side(driver):
+    step_to(driver, 2)
+    assert not part(driver, "versus").is_displayed()
+    part(driver, "pin").click()
+    step_to(driver, 4)
+    rows = [
+        [cell.text for cell in row.find_elements("css selector", "th, td")]
+        for row in part(driver, "versus").find_elements("css selector", "tr")
+    ]
+    assert [name.partition(":")[2] for name in rows[0][1:]] == ["5", "3"]
+    values = {row[0]: row[1:] for row in rows[1:]}
+    assert values["parameters"] == ["5", "3"]
+    assert values["operations, inverse dynamics"][0] == part(driver, "inverse").text
+    alone = [
+        0 if text == "none" else len(text.split()) for text in values["parameters of one alone"]
+    ]
+    assert alone[0] - alone[1] == 2
+    assert "Stop comparing" in part(driver, "pin").text
+    part(driver, "pin").click()
+    assert not part(driver, "versus").is_displayed()
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("abc", "is not a positive number"),
+        ("-2", "is not a positive number"),
+        ("0", "is not a positive"),
+    ],
+)
+def test_a_tolerance_that_cannot_be_is_said(driver, text, said):
+    from selenium.webdriver.common.keys import Keys
+    from selenium.webdriver.support.ui import Select
+
+    Select(part(driver, "heuristic")).select_by_visible_text("qr")
+    step_to(driver, 0)
+    field = part(driver, "tolerance")
+    field.clear()
+    field.send_keys(text + Keys.TAB)
+    assert said in part(driver, "no-such").text
+    assert part(driver, "count").text == "1"
+
+
+def test_a_tolerance_that_no_model_keeps_is_said(measured_results):
+    from selenium.webdriver.common.keys import Keys
+
+    with opened(measured_results / "results" / "report" / "index.html") as driver:
+        part(driver, "tolerance").send_keys("0.001" + Keys.TAB)
+        assert "is within 0.001 %; the least error is" in part(driver, "no-such").text
+
+
+def test_a_link_unfolds_what_it_leads_to(driver):
+    section = driver.find_element("id", "mechanism")
+    assert section.get_attribute("open") is None
+    driver.find_element("css selector", "nav a[href='#mechanism']").click()
+    assert section.get_attribute("open") is not None
+
+
+def test_the_page_is_short_and_figures_are_whole(two_link_results):
+    page = two_link_results / "report" / "index.html"
+    with opened(page) as driver:
+        assert driver.execute_script("return document.documentElement.scrollHeight") <= 9 * 800
+    with opened(page, width=390) as driver:
+        wide = driver.execute_script(
+            "document.querySelectorAll('details').forEach((d) => { d.open = true; });"
+            "return [...document.querySelectorAll('figure img')].map((i) => i.getBoundingClientRect().right)"
+        )
+        assert len(wide) > 5
+        assert max(wide) <= 390
 
 
 def test_a_point_is_named_and_a_click_goes_there(driver):
@@ -62,6 +149,7 @@ def test_a_point_is_named_and_a_click_goes_there(driver):
 def test_the_mechanism_plays_and_pauses(driver):
     place = driver.find_element("css selector", "[data-part=mechanism]")
     button, slider = (place.find_element("css selector", name) for name in ("button", "input"))
+    driver.execute_script("arguments[0].scrollIntoView({block: 'center'})", button)
     assert button.text == "Play"
     before = slider.get_attribute("value")
     button.click()
@@ -111,6 +199,8 @@ def test_without_scripts_figures_and_tables_are_there(two_link_results):
         assert not driver.find_element("css selector", "nav a.live").is_displayed()
         figures = driver.find_elements("css selector", "figure img, figure svg")
         tables = driver.find_elements("css selector", "table")
+        for summary in driver.find_elements("css selector", "details.part:not([open]) > summary"):
+            summary.click()
         assert sum(one.is_displayed() for one in figures) > 5
         assert sum(one.is_displayed() for one in tables) > 2
         assert driver.find_element("css selector", ".parameters").is_displayed()

@@ -13,8 +13,8 @@ def test_one_row_per_robot_with_the_selected_model(summary):
     selected = summary["selected"]
     assert row["heuristic"] == selected["heuristic"]
     assert int(row["n"]) == selected["n"]
-    assert int(row["d"]) == summary["full"]["operations_inverse"]
-    assert int(row["d, n"]) == selected["operations"]["inverse"]
+    assert int(row["operations inverse, full"]) == summary["full"]["operations_inverse"]
+    assert int(row["operations inverse"]) == selected["operations"]["inverse"]
     rows = list(csv.reader(io.StringIO(table.to_csv())))
     assert {len(row) for row in rows} == {17}
     assert format_latex_table(table).count("&") == 3 * 16

@@ -234,7 +234,10 @@ def test_headings_are_explained_where_they_stand(folder):
     (pareto,) = re.findall(
         r'id="table-pareto-front".*?<p class="symbols">(.*?)</p>', page, re.DOTALL
     )
-    assert "<b>d</b> operations of the inverse dynamics;" in pareto
+    assert (
+        "<b>operations inverse</b> sums, products and function calls of the inverse dynamics;"
+        in pareto
+    )
     (geometry,) = re.findall(
         r'id="table-kinematics".*?<p class="symbols">(.*?)</p>', page, re.DOTALL
     )

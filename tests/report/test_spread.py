@@ -29,8 +29,8 @@ def test_medians_and_extremes_over_the_runs_of_a_robot(summary):
     assert [row[:2] for row in table.rows] == [("two_link", "3"), ("other", "1")]
     row = dict(zip(table.header, table.rows[0], strict=True))
     assert row["n"] == "4 (3 to 5)"
-    assert row["d"] == "40 (30 to 50)"
-    assert row["M, δ"] == "-"
+    assert row["operations inverse"] == "40 (30 to 50)"
+    assert row["operations direct"] == "-"
     assert row["accepted"] == "3 of 3"
 
 
@@ -60,7 +60,7 @@ def test_the_command_on_a_sweep_leaves_out_and_names_what_has_not_ended(
     listed.write_text(
         f"robots: [{TWO_LINK}]\nseeds: [0, 1, 2]\nvariants: {{plain: []}}\nresults: here\n"
     )
-    assert "none of its 3 runs has ended" in invoke("table", "--sweep", listed, code=2).err
+    assert "none of its 3 runs is finished" in invoke("table", "--sweep", listed, code=2).err
     for seed in (0, 2):
         shutil.copytree(two_link_results, tmp_path / "here" / f"two_link-{seed}-plain")
     said = invoke("table", "--sweep", listed)

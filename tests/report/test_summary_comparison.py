@@ -109,11 +109,11 @@ TERM = {
 
 def test_more_operations_without_small_terms_are_a_regression_and_fewer_are_not(summary):
     one = summary | {"terms": [TERM]}
-    assert bad(one, summary) == ["functions without small terms"]
+    assert bad(one, summary) == ["pruned functions"]
     for operations, what in (
         (80, []),
         (104, []),
-        (106, ["operations without small terms, direct"]),
+        (106, ["operations of the pruned function, direct"]),
     ):
         assert bad(one, summary | {"terms": [TERM | {"operations": operations}]}) == what
     other = TERM | {"budget": {"torque": 0.02, "acceleration": 0.05}}
@@ -123,14 +123,14 @@ def test_more_operations_without_small_terms_are_a_regression_and_fewer_are_not(
 @pytest.mark.parametrize(
     ("changed", "what"),
     [
-        ({"torque_error": {"estimation": 0.0101, "validation": 0.009}}, ["torque error without small terms, direct, estimation"]),
+        ({"torque_error": {"estimation": 0.0101, "validation": 0.009}}, ["torque error of the pruned function, direct, estimation"]),
         ({"torque_error": {"estimation": 0.009, "validation": 0.02}}, []),  # was above the budget before: held out
-        ({"acceleration_error": {"estimation": 0.051, "validation": None}}, ["acceleration error without small terms, direct, estimation"]),
-        ({"acceleration_error": {"estimation": None, "validation": None}}, ["acceleration error without small terms, direct, estimation"]),
+        ({"acceleration_error": {"estimation": 0.051, "validation": None}}, ["acceleration error of the pruned function, direct, estimation"]),
+        ({"acceleration_error": {"estimation": None, "validation": None}}, ["acceleration error of the pruned function, direct, estimation"]),
         ({"torque_error": {"estimation": 0.009, "validation": 0.02}, "acceleration_error": {"estimation": 0.04, "validation": 0.06}}, []),
         ({"smallest_eigenvalue": 0.01}, []),
-        ({"smallest_eigenvalue": -0.01}, ["smallest eigenvalue without small terms, direct"]),
-        ({"smallest_eigenvalue": None}, ["smallest eigenvalue without small terms, direct"]),
+        ({"smallest_eigenvalue": -0.01}, ["smallest eigenvalue of the pruned function, direct"]),
+        ({"smallest_eigenvalue": None}, ["smallest eigenvalue of the pruned function, direct"]),
     ],
 )  # fmt: skip
 def test_a_budget_that_was_kept_to_is_kept_to(summary, changed, what):
@@ -142,6 +142,6 @@ def test_what_is_held_out_is_not_gated(summary):
     before = TERM | {"torque_error": {"estimation": 0.009, "validation": 0.009}}
     after = TERM | {"torque_error": {"estimation": 0.009, "validation": 0.02}}
     both = [summary | {"terms": [one]} for one in (before, after)]
-    assert bad(*both) == ["torque error without small terms, direct, validation"]
+    assert bad(*both) == ["torque error of the pruned function, direct, validation"]
     both = [summary | {"terms": [one | {"held_out": True}]} for one in (before, after)]
     assert bad(*both) == []

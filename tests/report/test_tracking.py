@@ -84,7 +84,7 @@ def test_the_report_shows_tracking_where_it_is_asked_for(invoke, two_link_copy):
     settings = ["report.tracking={}", "report.formats=[svg]"]
     invoke("report", TWO_LINK, "--results", two_link_copy, settings=settings)
     assert (two_link_copy / "report/figures/tracking.svg").exists()
-    assert "What it is for" in (two_link_copy / "report/index.html").read_text()
+    assert "Control with the reduced model" in (two_link_copy / "report/index.html").read_text()
 
 
 def test_without_a_compiler_the_controller_is_interpreted(invoke, two_link_copy, monkeypatch):
@@ -131,4 +131,4 @@ def test_loops_are_refused(invoke, tmp_path):
     ]
     run = ("run", CONFIGS / "four_bar.yaml", "--results", tmp_path)
     refused = invoke(*run, settings=settings, code=2)
-    assert "report.tracking is for open trees" in refused.err.replace("\n", " ")
+    assert "works for open trees only" in refused.err.replace("\n", " ")

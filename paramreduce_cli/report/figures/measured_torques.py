@@ -8,7 +8,7 @@ from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import choose_joint_style, make_figure, place_legend_above
 
 
-@placed(PageSection.IDENTIFICATION, 2)
+@placed(PageSection.PAPER, 7)
 def measured_torques(data: ReportData) -> Figure | None:
     """Held-out data: measured torques and torques of the reduced model (left), residuals of both models (right), N m
     (N).

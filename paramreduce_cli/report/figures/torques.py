@@ -12,7 +12,7 @@ _ANY = "#7d8590"
 """Stands for the colour of any joint."""
 
 
-@placed(PageSection.SELECTED, 2)
+@placed(PageSection.PAPER, 5)
 def torques(data: ReportData) -> Figure:
     """Given or measured torques and torques of the selected model, along the validation set."""
     modelled = data.identification is None

@@ -8,7 +8,7 @@ from paramreduce_cli.texts import format_percent
 from paramreduce_cli.texts.table import Table
 
 
-@placed(PageSection.HEURISTICS, 3)
+@placed(PageSection.PAPER, 6)
 def joint_errors(data: ReportData) -> Table:
     """Torque error of the selected model for each joint: root mean square, and relative to that joint's torque."""
     selected = data.validation.selected

@@ -24,7 +24,7 @@ def operations(data: ReportData) -> Table:
         for name, n, prefix in named
     ]
     header = (
-        "model", "n", "d, lean", "d, plain recursion", "d, the paper's rule",
-        "[M, δ], lean", "[M, δ], plain recursion", "[M, δ], the paper's rule",
+        "model", "n", "inverse, lean", "inverse, textbook", "inverse, paper's rule",
+        "direct, lean", "direct, textbook", "direct, paper's rule",
     )  # fmt: skip
     return Table("Operations", header, tuple(rows))

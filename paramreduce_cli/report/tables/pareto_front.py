@@ -12,7 +12,18 @@ def pareto_front(data: ReportData) -> Table:
     """Models that no other model beats in all quantities: errors on the estimation (E), the validation (V) and the test
     set (T; median and range).
     """
-    header = ("heuristic", "n", "ε_τ E", "ε_τ V", "ε_τ T", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T", "d", "M, δ")
+    header = (
+        "heuristic",
+        "n",
+        "torque error est.",
+        "torque error val.",
+        "torque error test",
+        "accel. error est.",
+        "accel. error val.",
+        "accel. error test",
+        "operations inverse",
+        "operations direct",
+    )
     rows = []
     for model in data.validation.pareto:
         r = data.validation.heuristics[model.heuristic]

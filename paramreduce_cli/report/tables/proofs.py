@@ -11,7 +11,7 @@ from paramreduce_cli.texts.table import Table
 def proofs(data: ReportData) -> Table:
     """Proven bounds on the error of the best subset, for every number of parameters."""
     found = data.reduction.proofs
-    header = ("n", "ε_τ", "no subset below", "gap", "status", "nodes", "s")
+    header = ("n", "torque error", "no subset below", "gap", "status", "nodes", "s")
     if found is None:
         return Table("Proofs: best-subset was not run", header, ())
     rows = []

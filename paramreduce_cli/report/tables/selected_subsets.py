@@ -16,4 +16,6 @@ def selected_subsets(data: ReportData) -> Table:
         if row is not None:
             kept = " ".join(names[k] for k in sorted(found.subsets[row]))
             rows.append((name, format_percent(float(found.torque_error[row])), kept))
-    return Table(f"Subsets of {n} parameters", ("heuristic", "ε_τ E", "parameters"), tuple(rows))
+    return Table(
+        f"Subsets of {n} parameters", ("heuristic", "torque error est.", "parameters"), tuple(rows)
+    )

@@ -18,8 +18,8 @@ def terms(data: ReportData) -> Table:
     inside the limits; smallest eigenvalue of all mass matrices.
     """
     header = (
-        "function", "n", "operations", "before", "ε_τ E", "ε_τ V", "ε_τ T", "ε_z̈ E", "ε_z̈ V", "ε_z̈ T", "ε_τ random",
-        "ε_z̈ random", "smallest eigenvalue",
+        "function", "n", "operations", "before", "torque error est.", "torque error val.", "torque error test", "accel. error est.", "accel. error val.", "accel. error test", "torque error random",
+        "accel. error random", "smallest eigenvalue",
     )  # fmt: skip
     rows = []
     labels = {key: label for key, label, _ in FUNCTIONS}
