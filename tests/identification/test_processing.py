@@ -220,7 +220,7 @@ def test_a_delay_is_taken_back():
 
 
 def test_what_is_cut_off_whole_is_said():
-    with pytest.raises(DataError, match=r"log\.csv: hardly any samples.*sampling\.log\.trim"):
+    with pytest.raises(DataError, match=r"log\.csv: too few samples.*sampling\.log\.trim"):
         made(two_link_log(), trim=[100, 0])
 
 

@@ -163,7 +163,7 @@ def test_what_cannot_be_is_said_with_row_and_column(changes, said):
 
 
 def test_missing_columns_are_listed():
-    with pytest.raises(DataError, match=r"no column tau1; there are t, q1.*sampling\.log\.columns"):
+    with pytest.raises(DataError, match=r"no column tau1. Columns: t, q1.*sampling\.log\.columns"):
         read_signals(
             RawLog("x", {k: v for k, v in LOG.items() if "tau" not in k}, 2), section(), NAMES
         )

@@ -514,7 +514,7 @@ def test_summary_and_page(two_link, tmp_path, invoke):
         assert least["operations"] == one["operations"]
     page = path.with_name("index.html").read_text()
     for one in summary["terms"]:
-        assert f"{one['operations']} with terms left out</a>, which is the leanest" in page
+        assert f"{one['operations']} with pruned terms</a>, which is the leanest" in page
     common = ("export", "configs/two_link.yaml", "--results", tmp_path / "r", "--what", "idm")
     sets = [part for setting in (ONE_FORMAT, *TERMS) for part in ("--set", setting)]
     for name in ("leanest", "terms"):
@@ -604,7 +604,7 @@ def test_bad_input(two_link, invoke, tmp_path):
     assert "less than 1" in refused.err
     for options, said in (
         ((), "--what idm or --what ddm"),
-        (("--what", "regressor"), "each function has values of its own"),
+        (("--what", "regressor"), "each function has its own values"),
         (("--what", "idm", "--format", "urdf"), "not to a robot's file"),
     ):
         refused = invoke("export", path, *common, *sets, "--model", "terms", *options, code=2)
