@@ -526,7 +526,7 @@ def test_summary_and_page(two_link, tmp_path, invoke):
         "validate", "configs/two_link.yaml", "--results", tmp_path / "r", *sets, *nothing, code=1
     )
     refused = invoke(*common, *sets, *nothing, "--model", "leanest", code=2)
-    assert "the inverse dynamics of no model is within" in refused.err
+    assert "no model's inverse dynamics is within" in refused.err
     assert "Without small terms" in page
     term = loaded(runner, TermReduction).functions["direct"]
     ranges = (path.parent / "tables" / "term-ranges.csv").read_text()
@@ -605,7 +605,7 @@ def test_bad_input(two_link, invoke, tmp_path):
     for options, said in (
         ((), "--what idm or --what ddm"),
         (("--what", "regressor"), "each function has its own values"),
-        (("--what", "idm", "--format", "urdf"), "not to a robot's file"),
+        (("--what", "idm", "--format", "urdf"), "not for a robot's file"),
     ):
         refused = invoke("export", path, *common, *sets, "--model", "terms", *options, code=2)
         assert said in refused.err
