@@ -83,7 +83,7 @@ def make_exported_model(
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
         origin: Of the model, for the comment that opens every file.
-        simplified: The function that is asked for with terms left out, whose parameters are those of
+        simplified: The function that is asked for with pruned terms, whose parameters are those of
             the model.
         validation: Says in which ranges the model was validated; None where it was not.
         report_progress: Told of its steps.

@@ -1,4 +1,4 @@
-"""Whether exported functions compute what plain recursion does."""
+"""Whether exported functions compute what textbook recursion does."""
 
 from collections.abc import Mapping
 from typing import Any
@@ -27,7 +27,7 @@ def make_random_cases(
 ) -> dict[str, FloatArray]:
     """Return random states and the results of textbook recursion, by the names of the functions' arrays.
 
-    Where terms were left out, results are those of the simplified program, which plain recursion does
+    Where terms were left out, results are those of the simplified program, which textbook recursion does
     not know; states are inside the ranges that it holds in, those of loops anywhere.
 
     Args:
@@ -35,7 +35,7 @@ def make_random_cases(
         model: The reduced model.
         count: Number of states.
         rng: Where they come from.
-        simplified: A function with terms left out.
+        simplified: A function with pruned terms.
     """
     q, dq, ddq = draw_states(mechanism, count, rng)
     if simplified is not None and mechanism.loops is None:

@@ -95,12 +95,12 @@ _WIDTH = 100
 """Characters of a line of a header, at most, where its words allow."""
 _FIXED = "\N{NO-BREAK SPACE}"
 _MADE_OF = (
-    "Parameters, {}; each is followed by what it is made of, ordered and counted",
-    "by the values in the config; what is zero there is left out:",
+    "Parameters, {}; each is followed by the sum of standard parameters that it is,",
+    "ordered by the values in the config, without parameters that are zero there:",
 )
 _FITTED = (
-    "Parameters, {}; fitted again to this function, whose terms are fewer: they are no",
-    "combinations of those in the config; units in parentheses save products:",
+    "Parameters, {}; they were fitted to this pruned function, so they are no sums of",
+    "standard parameters; units in parentheses save products:",
 )
 
 

@@ -68,7 +68,7 @@ def find_chosen_model(
         selected = f"; {default[0]} is selected" if default else ""
         raise ConfigError(
             f"--model {text}: there is {', '.join(choices)}{selected}; with a config and a "
-            f"log also {IDENTIFIED} and {CONSISTENT}, with terms left out {TERMS}.",
+            f"log also {IDENTIFIED} and {CONSISTENT}, with pruned terms {TERMS}.",
             rejected=text or "",
             choices=[*default, *choices],
         )
@@ -81,7 +81,7 @@ def find_chosen_model(
         title += f", {format_percent(other)} on the validation set"
         test = judged.torque_error.test[known_row]
         if test.size:
-            title += f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} motions of the test set"
+            title += f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} test motions"
     known = model.values if model is not None else None
     return make_reduced_model(reduction, choice.heuristic, row, known), title
 
@@ -129,12 +129,12 @@ def find_pruned_model(terms: TermReduction, name: str) -> tuple[ReducedModel, Te
     if name == "direct" and terms.acceleration_budget < float("inf"):
         allowed += f", of accelerations {format_percent(terms.acceleration_budget)}"
     title = (
-        f"{name} dynamics with terms left out, {term.values.size} parameters, {term.operations} operations, "
+        f"{name} dynamics with pruned terms, {term.values.size} parameters, {term.operations} operations, "
         f"torque error {known} (estimation / validation), allowed {allowed}"
     )
     if term.torque_error.test.size:
         test = format_percent_range(*ErrorRange.summarise(term.torque_error.test))
-        title += f", {test} on {term.torque_error.test.size} motions that no search looked at"
+        title += f", {test} on {term.torque_error.test.size} test motions"
     fitted_again = ("",) * len(term.names)  # so that they stand for no combination of known ones
     model = ReducedModel(term.names, term.values, term.position, fitted_again, term.units)
     return model, term, title

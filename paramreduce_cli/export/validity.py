@@ -32,7 +32,7 @@ def _describe_state(mechanism: Mechanism, j: int, name: str, values: list[str]) 
 def describe_validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     """Describe where a function with pruned terms holds, how far it deviates elsewhere, and where most."""
     lines = [
-        "TERMS WERE LEFT OUT, or stand for others: it holds inside the ranges that it was fitted in, which are",
+        "NEGLIGIBLE TERMS WERE PRUNED. The function holds only inside the ranges that it was fitted to:",
         *describe_ranges(mechanism, term.lower, term.upper),
     ]
     errors = (term.acceleration_error.estimation, term.acceleration_error.validation)
@@ -41,25 +41,25 @@ def describe_validity(mechanism: Mechanism, term: TermModel) -> list[str]:
     test = ErrorRange.summarise(term.acceleration_error.test)
     if np.isfinite(test.median):
         lines.append(
-            f"The same on motions that no search looked at: {format_percent_range(*test)}."
+            f"Error of the accelerations on the test motions: {format_percent_range(*test)}."
         )
     where = "both sets"
     if term.random_states or term.mass_states:
-        lines.append("Random states inside the limits were looked at, with these ranges:")
+        lines.append("It was also evaluated on random states inside the limits, with these ranges:")
         lines += describe_ranges(mechanism, *term.drawn)
     if term.random_states:
-        where = "these"
+        where = "the random states"
         lines.append(
-            f"Torque error on {term.random_states} of them: {format_percent(term.random_torque_error)}."
+            f"Torque error on {term.random_states} random states: {format_percent(term.random_torque_error)}."
         )
         if not np.isnan(term.random_acceleration_error):
             error = format_percent(term.random_acceleration_error)
-            lines.append(f"Error of the accelerations on these: {error}.")
+            lines.append(f"Error of the accelerations on the random states: {error}.")
     lines.append(f"Largest differences of torques, N m or N, on {where}:")
     differences = zip(mechanism.coordinate_names, term.largest_difference.tolist(), strict=True)
     lines += [f"  {name}: {value:.3g}" for name, value in differences if not np.isnan(value)]
     worst = mechanism.coordinate_names[term.worst_joint]
-    lines.append(f"The worst one, against the nominal torque, is that of {worst}, at")
+    lines.append(f"Relative to the nominal torque the largest difference is that of {worst}, at")
     lines += [
         _describe_state(mechanism, j, name, [f"{value:.4g}" for value in term.worst_state[:, j]])
         for j, name in enumerate(mechanism.coordinate_names)

@@ -35,7 +35,7 @@ _FARTHER = 2.5
 """Times the error of what was learned from, from which on what was held out is said to be missed."""
 _IMPOSSIBLE = 1.15
 """Error of bodies that can exist over that of base parameters, from which on there is a hint at wrong kinematics: between 1.00 to 1.06 on logs
-of three robots themselves, and 1.26 to 1.32 with the kinematics of others (docs/logs.md)."""
+of three robots themselves, and 1.26 to 1.32 with the kinematics of others (docs/lab/logs.md)."""
 _BESIDE = 0.003
 """Share of the torques by which errors must differ besides: solvers are not exact, and where a low-pass leaves little, base
 parameters fit noise that bodies cannot (0.0016 on the Panda's own log with a cut-off from the spectrum; 0.007 with other kinematics)."""

@@ -28,7 +28,7 @@ def find_leanest(
         function: ``inverse`` or ``direct``.
         section: What the config asks for.
         results: What reduced models are worth.
-        terms: Functions with terms left out, if there are any.
+        terms: Functions with pruned terms, if there are any.
 
     Returns:
         None if there is none.

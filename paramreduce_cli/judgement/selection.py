@@ -131,7 +131,7 @@ def _explain_choice(
     if reduction.proofs is None or limit is None or n == 1:
         return f"{text}."
     if is_proven_smallest(reduction.proofs, n, limit):
-        return f"{text}; proven: with fewer parameters none has that torque error on the estimation set."
+        return f"{text}; proven: no smaller subset reaches that error on the estimation set."
     return f"{text}; smaller ones are not excluded by proof."
 
 

@@ -25,7 +25,7 @@ def check_formulations(
     states: tuple[FloatArray, FloatArray, FloatArray],
     rng: np.random.Generator,
 ) -> None:
-    """Compare every formulation with plain recursion on the open tree.
+    """Compare every formulation with textbook recursion on the open tree.
 
     Args:
         mechanism: The mechanism.
@@ -64,7 +64,7 @@ def check_formulations(
 def reject_if_wrong(
     what: str, off: FloatArray, against: FloatArray, tolerance: float = TOLERANCE
 ) -> None:
-    """Refuse results that are too far from those of plain recursion.
+    """Refuse results that are too far from those of textbook recursion.
 
     Args:
         what: What computed the results, for the message.

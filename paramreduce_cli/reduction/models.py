@@ -91,7 +91,7 @@ def make_reduced_model(
         reduction: Reduction that holds the subset.
         heuristic: Heuristic that found the subset.
         row: Row of the subset.
-        known_values: Standard parameters, (n_standard,), by which the terms of expressions are ordered and small terms are
+        known_values: Standard parameters, (n_standard,), by which the terms of expressions are ordered and negligible terms are
             counted.
     """
     found, columns = reduction.heuristics[heuristic], reduction.columns

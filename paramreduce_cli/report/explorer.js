@@ -394,7 +394,7 @@
     legend.append(button);
   });
 
-  // Error against operations: a point for every model, the front, and functions with terms left out.
+  // Error against operations: a point for every model, the front, and functions with pruned terms.
   const costCharts = {};
   function costChart(key, label) {
     const all = curves.flatMap((c, k) => c.n.map((_, row) => ({ x: c.operations[key][row], y: visible(c.torque.estimation[row]), curve: k, row, text: spoken(k, row) }))).filter((p) => p.x !== null && p.y !== null);

@@ -174,12 +174,12 @@ def rows():
         yield compared(f"{name} d, batched / single", t[f"{name}_idm_batch"], d, 1 / 3)
         batched = t[f"{name}_ddm_batch"]
         yield compared(f"{name} [M, delta], batched / single", batched, direct_d, 1 / 3)
-    what = "d without small terms"
+    what = "d with pruned terms"
     yield compared(f"{what} / rnea", t["terms_d_idm"], t["rnea"], 1 / 14)
     yield compared(f"{what}, batched / rnea", t["terms_d_idm_batch"], t["rnea"], 1 / 60)
     single = t["single_d_idm_batch"]
     yield compared(f"{what}, batched, single precision / rnea", single, t["rnea"], 1 / 60)
-    what = "[M, delta] without small terms"
+    what = "[M, delta] with pruned terms"
     yield compared(f"{what} / crba + bias", t["terms_M_ddm"], t["crba_bias"], 1 / 14)
     yield compared(f"{what}, batched / crba + bias", t["terms_M_ddm_batch"], t["crba_bias"], 1 / 60)
 

@@ -16,14 +16,14 @@ from tests.docs import prepared
 from tests.docs.prepared import ROOT
 from tests.pythons import interpreters
 
-LONG = ("tutorial.md", "how-to.md", "python.md")
+LONG = ("tutorial.md", "how-to.md", "controllers.md", "tools.md", "python.md")
 """Pages that are typed as they stand, each in an empty folder of its own."""
 SHORT = {
     prepared.paper: ("README.md", "stages.md", "lean.md", "terms.md"),
-    prepared.matrix: ("artifacts.md",),
+    prepared.matrix: ("own-data.md",),
     prepared.config: ("cluster.md",),
     prepared.robot: ("robots.md",),
-    prepared.recorded: ("logs.md",),
+    prepared.recorded: ("logs.md", "record.md"),
 }
 """Pages that are typed with short configs, by what their readers have in their folder."""
 CONTROLLER = "hold_controller.cpp"
@@ -82,7 +82,7 @@ def main():
             failed |= all_typed(table, page, here, environment)
         if given.page:
             end(table, failed)
-        failed |= typed(table, "how-to.md", CONTROLLER, SYNTAX, folder / "how-to", environment)
+        failed |= typed(table, "controllers.md", CONTROLLER, SYNTAX, folder / "controllers", environment)
         for prepare, pages in SHORT.items():
             here = folder / prepare.__name__
             here.mkdir()

@@ -116,7 +116,7 @@ def test_without_it_errors_are_those_of_the_validation_set(tmp_path, invoke):
     assert "on the estimation and on the validation set" in out
     assert "test set" not in out
     assert summary_of(tmp_path)["selected"]["torque_error"]["test"] is None
-    assert "no search looked at" not in (tmp_path / "report" / "index.html").read_text()
+    assert "which no search uses: median" not in (tmp_path / "report" / "index.html").read_text()
 
 
 def test_brought_coefficients_with_and_without_one(two_link_results, tmp_path):

@@ -73,7 +73,7 @@ terms: {torque_error: 0.05, acceleration_error: 0.3, functions: [direct], rounds
 
 
 def simplified(folder, robot, *overrides):
-    """Run a config that ships as far as its functions without small terms."""
+    """Run a config that ships as far as its functions with pruned terms."""
     return as_far(config_of(robot, ONE_FORMAT, *TERMS, *overrides), folder)
 
 
@@ -418,7 +418,7 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
         make_exported_model(model, chosen, title=title, what=what, simplified=term)
     )
     header = " ".join(files["two_link.h"].decode().replace("*", " ").split())
-    assert "TERMS WERE LEFT OUT" in header
+    assert "NEGLIGIBLE TERMS WERE PRUNED" in header
     names = model.mechanism.coordinate_names
     joints = zip(
         names, term.lower.T, term.upper.T, term.largest_difference,
@@ -527,7 +527,7 @@ def test_summary_and_page(two_link, tmp_path, invoke):
     )
     refused = invoke(*common, *sets, *nothing, "--model", "leanest", code=2)
     assert "no model's inverse dynamics is within" in refused.err
-    assert "Without small terms" in page
+    assert "Pruned terms" in page
     term = loaded(runner, TermReduction).functions["direct"]
     ranges = (path.parent / "tables" / "term-ranges.csv").read_text()
     assert f"{term.lower[0, 0]:.4g} to {term.upper[0, 0]:.4g}" in ranges

@@ -40,7 +40,7 @@ def terms(data: ReportData) -> Figure | None:
         front = term.front
         one.semilogy(
             front.operations, clip_errors(front.torque_error.estimation),
-            color="#0969da", marker="o", markersize=3, linewidth=1.0, label="terms left out too",
+            color="#0969da", marker="o", markersize=3, linewidth=1.0, label="pruned terms too",
         )  # fmt: skip
         one.semilogy(
             front.operations, clip_errors(front.torque_error.validation),

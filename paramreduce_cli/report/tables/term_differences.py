@@ -1,4 +1,4 @@
-"""How far torques of functions with terms left out stray."""
+"""How far torques of functions with pruned terms stray."""
 
 import numpy as np
 
@@ -30,4 +30,4 @@ def term_differences(data: ReportData) -> Table:
             )
             state = (f"{value:.4g}" for value in one.worst_state[:, j])
             rows.append((labels[name], f"{joint}{star}", *sizes, *state))
-    return Table("Differences of torques without small terms", header, tuple(rows))
+    return Table("Differences of torques with pruned terms", header, tuple(rows))

@@ -1,4 +1,4 @@
-"""Where functions with terms left out hold, and where they were looked at besides."""
+"""Where functions with pruned terms hold, and where they were looked at besides."""
 
 import numpy as np
 
@@ -26,4 +26,4 @@ def term_ranges(data: ReportData) -> Table:
                 f"{low:.4g} to {high:.4g}" if not np.isnan(low) else "-" for low, high in extremes
             )
             rows.append((joint, unit, *shown))
-    return Table("Ranges of functions with terms left out", header, tuple(rows))
+    return Table("Ranges of functions with pruned terms", header, tuple(rows))

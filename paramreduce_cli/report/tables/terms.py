@@ -1,4 +1,4 @@
-"""Functions with terms left out."""
+"""Functions with pruned terms."""
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def terms(data: ReportData) -> Table:
                 "-" if np.isnan(eigenvalue) else f"{eigenvalue:.3g}",
             )
         )
-    return Table("Functions with terms left out", header, tuple(rows))
+    return Table("Functions with pruned terms", header, tuple(rows))
 
 
 def _format_error(error: float) -> str:
