@@ -81,7 +81,9 @@ def find_chosen_model(
         title += f", {format_percent(other)} on the validation set"
         test = judged.torque_error.test[known_row]
         if test.size:
-            title += f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} test motions"
+            title += (
+                f", {format_percent_range(*ErrorRange.summarise(test))} on {test.size} test motions"
+            )
     known = model.values if model is not None else None
     return make_reduced_model(reduction, choice.heuristic, row, known), title
 

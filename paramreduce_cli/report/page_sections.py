@@ -90,13 +90,18 @@ class PagePlace:
     """Within the section, figures and tables together."""
     tall: bool = False
     """Whether a table scrolls in a box of its own."""
+    of_mechanism: bool = False
+    """Whether there is nothing to show without a mechanism."""
 
 
-def placed(section: PageSection, order: int, *, tall: bool = False) -> Callable[[F], F]:
-    """Declare where a figure or a table stands on the page."""
+def placed(
+    section: PageSection, order: int, *, tall: bool = False, of_mechanism: bool = False
+) -> Callable[[F], F]:
+    """Declare where a figure or a table stands on the page, and whether it needs a mechanism, as its section may."""
 
     def declare(function: F) -> F:
-        function.place = PagePlace(section, order, tall)  # type: ignore[attr-defined]
+        place = PagePlace(section, order, tall, of_mechanism or section.of_mechanism)
+        function.place = place  # type: ignore[attr-defined]
         return function
 
     return declare

@@ -142,7 +142,7 @@ def _list_shown(offered: Registry, model: Model | None) -> list[tuple[str, Any]]
     return [
         (name, draw)
         for name, draw in offered.items()
-        if model is not None or not get_place(draw).section.of_mechanism
+        if model is not None or not get_place(draw).of_mechanism
     ]
 
 

@@ -119,7 +119,7 @@ def test_a_page_and_values_without_a_robot(invoke, noisy, tmp_path):
     assert summary["model"]["n_base"] == 7
     assert set(summary["selected"]["operations"].values()) == {None}
     page = (results / "report" / "index.html").read_text().split("<script")[0]
-    assert "nothing is known of the robot itself" in page
+    assert "There is no model of the robot" in page
     assert "figure-torques" in page
     assert "operations" not in page
     invoke("export", "--results", results, "--format", "values")

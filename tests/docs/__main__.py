@@ -82,7 +82,9 @@ def main():
             failed |= all_typed(table, page, here, environment)
         if given.page:
             end(table, failed)
-        failed |= typed(table, "controllers.md", CONTROLLER, SYNTAX, folder / "controllers", environment)
+        failed |= typed(
+            table, "controllers.md", CONTROLLER, SYNTAX, folder / "controllers", environment
+        )
         for prepare, pages in SHORT.items():
             here = folder / prepare.__name__
             here.mkdir()

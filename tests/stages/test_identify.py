@@ -81,7 +81,7 @@ def test_summary_and_page(measured_results):
     assert set(found["reduced"]) >= {"n", "train", "held_out"}
     assert found["reduced"]["held_out"] < 0.1
     page = (report / "index.html").read_text().split("<script")[0]
-    assert "What the measurements say" in page
+    assert "Identified parameters" in page
     assert "full model" not in page.lower().replace("beats the full one", "")
     for name in (
         "log-motion",

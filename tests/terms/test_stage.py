@@ -432,15 +432,13 @@ def test_the_exported_header_says_where_a_function_holds(two_link, name):
         assert f"{joint}: {largest:.3g} " in header
     for joint, (lower, upper) in zip(names, np.moveaxis(term.drawn, 2, 0), strict=True):
         assert f"{joint}: position {lower[0]:.4g} to {upper[0]:.4g} rad, velocity {lower[1]:.4g} to {upper[1]:.4g}" in header  # fmt: skip
-    said = (
-        f"Torque error on {term.random_states} of them: {format_percent(term.random_torque_error)}."
-    )
+    said = f"Torque error on {term.random_states} random states: {format_percent(term.random_torque_error)}."
     assert said in header
     assert f"that of {names[term.worst_joint]}, at" in header
     for joint, state in zip(names, term.worst_state.T, strict=True):
         assert f"{joint}: position {state[0]:.4g} rad, velocity {state[1]:.4g} rad/s" in header
     eigenvalue = f"on {term.mass_states} random states: {term.smallest_eigenvalue:.3g}."
-    error = f"accelerations on these: {format_percent(term.random_acceleration_error)}."
+    error = f"accelerations on the random states: {format_percent(term.random_acceleration_error)}."
     assert (eigenvalue in header) == (error in header) == (name == "direct")
     assert "allowed 5 %" in header
     values = write_values(chosen, title, "", model.mechanism, term)["parameters.json"].decode()

@@ -9,7 +9,7 @@ from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS, clip_errors, make_two_plots, place_legend_beside
 
 
-@placed(PageSection.PAPER, 2)
+@placed(PageSection.PAPER, 2, of_mechanism=True)
 def error_vs_operations(data: ReportData) -> Figure:
     """Torque error on the estimation set against operations, for the models whose operations were counted.
 

@@ -8,7 +8,7 @@ from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS, make_figure, mark_selected, place_legend_beside
 
 
-@placed(PageSection.PAPER, 3)
+@placed(PageSection.PAPER, 3, of_mechanism=True)
 def operations(data: ReportData) -> Figure:
     """Operations of the lean inverse and direct dynamics against the number of parameters; thin lines: all parameters.
 

@@ -10,7 +10,7 @@ from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import break_lines, make_figure
 
 
-@placed(PageSection.PAPER, 9)
+@placed(PageSection.PAPER, 9, of_mechanism=True)
 def poses(data: ReportData) -> Figure:
     """Mechanism in a few poses of the validation set."""
     count = len(data.skeletons)

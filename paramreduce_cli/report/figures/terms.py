@@ -9,7 +9,7 @@ from paramreduce_cli.report.page_sections import PageSection, placed
 from paramreduce_cli.report.style import FUNCTIONS, clip_errors, make_two_plots, place_legend_beside
 
 
-@placed(PageSection.PAPER, 8)
+@placed(PageSection.PAPER, 8, of_mechanism=True)
 def terms(data: ReportData) -> Figure | None:
     """Torque error against operations: the best models with fewer parameters, and models whose negligible terms are
     pruned. Filled: estimation set; hollow: validation set. Direct dynamics: only models with a positive definite mass

@@ -33,4 +33,6 @@ def summary(data: ReportData) -> Table:
                 for key, error in (("inverse", "torque"), ("direct", "acceleration"))
             )
             rows.append((name, *model, *d, *M))
-    return Table(f"Reduced models with {n} parameters", HEADER, tuple(rows))
+    known = [k for k in range(len(HEADER)) if any(row[k] != "-" for row in rows)]
+    header, *rows = (tuple(row[k] for k in known) for row in (HEADER, *rows))
+    return Table(f"Reduced models with {n} parameters", header, tuple(rows))
