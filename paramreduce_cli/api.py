@@ -89,7 +89,7 @@ def build_model(config: Config) -> Model:
     """Derive a robot's model, its parameters and its base parameters.
 
     Args:
-        config: As :func:`load_config` reads it.
+        config: Config from :func:`load_config`.
 
     Raises:
         ParamreduceError: The config describes no mechanism that can be.

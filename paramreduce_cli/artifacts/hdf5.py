@@ -66,11 +66,11 @@ class Stamp:
     seed: int
     seconds: float
     digest: str = ""
-    """Of all datasets; set when the file is complete."""
+    """Digest of all datasets; set when the file is complete."""
     cut_short: bool = False
     """Whether Ctrl-C ended a search in it, with which the next run goes on."""
     warnings: tuple[str, ...] = ()
-    """What was said while it was made."""
+    """Warnings of the stage."""
     config: str = ""
     """Name of the config's file; empty where there was none, or where it was not started at the shell."""
 
@@ -216,8 +216,8 @@ def write(path: Path, stamp: Stamp, fill: Callable[[Writer], None]) -> Stamp:
     """Write an artifact as a whole.
 
     Args:
-        path: Where it goes; an older file there stays until the new one is complete.
-        stamp: Its provenance.
+        path: Destination; an older file stays until the new one is complete.
+        stamp: Provenance of the artifact.
         fill: Writes the contents.
 
     Returns:
@@ -371,8 +371,8 @@ class StoredRows:
     """A numeric dataset in a file, of which forward slices are read; an array is made where one is asked for.
 
     Args:
-        reader: Of the file.
-        name: Of the dataset.
+        reader: Reader of the file.
+        name: Name of the dataset.
     """
 
     def __init__(self, reader: Reader, name: str) -> None:

@@ -111,7 +111,7 @@ class StoredSet:
 
     Args:
         path: The file.
-        name: Of its group.
+        name: Name of the group in the file.
         n_parameters: Columns that W must have.
         owns_file: Whether the project wrote the file, so that its triangular factors can be trusted.
 

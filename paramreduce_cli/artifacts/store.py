@@ -168,7 +168,7 @@ def load_file(path: Path, record: type, robot: str | None, maker: str) -> tuple[
 
     Args:
         path: The file.
-        record: Its type.
+        record: Type of the record.
         robot: Name of the robot it must belong to; None to accept any file of the right
             layout, also one that a user brings.
         maker: Command that makes it, for messages.

@@ -114,7 +114,7 @@ def say_table(table: rich.table.Table, least: int = 0) -> None:
     """Print a table to standard output.
 
     Args:
-        table: What to print.
+        table: Table to print.
         least: Columns that it has at least, however narrow the terminal.
     """
     with out.capture() as captured:
@@ -217,7 +217,7 @@ def show_progress(
     """Show long work: one line that moves on a terminal, a line now and then elsewhere, events as JSON, nothing if quiet.
 
     Args:
-        label: What is at work, such as "3/7 reduce".
+        label: Current work, such as "3/7 reduce".
         quiet: Whether nothing is shown.
         as_json: Whether progress is written as events for programs.
 

@@ -48,17 +48,17 @@ class ClearanceSection(Section):
     """
 
     radius: Positive = 0.06
-    """Of capsules that are not given, m."""
+    """Radius of capsules that are not given, m."""
     gap: Annotated[Number, Field(ge=0)] = 0.01
     """Distance that is left between surfaces, m."""
     capsules: dict[Name, list[CapsuleSection]] = {}
-    """By body, `base` for the base; an empty list for a body that is not looked at."""
+    """Capsules by body, `base` for the base; an empty list for a body that is not checked."""
     apart: Annotated[Whole, Field(ge=2)] = 3
     """Joints between two bodies from which on they are looked at; nearer ones cannot get apart."""
     ignore: list[Annotated[list[Name], Field(min_length=2, max_length=2)]] = []
     """Pairs of bodies that are not looked at."""
     planes: list[PlaneSection] = []
-    """That bodies stay above; the base and those that the first joint carries are not looked at."""
+    """Planes that bodies stay above; the base and bodies on the first joint are not checked."""
 
     def build_constraints(self, mechanism: Mechanism) -> Iterator[Constraint]:
         """Yield a constraint for each pair of bodies, and for each body and plane.

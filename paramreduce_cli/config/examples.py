@@ -49,8 +49,8 @@ def copy_example(name: str, path: Path) -> tuple[list[Path], list[str]]:
     """Copy a robot's config, and the files that it names beside it.
 
     Args:
-        name: Of the robot.
-        path: Where its config is to be.
+        name: Name of the robot.
+        path: Destination of the config.
 
     Returns:
         What is there now, the config first; and files that it names which do not come along.

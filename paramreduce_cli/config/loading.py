@@ -99,7 +99,7 @@ def load_section(path: Path, kind: type[S]) -> S:
 
     Args:
         path: The file.
-        kind: What it must be.
+        kind: Type of the section.
 
     Raises:
         ConfigError: As for :func:`load_config`.

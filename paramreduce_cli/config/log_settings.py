@@ -50,15 +50,15 @@ class UnitsSection(Section):
     """The units of the columns of a log."""
 
     time: Literal["s", "ms", "us", "ns"] = "s"
-    """Of time."""
+    """Unit of time."""
     position: Literal["rad", "deg", "rev", "m", "mm"] = "rad"
-    """Of positions."""
+    """Unit of positions."""
     velocity: Literal["rad/s", "deg/s", "rpm", "m/s", "mm/s"] = "rad/s"
-    """Of speeds."""
+    """Unit of speeds."""
     acceleration: Literal["rad/s^2", "deg/s^2", "m/s^2", "mm/s^2"] = "rad/s^2"
-    """Of accelerations."""
+    """Unit of accelerations."""
     torque: Literal["N m", "mN m", "kN m", "N", "A", "mA"] = "N m"
-    """Of torques or currents."""
+    """Unit of torques or currents."""
 
 
 class SignsSection(Section):
@@ -81,11 +81,11 @@ class LogSection(Section):
     held_out: (
         Annotated[Number, Field(ge=0.05, le=0.9)] | Annotated[list[Path], Field(min_length=1)]
     ) = 0.4
-    """What is held out: a share of every file, at its end, or a list of other files."""
+    """Held-out data: a fraction of every file, at its end, or a list of other files."""
     columns: ColumnsSection = ColumnsSection()
-    """What is where in a file."""
+    """Columns that hold each quantity."""
     units: UnitsSection = UnitsSection()
-    """Of the columns."""
+    """Units of the columns."""
     transmission: list[PerJoint] | PerJoint | None = None
     """Motor over joint: one number per joint, or a matrix N of them (motor position = N joint position); recorded positions and torques are then the motors'."""
     torque_constants: PerJoint | None = None
@@ -95,20 +95,20 @@ class LogSection(Section):
     offsets: PerJoint = [0.0]
     """Added to the joint positions, rad (m)."""
     delay: Number = 0.0
-    """By which torques were recorded later than positions, s."""
+    """Delay of the recorded torques against positions, s."""
     trim: Annotated[list[Annotated[Number, Field(ge=0)]], Field(min_length=2, max_length=2)] = [
         0,
         0,
     ]
     """Seconds that are cut off at the start and at the end."""
     standstill: Literal["cut", "keep"] = "cut"
-    """What becomes of the time before the first joint moves and after the last one stops."""
+    """Treatment of the time before the first joint moves and after the last one stops."""
     outliers: Literal["replace", "keep"] = "replace"
     """`replace` adds whole turns that positions jump by, cuts out rows in which positions jump to and fro, and interpolates single torques and positions far from their neighbours; `keep` leaves all of them."""
     state_cutoff: Frequency = "auto"
-    """Of the zero-phase low-pass on positions and speeds, Hz; auto takes it from the spectrum."""
+    """Cut-off frequency of the zero-phase low-pass on positions and speeds, Hz; auto takes it from the spectrum."""
     torque_cutoff: Frequency = "auto"
-    """Of the zero-phase low-pass that torques and observation matrix share, Hz; auto is the frequency up to which there is motion, none leaves torques as recorded."""
+    """Torque cutoff of the zero-phase low-pass that torques and observation matrix share, Hz; auto is the frequency up to which there is motion, none leaves torques as recorded."""
     rate: Positive | None = None
     """Samples per second that are used; if left out ten per period of the torque cut-off, or as recorded."""
     folds: Annotated[Whole, Field(ge=2, le=100)] = 5

@@ -98,17 +98,17 @@ class TrajectoriesSection(Section):
     constraints: list[ConstraintSection] = []
     """Bounds on quantities of the mechanism along the trajectories, besides the limits of the independent coordinates."""
     criterion: Criterion = "condition-number"
-    """What is minimised."""
+    """Quantity that is minimised."""
     scaling: Scaling = "column-normalised"
     """Scaling of the base columns of W in which the criterion is measured."""
     starts: Count = 8
     """Starts per trajectory; where nothing but joint limits binds, each is the best of many random motions."""
     polished: Count = 2
-    """How many of the most promising starts are optimised to the end."""
+    """Number of the most promising starts that are optimised to the end."""
     max_iterations: Count = 250
-    """Of IPOPT, for each level of sharpness."""
+    """Largest number of IPOPT's iterations, for each level of sharpness."""
     seed: Seed = 0
-    """Of the random starts."""
+    """Seed of the random starts."""
     file: Path | None = None
     """Fourier coefficients to use instead of optimising: a trajectories.h5, or a summary.json; relative to this file."""
 
@@ -136,15 +136,15 @@ class InputSection(Section):
     """A force on an independent coordinate in a simulation: sines of time with random phases, and feedback."""
 
     amplitude: Annotated[Number, Field(ge=0)] = 0.0
-    """Of each sine, N m (N if prismatic)."""
+    """Amplitude of each sine, N m (N if prismatic)."""
     frequencies: list[Positive] = []
-    """Of the sines, Hz."""
+    """Frequencies of the sines, Hz."""
     stiffness: Annotated[Number, Field(ge=0)] = 0.0
     """Feedback of the coordinate, N m/rad (N/m)."""
     damping: Annotated[Number, Field(ge=0)] = 0.0
     """Feedback of its speed, N m s/rad (N s/m)."""
     reference: Number = 0.0
-    """Where the feedback leads, rad (m)."""
+    """Position that the feedback leads to, rad (m)."""
 
     @model_validator(mode="after")
     def _check_amplitude(self) -> InputSection:
@@ -161,11 +161,11 @@ class SimulationSection(Section):
     """
 
     inputs: Annotated[dict[str, InputSection], Field(min_length=1)]
-    """By independent coordinate."""
+    """Inputs by the name of the independent coordinate."""
     duration: Span = 10.0
-    """Of each motion, s."""
+    """Duration of each motion, s."""
     step: Positive = 0.01
-    """Between samples, s."""
+    """Step between samples, s."""
     runs: Count = 4
     """Motions of the estimation set."""
     validation_runs: Count = 1
@@ -194,7 +194,7 @@ class SamplingSection(Section):
     log: LogSection | None = None
     """Logs of the machine instead of trajectories, for both sets."""
     torques: Literal["measured", "model"] = "measured"
-    """Of recorded states: measured ones, which the files must hold, or those of the model, whatever they hold."""
+    """Torques of recorded states: measured ones, which the files must hold, or those of the model."""
     symmetries: list[Annotated[list[str], Field(min_length=1)]] = []
     """Symmetries of the mechanism that complete the estimation set: each lists, for every independent coordinate in turn, the one that moves in its place, `-NAME` where it moves the other way."""
     nominal_acceleration: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"
@@ -215,11 +215,11 @@ class GroupSection(Section):
     """A rule that groups parameters of the same role on several bodies: they are selected or dropped together."""
 
     name: Name
-    """Of the group; with bodies the groups are called KIND_NAME."""
+    """Name of the group; with bodies the groups are called KIND_NAME."""
     bodies: Annotated[list[Name], Field(min_length=2)] | None = None
     """Bodies that play the same role: each kind of parameter makes a group of its own."""
     kinds: Annotated[list[ParameterKind], Field(min_length=1)] = [*get_args(ParameterKind)]
-    """Which kinds of parameters of these bodies are grouped."""
+    """Kinds of parameters of these bodies that are grouped."""
     parameters: Annotated[list[str], Field(min_length=2)] | None = None
     """Names of the parameters of one group, instead of bodies."""
     tied: bool = False
@@ -257,7 +257,7 @@ class BestSubset(Section):
     """The search for proven subsets."""
 
     time_limit: Annotated[Number, Field(ge=0)] = 60.0
-    """For all sizes together, s; what is not proven then is reported with a lower bound, and the next run goes on."""
+    """Time limit for all sizes together, s; what is not proven then is reported with a lower bound, and the next run goes on."""
     node_limit: Count | None = None
     """Nodes of the search tree for each size: ends at the same place on every machine, but where jobs share subtrees."""
     parts: Literal["sizes", "subtrees"] = "sizes"
@@ -334,21 +334,21 @@ class Acceptance(Section):
     """The largest values at which the selected model is accepted; missing limits are not checked."""
 
     torque_error_estimation: Positive | None = None
-    """Of the torques on the estimation set, a share (0.01 is 1 %)."""
+    """Torque error on the estimation set, a fraction (0.01 is 1 %)."""
     torque_error_validation: Positive | None = None
-    """Of the torques on the validation set, a share."""
+    """Torque error on the validation set, a fraction."""
     torque_error_test: Positive | None = None
-    """Of the torques, the median over the motions of the test set, a share."""
+    """Torque error on the test set: median over its motions, a fraction."""
     torque_error_test_worst: Positive | None = None
-    """Of the torques, the worst of the motions of the test set, a share."""
+    """Torque error on the worst motion of the test set, a fraction."""
     acceleration_error_estimation: Positive | None = None
-    """Of the accelerations on the estimation set, a share."""
+    """Acceleration error on the estimation set, a fraction."""
     acceleration_error_validation: Positive | None = None
-    """Of the accelerations on the validation set, a share."""
+    """Acceleration error on the validation set, a fraction."""
     acceleration_error_test: Positive | None = None
-    """Of the accelerations, the median over the motions of the test set, a share."""
+    """Acceleration error on the test set: median over its motions, a fraction."""
     acceleration_error_test_worst: Positive | None = None
-    """Of the accelerations, the worst of the motions of the test set, a share."""
+    """Acceleration error on the worst motion of the test set, a fraction."""
     operations_inverse: Positive | None = None
     """Operations of the inverse dynamics."""
     operations_direct: Positive | None = None
@@ -361,7 +361,7 @@ class ValidationSection(Section):
     accept: Acceptance = Acceptance()
     """Limits that turn into the exit code: 0 accepted, 1 not accepted."""
     operations: CountedDynamics = CountedDynamics.GENERALISED
-    """Of closed loops: count d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b handed in."""
+    """Functions of closed loops to count: d_q and [M_qq | delta_q] of the open tree, or d_z and [M_zz | delta_z] with R and b as inputs."""
     stability: bool = True
     """Whether the selection is repeated with each trajectory left out and with fewer samples."""
 
@@ -370,9 +370,9 @@ class TrackingSection(Section):
     """The settings for computed-torque control with the full and with the selected model, in simulation."""
 
     bandwidth: Positive = 20.0
-    """Of the feedback, critically damped, rad/s."""
+    """Bandwidth of the feedback, critically damped, rad/s."""
     moves: Annotated[int, Field(ge=1, le=20)] = 4
-    """How many moves from rest to rest the arm makes."""
+    """Number of moves from rest to rest."""
 
 
 class ReportSection(Section):

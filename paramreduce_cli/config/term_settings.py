@@ -23,4 +23,4 @@ class TermsSection(Section):
     rounds: Annotated[Whole, Field(ge=0, le=100_000)] = 8
     """How many times in a row it may bring nothing to leave terms out once more: first of the best subsets, in formulations changed at random, then from shortly before the best ends. What saves less than one operation in two hundred brings nothing."""
     time_limit: Annotated[Number, Field(gt=0)] | None = None
-    """For the descents of each function, s, which takes somewhat longer as a whole: then no more are begun, and what is found depends on the machine; without it they end by themselves."""
+    """Time limit for the descents of each function, s, which takes somewhat longer as a whole: then no more are begun, and what is found depends on the machine; without it they end by themselves."""

@@ -11,7 +11,7 @@ _DEEPEST = 50
 _MOST_TEXT = 1_000_000
 """Characters; a config of a hundred bodies has a hundred thousand."""
 _MOST_VALUES = 20_000
-"""Of a config, as often as aliases repeat them."""
+"""Most values of a config, as often as aliases repeat them."""
 _LARGEST_INTEGER = 2**53
 """Beyond it an integer is no exact number of a computer's arithmetic."""
 _SHOWN = 60
@@ -56,7 +56,7 @@ def read_yaml(text: str, source: str) -> Document:
 
     Args:
         text: The text.
-        source: Its name in messages.
+        source: Name of the source, for messages.
 
     Raises:
         yaml.YAMLError: It is not YAML.

@@ -56,13 +56,13 @@ class Excitation:
     measured: Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
     """The same columns by q, dz and ddz without smoothing, where friction has a sign that jumps."""
     coordinates: Coordinates
-    """From the independent coordinates to all of them."""
+    """Map from the independent coordinates to all of them."""
     quantities: Quantities
     """Quantities of the mechanism that are bounded."""
     beta: FloatArray
     """The other columns in the base columns, (r, n - r)."""
     torque_scale: FloatArray
-    """What rows of each joint are divided by, (n_dof,), N m or N."""
+    """Divisor of the rows of each joint, (n_dof,), N m or N."""
     criterion: Criterion
     scaling: Scaling
     loads: TorqueConstraints
@@ -202,11 +202,11 @@ class FreeObjective:
     limits: LimitMap
     """Map from free to admissible series."""
     level: Level
-    """How sharp criterion and limits are."""
+    """Sharpness of criterion and limits."""
     positions: Follower
-    """Where the mechanism is along the motion."""
+    """Positions of the mechanism along the motion."""
     mixing: FloatArray
-    """From the solver's series to those of the joints, (n_dof, n_dof)."""
+    """Map from the solver's series to those of the joints, (n_dof, n_dof)."""
 
     def __call__(self, x: FloatArray) -> tuple[float, FloatArray]:
         """Value and gradient at ``x``, the unmixed free series stacked joint by joint.

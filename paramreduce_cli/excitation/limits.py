@@ -31,7 +31,7 @@ class LimitMap:
     within the room that is left.
 
     Args:
-        limits: Of all joints.
+        limits: Limits of all joints.
         basis: The series on an equidistant grid over one period.
         mapping: ``gauge`` or ``ball``.
         rest_to_rest: Whether motions begin and end without velocity and acceleration: two linear

@@ -43,7 +43,7 @@ class Step:
 
     level: Level
     share: float
-    """Of the starts beyond those that are polished, 1 for all starts and 0 for these alone."""
+    """Fraction of the starts beyond the polished ones: 1 for all starts, 0 for the polished ones alone."""
     rule: Mapping[str, float]
     """When IPOPT stops."""
     most: int = 1000
@@ -96,19 +96,19 @@ class TrajectorySettings:
     """s"""
     harmonics: int
     points: int
-    """Of the grid on which the criterion and the limits are evaluated, at the last level if no earlier."""
+    """Number of points of the grid on which the criterion and the limits are evaluated, at the last level if no earlier."""
     limits: JointLimits
     mapping: LimitMapping
     rest_to_rest: bool
     """Whether motions begin and end without velocity and acceleration."""
     start_pose: FloatArray | None
-    """Where to look for motions with bounds; None for where the middle of the limits leads."""
+    """Position to start the search for motions with bounds from; None for the middle of the limits."""
     starts: int
-    """How many series are optimised at first."""
+    """Number of series that are optimised at first."""
     polished: int
-    """How many of them go on to the sharp levels."""
+    """Number of these that continue to the sharp levels."""
     max_iterations: int
-    """Of IPOPT, per level."""
+    """Largest number of IPOPT's iterations per level."""
     scaling: str
     """Name of the scaling whose condition number is reported first."""
 
@@ -134,7 +134,7 @@ class _Grid:
 
     basis: FourierBasis
     limits: LimitMap
-    """To series that keep the limits of the independent coordinates on it."""
+    """Map to series that keep the limits of the independent coordinates on the grid."""
 
 
 @dataclass
@@ -145,7 +145,7 @@ class _Candidate:
     """The free series that it began with."""
     free: FloatArray
     value: float
-    """Of the objective that it went through last."""
+    """Value of the last objective."""
     curvature: FloatArray | None = None
     status: str = ""
 
@@ -156,9 +156,9 @@ def optimise_trajectory(
     """Find one exciting trajectory.
 
     Args:
-        excitation: What is measured.
-        settings: What is asked.
-        seed: Of the random starts; the result depends on nothing else.
+        excitation: Excitation objective.
+        settings: Settings of the trajectory.
+        seed: Seed of the random starts; the result depends on nothing else.
 
     Raises:
         NumericalError: No motion keeps the bounds; says which one stops it.

@@ -17,9 +17,9 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import FloatArray
 
 _TOLERANCE = 1e-8
-"""Of the integration, relative and absolute; it moves the path, not the fit of its samples."""
+"""Tolerance of the integration, relative and absolute; it moves the path, not the fit of its samples."""
 _MOST_EVALUATIONS = 100
-"""Of the dynamics for each sample, on average; a dozen are usual."""
+"""Most evaluations of the dynamics for each sample, on average; a dozen are usual."""
 _METHOD = "LSODA"
 """Stiff where friction is smooth but steep, and not where it is not."""
 
@@ -29,13 +29,13 @@ class Input:
     """A force on an independent coordinate: sines of time, and feedback towards a rest."""
 
     amplitude: float = 0.0
-    """Of each sine, N m or N."""
+    """Amplitude of each sine, N m or N."""
     frequencies: tuple[float, ...] = ()
     """Hz"""
     phases: tuple[float, ...] = ()
     """rad"""
     stiffness: float = 0.0
-    """Of the feedback, N m/rad or N/m."""
+    """Stiffness of the feedback, N m/rad or N/m."""
     damping: float = 0.0
     """N m s/rad or N s/m"""
     reference: float = 0.0
@@ -61,7 +61,7 @@ class SimulatedMotion:
     dz: FloatArray
     ddz: FloatArray
     tau: FloatArray
-    """What the inputs were, zero where there is none."""
+    """Inputs, zero where there is none, (n_samples, n_dof), N m or N."""
 
 
 def simulate(
@@ -74,11 +74,11 @@ def simulate(
     """Move from rest under inputs.
 
     Args:
-        dynamics: Of the mechanism.
+        dynamics: Dynamics of the mechanism.
         phi: Standard parameters of the full model, (n_parameters,).
         inputs: One per independent coordinate.
         start: Independent coordinates to start from, (n_dof,), rad or m.
-        time: Of the samples, from zero, (n_samples,), s.
+        time: Time of the samples, from zero, (n_samples,), s.
 
     Raises:
         DataError: The motion grows beyond all bounds, or the loops cannot be closed.

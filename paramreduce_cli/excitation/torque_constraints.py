@@ -12,10 +12,10 @@ class TorqueConstraints:
     """The limits of torque and power as rows that are at most zero where the limits are kept.
 
     Attributes:
-        values: Of the base parameters, (r,).
+        values: Values of the base parameters, (r,).
         torque: Limits, (n_dof,), N m or N; infinite where there is none.
         power: Limits, (n_dof,), W.
-        scale: What rows of the observation matrix were divided by, (n_dof,).
+        scale: Divisor of the rows of the observation matrix, (n_dof,).
     """
 
     values: FloatArray

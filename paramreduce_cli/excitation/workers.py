@@ -40,9 +40,9 @@ class ExcitationTask:
     mechanism: Mechanism
     base: BaseParameters
     base_values: FloatArray
-    """Of the base parameters, (r,)."""
+    """Values of the base parameters, (r,)."""
     torque_scale: FloatArray
-    """What rows of each joint are divided by, (n_dof,), N m or N."""
+    """Divisor of the rows of each joint, (n_dof,), N m or N."""
     criterion: str
     constraints: tuple[Constraint, ...]
     settings: TrajectorySettings
@@ -84,7 +84,7 @@ def optimise_all(
     """Optimise the trajectories that are not among the finished items yet.
 
     Args:
-        task: What is asked.
+        task: Task with objective, limits and settings.
         keys: Names of the trajectories; each seeds its own random numbers.
         run: Number of processes, and the progress callback.
         items: Finished trajectories, and the part of this job.

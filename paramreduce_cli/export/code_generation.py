@@ -82,11 +82,11 @@ def make_exported_model(
         what: Functions to export.
         constant: Whether the values of the parameters are part of the code.
         single: Whether numbers have single precision.
-        origin: Of the model, for the comment that opens every file.
+        origin: Artifact that the model is from, for the comment that opens every file.
         simplified: The function that is asked for with pruned terms, whose parameters are those of
             the model.
-        validation: Says in which ranges the model was validated; None where it was not.
-        report_progress: Told of its steps.
+        validation: Validation, for the ranges that the model was validated in; None without one.
+        report_progress: Progress callback.
 
     Raises:
         FormulationError: The functions do not compute what the straightforward model does.

@@ -31,10 +31,10 @@ def make_random_cases(
     not know; states are inside the ranges that it holds in, those of loops anywhere.
 
     Args:
-        mechanism: Of the robot.
+        mechanism: Mechanism of the robot.
         model: The reduced model.
         count: Number of states.
-        rng: Where they come from.
+        rng: Random generator.
         simplified: A function with pruned terms.
     """
     q, dq, ddq = draw_states(mechanism, count, rng)
@@ -111,7 +111,7 @@ def check(
     """Compare functions with stored results, joint by joint.
 
     Args:
-        functions: To be checked.
+        functions: Functions to be checked.
         stored: Their arguments and expected results, (n_states, ...) by name.
         least: Smallest sizes that results are judged by, by name.
         tolerance: Share of the size of each result that is allowed.
@@ -156,7 +156,7 @@ def measure_single_precision(
     That is with NumPy's sines and without contraction; compiled code has been found 1.5 times as far off.
 
     Args:
-        functions: With their arguments and results.
+        functions: Functions with their arguments and results.
         stored: Arguments and exact results, (n_states, ...) by name.
         least: Smallest sizes that results are judged by, by name.
     """

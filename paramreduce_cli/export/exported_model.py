@@ -19,7 +19,7 @@ class ParameterValue:
     value: float
     unit: str
     expression: str
-    """What it stands for, in standard parameters."""
+    """Sum of standard parameters that the value is of."""
 
 
 @dataclass(frozen=True)
@@ -28,12 +28,12 @@ class ExportedModel:
 
     robot: str
     heading: tuple[str, ...]
-    """Where it comes from and what it is worth, line by line."""
+    """Origin and accuracy of the model, line by line."""
     frames: tuple[str, ...]
-    """In which frames the parameters are, line by line."""
+    """Frames that the parameters refer to, line by line."""
     coordinates: tuple[str, ...]
     units: tuple[str, ...]
-    """Of these, rad or m."""
+    """Unit of each coordinate, rad or m."""
     independent: IntArray
     """Positions of the independent coordinates, (n_dof,)."""
     parameters: tuple[ParameterValue, ...]
@@ -43,7 +43,7 @@ class ExportedModel:
     """Whether the values of the parameters are in the code."""
     functions: tuple[Function, ...]
     closures: tuple[Function, ...]
-    """Of a mechanism with loops; empty for a tree."""
+    """Closures of a mechanism with loops; empty for a tree."""
     single: bool
     """Whether numbers have single precision, where the language has a choice."""
     cases: Mapping[str, FloatArray]

@@ -15,9 +15,9 @@ class Language:
     """A language with its way to write expressions."""
 
     calls: Mapping[str, str]
-    """Its names of :data:`FUNCTIONS`."""
+    """Names of :data:`FUNCTIONS` in the language."""
     number: Callable[[float], str]
-    """How a constant is written."""
+    """Function that writes a constant."""
     element: Callable[[Argument, int], str]
     """An element of an array, by its position row by row."""
 

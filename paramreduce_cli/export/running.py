@@ -32,9 +32,9 @@ class RunningModel:
     Without a compiler its expressions are evaluated in Python.
 
     Args:
-        model: Of the robot.
+        model: Model of the robot.
         chosen: The model.
-        what: Which function.
+        what: Function to run.
     """
 
     def __init__(self, model: Model, chosen: ReducedModel, what: Exported = Exported.IDM) -> None:
@@ -72,9 +72,8 @@ class RunningModel:
         """Results for some states, (n_states, n): torques, or mass matrices row by row and then delta.
 
         Args:
-            states: What it takes: q, dq and ddq, (n_states, n_q) each, and with loops R, (n_states, n_q - n_dof, n_dof),
-                and b, (n_states, n_q - n_dof).
-            repetitions: How often the same is done.
+            states: States in the order of `takes`: q, dq and ddq, (n_states, n_q) each, and with loops R, (n_states, n_q - n_dof, n_dof), and b, (n_states, n_q - n_dof).
+            repetitions: Number of repetitions, for timing.
         """
         count = len(states[0])
         arrays = [np.ascontiguousarray(x).reshape(count, -1) for x in states]

@@ -18,7 +18,7 @@ class Sines:
     limit: float
     """Angles beyond it go to the library, rad."""
     parts: tuple[float, ...]
-    """Of pi/2, large ones first."""
+    """Parts of pi/2, large ones first."""
     sine: tuple[float, ...]
     """S, constant term first; it is off by 3e-18, single 4e-9."""
     cosine: tuple[float, ...]

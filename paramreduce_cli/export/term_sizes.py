@@ -64,8 +64,8 @@ def find_entry_sizes(name: str, expected: FloatArray, least: float) -> FloatArra
 
     Args:
         name: Name of the result.
-        expected: Its values, (n_states, ...).
-        least: Its smallest size.
+        expected: Values of the result, (n_states, ...).
+        least: Smallest size of the result.
 
     Returns:
         An array that broadcasts to one state of the result.

@@ -81,7 +81,7 @@ def minimise_operations(candidates: Iterable[Values], seed: int = 0) -> Values:
     Args:
         candidates: The same values, written in one or several ways; those that are far behind before they are
             rewritten are dropped.
-        seed: Where they begin; others may come to another end.
+        seed: Seed of the random changes; other seeds may end elsewhere.
 
     Returns:
         What takes the fewest operations.

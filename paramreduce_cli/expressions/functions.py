@@ -19,7 +19,7 @@ class Argument:
     shape: tuple[int, ...]
     """One or two lengths; matrices are stored row by row."""
     text: str
-    """What it is, with its unit."""
+    """Meaning of the array, with its unit."""
 
     @property
     def size(self) -> int:
@@ -36,7 +36,7 @@ class Function:
 
     name: str
     text: str
-    """What it computes, in one sentence."""
+    """Sentence on what the function computes."""
     arguments: tuple[Argument, ...]
     results: tuple[Argument, ...]
     program: Program

@@ -21,7 +21,7 @@ class Node(NamedTuple):
     """``constant``, ``input``, ``+``, ``*`` or the name of a function."""
     operands: tuple[int, ...] = ()
     number: float = 0.0
-    """Of a constant, its size; of an input, its position."""
+    """Number of a constant, its size; of an input, its position."""
 
 
 class Graph:

@@ -19,7 +19,7 @@ class LiveCount:
     """A program in arrays.
 
     Args:
-        program: To be counted.
+        program: Program to be counted.
     """
 
     def __init__(self, program: Program) -> None:
@@ -39,7 +39,7 @@ class LiveCount:
         """Operations left.
 
         Args:
-            zero: Which of the first inputs are zero.
+            zero: Mask of the first inputs that are zero.
         """
         return int(_count_live(self._kinds, self._operands, self._inputs, self._outputs, zero))
 

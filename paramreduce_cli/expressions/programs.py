@@ -142,7 +142,7 @@ class Program:
         """Build the program again in another graph.
 
         Args:
-            graph: Where its nodes go.
+            graph: Graph that the nodes are added to.
             substitute: The value in that graph of an input, by position; the input of the same
                 position if there is none.
 

@@ -31,7 +31,7 @@ from paramreduce_cli.expressions.simplification_rules import insert, simplify_to
 _AT_MOST = 6
 """Places at which it is rewritten at once."""
 _LOOKS = 10_000
-"""At places, until one is found where something can be rewritten."""
+"""Looks at places, until one is found where something can be rewritten."""
 
 
 @on_rows
@@ -39,8 +39,8 @@ def rewrite(rows: Rows, tries: int) -> None:
     """Rewrite rows until tries save nothing more.
 
     Args:
-        rows: Changed.
-        tries: How often something else is tried, after the laws have been applied.
+        rows: Rows of sums and products; changed in place.
+        tries: Number of random rewritings that are tried after the simplification rules.
     """
     for k in range(tries + 1):
         cost = rows.counters[COST]
@@ -78,9 +78,9 @@ def _distribute(rows: Rows, n: int, place: int, joined: bool) -> None:
     """Turn a product with a sum into a sum of products.
 
     Args:
-        rows: Changed.
+        rows: Rows of sums and products; changed in place.
         n: The product.
-        place: Of the sum among its factors.
+        place: Place of the sum among its factors.
         joined: Whether products in the sum are written out.
     """
     row, total = rows.room[0], rows.room[1]

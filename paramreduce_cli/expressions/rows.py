@@ -33,16 +33,16 @@ last on, how many wait on each list."""
 END = -1
 
 on_rows = compile_loop(makes_arrays=False)
-"""For functions of rows that are called from Python, too."""
+"""On rows for functions of rows that are called from Python, too."""
 within = compile_loop(within=True, makes_arrays=False)
-"""For all others."""
+"""Within for all others."""
 
 
 class Rows(NamedTuple):
     """A record of all rows of some values, in few arrays, as each costs compilation time."""
 
     numbers: IntArray
-    """What is known of every number, (size, WAITS + lists)"""
+    """Counters of every number, (size, WAITS + lists)."""
     terms: IntArray
     """(size, width)"""
     links: IntArray
@@ -50,15 +50,15 @@ class Rows(NamedTuple):
     waiting: IntArray
     """Lists of numbers, (lists, size)"""
     saved: IntArray
-    """Which rows have changed since :func:`keep`, and what they were, (size, 3)"""
+    """Rows that have changed since :func:`keep`, with their former contents, (size, 3)."""
     saved_terms: IntArray
     """(size, width)"""
     counters: IntArray
     """(WAITING + lists,)"""
     room: IntArray
-    """For rows that are being made, (4, 2 * size + 2 * width)"""
+    """Buffer for rows under construction, (4, 2 * size + 2 * width)."""
     pairs: IntArray
-    """For counts of pairs of terms, (width, width)"""
+    """Counts of pairs of terms, (width, width)."""
 
 
 def make_rows(
@@ -74,7 +74,7 @@ def make_rows(
         sums: Terms of sums.
         products: Terms of products, none of them negative.
         pinned: Numbers that something else refers to.
-        numbers: How many are taken.
+        numbers: Number of slots in use.
         others: Operations that have no row.
     """
     tables = ((SUM, sums), (PRODUCT, products))
@@ -208,8 +208,8 @@ def put(rows: Rows, number: int, kind: int, row: IntArray) -> None:
     Args:
         rows: All of them.
         number: Whose row it is.
-        kind: What it is joined to.
-        row: Its terms; of a sum, opposites vanish, and if none is left it is zero. Changed.
+        kind: Operation of the row: sum or product.
+        row: Terms of the row, changed in place; opposites in a sum cancel, and an empty sum is zero.
     """
     if kind == SUM:
         length = _cancel(row)

@@ -19,7 +19,7 @@ from paramreduce_cli.expressions.programs import Program
 from paramreduce_cli.records import FloatArray
 
 _ROUNDING = 1e-9
-"""Of coefficients of equations in s, and of numbers."""
+"""Rounding of coefficients of equations in s, and of numbers."""
 _DIGITS = 6
 """To which equations are told apart."""
 
@@ -30,8 +30,8 @@ def rescale(program: Program, n: int) -> tuple[Program, FloatArray]:
     Those that vanish together in most places are made to first, then others as far as these leave it open.
 
     Args:
-        program: Of sums, products and functions, numbers folded as a :class:`Graph` folds them.
-        n: How many inputs, the first ones, may come in other units.
+        program: Program of sums, products and functions, numbers folded as a :class:`Graph` folds them.
+        n: Number of first inputs that may come in other units.
 
     Returns:
         The program, and the sizes of the units that these inputs come in, (n,): what they were is so many
@@ -50,8 +50,8 @@ class _Rescaler:
     """A builder of a program in new units.
 
     Args:
-        program: As it is.
-        units: Of its nodes.
+        program: Program before rescaling.
+        units: Units of its nodes.
     """
 
     def __init__(self, program: Program, units: _Units) -> None:
@@ -111,7 +111,7 @@ class _Units:
 
     Args:
         program: Whose nodes.
-        n: How many inputs may have one.
+        n: Number of inputs that may have a unit.
     """
 
     def __init__(self, program: Program, n: int) -> None:

@@ -36,7 +36,7 @@ def simplify_to_fixed_point(rows: Rows, products_first: bool) -> None:
     """Apply all laws until none saves an operation.
 
     Args:
-        rows: Changed.
+        rows: Rows of sums and products; changed in place.
         products_first: Whether products share pairs before factors are taken out.
     """
     tidy(rows)

@@ -33,11 +33,10 @@ class Physical:
     """The parameters that belong to bodies, and those that must not be negative.
 
     Attributes:
-        names: Of bodies and payloads.
-        columns: Of each, its parameters in the order of ``INERTIAL``, (n_bodies, 10).
+        names: Names of bodies and payloads.
+        columns: Columns of each, its parameters in the order of ``INERTIAL``, (n_bodies, 10).
         positive: Parameters that must not be negative.
-        sizes: How far each parameter may be from what is known, (n_parameters,): as much as it is for a
-            body of its mass and size; for those of drives, the value that alone would make all torques.
+        sizes: Scale of each parameter, (n_parameters,): its size for a body of that mass and extent; for drives the known value.
         known: (n_parameters,)
     """
 
@@ -99,7 +98,7 @@ def fit_unconstrained(factor: FloatArray, physical: Physical) -> FloatArray:
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
-        physical: What is known.
+        physical: Known parameters and their scales.
     """
     A, b = _stack_rows(factor, physical)
     solution = np.linalg.lstsq(A, b, rcond=None)[0]
@@ -120,9 +119,8 @@ def fit_consistent(factor: FloatArray, physical: Physical, distance: str) -> Flo
 
     Args:
         factor: Triangular factor of [W | tau] with rows divided by the noise, (k, n + 1).
-        physical: What is known and what must hold.
-        distance: To the known bodies: `euclidean` in units of their size, or `entropic`, the
-            divergence of their mass distributions [Lee2020].
+        physical: Known parameters, their scales and the constraints.
+        distance: Distance to the known bodies: `euclidean` in units of their size, or `entropic`, the divergence of their mass distributions [Lee2020].
 
     Raises:
         DataError: The solver finds no solution, or entropic distances are asked to bodies that are not

@@ -22,15 +22,15 @@ from paramreduce_cli.records import Block, FloatArray, Residuals
 _MOST_SAMPLES = 40_000
 """That noise and standard deviations are taken from."""
 _ROUNDS = 3
-"""Of the correction for what a fit takes out of its residuals."""
+"""Rounds of the correction for what a fit takes out of its residuals."""
 _DRAWS = 4
-"""Of noise in each."""
+"""Draws of noise in each."""
 _TUNING = 1.345
 """Huber's constant: residuals beyond so many deviations count less."""
 _MOST_ROUNDS = 30
 _SETTLED = 1e-6
 _LAGS = 10
-"""Of the test of whiteness."""
+"""Lags of the test of whiteness."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +42,8 @@ class Rows:
         tau: (n_samples, n_dof) each.
         dz: Speeds, like tau.
         ddz: Accelerations, like tau.
-        step: Between samples, s.
-        share: Of all samples that these are.
+        step: Step between samples, s.
+        share: Fraction of all samples that these are.
     """
 
     X: tuple[FloatArray, ...]
@@ -65,7 +65,7 @@ def collect_rows(blocks: Iterable[Block], columns: FloatArray, n_samples: int) -
     Args:
         blocks: The samples.
         columns: Standard parameters by those of the model, (n_standard, p).
-        n_samples: How many there are.
+        n_samples: Number of samples.
     """
     share = min(1.0, _MOST_SAMPLES / n_samples)
     parts: dict[tuple[int, int], list[tuple[FloatArray, ...]]] = {}
@@ -100,7 +100,7 @@ def fit_robustly(
     Args:
         make: Yields (X, tau) blocks of all samples anew, (n, n_dof, p) and (n, n_dof).
         start: Parameters to begin with, (p,).
-        deviation: Of each joint's noise, (n_dof,); infinite where torques are not measured.
+        deviation: Standard deviation of each joint's noise, (n_dof,); infinite where torques are not measured.
 
     Returns:
         The parameters, and the deviations of the bulk of the residuals.
@@ -130,9 +130,9 @@ class LinearFit:
     """A weighted least-squares estimate with what its noise is like.
 
     Attributes:
-        rows: Of its model.
+        rows: Rows of the model.
         parameters: (p,)
-        deviation: That torques of each joint were divided by, (n_dof,); infinite where not measured.
+        deviation: Divisor of the torques of each joint, (n_dof,); infinite where not measured.
     """
 
     rows: Rows
@@ -231,7 +231,7 @@ def fit_weighted(rows: Rows, deviation: FloatArray) -> LinearFit:
 
     Args:
         rows: Rows of the model.
-        deviation: That torques of each joint are divided by, (n_dof,); infinite where not measured.
+        deviation: Divisor of the torques of each joint, (n_dof,); infinite where not measured.
     """
     X = np.concatenate([(x / deviation[:, None]).reshape(-1, x.shape[2]) for x in rows.X])
     y = np.concatenate([(t / deviation).ravel() for t in rows.tau])

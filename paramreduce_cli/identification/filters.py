@@ -23,7 +23,7 @@ _ABOVE_FLOOR = 10.0
 _IN_A_ROW = 5
 """Frequencies below that, one after the other, that end the motion's band."""
 _SEGMENTS = 4
-"""Of the log in a spectrum: the longer, the finer in frequency."""
+"""Segments of the log in a spectrum: the longer, the finer in frequency."""
 _DERIVATIVE = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
 """Central differences of eighth order."""
 

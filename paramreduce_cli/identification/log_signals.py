@@ -41,8 +41,8 @@ def find_longest(learned: list[list[Piece]], held_out: list[list[Piece]], rate: 
     """Return the longest training motion, with the held-out part of the same motion.
 
     Args:
-        learned: At least one motion.
-        held_out: Of the same files; empty if it is of others.
+        learned: Training motions, at least one.
+        held_out: Held-out motions of the same files; empty if they are from other files.
         rate: Samples per second.
     """
     sizes = [
@@ -84,9 +84,9 @@ def collect_signals(
     Args:
         recorded: Times, positions, speeds and torques as recorded.
         ready: Processed training motion, with the held-out part of the same motion if there is one.
-        torque_cutoff: Of the low-pass that torques have still to pass, Hz.
+        torque_cutoff: Cut-off frequency of the low-pass that torques still have to pass, Hz.
         rate: Samples per second of what is ready.
-        outliers: Of the file.
+        outliers: Outliers of the file.
     """
     taps = filters.design_low_pass(torque_cutoff, rate)
     raw_time, raw_z, raw_dz, raw_tau = recorded

@@ -92,10 +92,10 @@ class LoggedSet:
 
     motions: MeasuredMotions
     log: MeasuredLog
-    """For the low-pass."""
+    """Log, for its low-pass filters."""
     dynamics: Dynamics
     source: str
-    """What the states are, for messages."""
+    """Source of the states, for messages."""
     measured: np.ndarray | None = None
     """Joints whose torques are measured, the others' are zero, (n_dof,); all if left out."""
 

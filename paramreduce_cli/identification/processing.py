@@ -74,7 +74,7 @@ def process_logs(
         logs: Logs as recorded.
         section: Settings of the section for logs.
         names: Names of the independent coordinates.
-        report_progress: Called with the progress.
+        report_progress: Progress callback.
         unmeasured: Coordinates without torques.
 
     Raises:

@@ -27,9 +27,9 @@ class LogQuality:
     n_base: int
     """Base parameters that motions can tell."""
     rank: int
-    """Those that this one does, noise apart."""
+    """Number of base parameters that the log determines, noise apart."""
     condition: float
-    """Of the observation matrix of the base parameters with columns of unit length."""
+    """Condition number of the observation matrix of the base parameters with columns of unit length."""
     weak: tuple[str, ...]
     """Base parameters that can hardly be told from the others."""
 

@@ -19,7 +19,7 @@ from paramreduce_cli.records import FloatArray
 _SURE = 5.0
 """Standard deviations from zero at which a signal is there."""
 _SHARE = 0.02
-"""Of a joint's residuals that it must explain, squared."""
+"""Share of a joint's residuals that it must explain, squared."""
 _OBVIOUS = 0.25
 """Share that needs less sureness, as what is missing has coloured the noise that it is measured by."""
 _OBVIOUSLY_SURE = 3.0
@@ -29,7 +29,7 @@ _MOST = 4
 _GAIN = 0.08
 """Relative error of a torque's scale that is worth a word."""
 _DELAY = 0.15
-"""Of a sampling step, likewise."""
+"""Delay of a sampling step, likewise."""
 _TILT = 1.0
 """Degrees, likewise."""
 _SMOOTH = 0.05
@@ -67,7 +67,7 @@ def find_residual_hints(
         tilts: Torques that gravity of one unit along each horizontal axis would cause, (n_samples, n_dof)
             for each part of the rows.
         gravity: m/s^2
-        delay: That was taken back already, s.
+        delay: Delay that was already taken back, s.
         sliding: Whether coordinates are lengths; none if left out.
         modelled: Keys of drives that are in the model, such as ``drives.q1.coulomb``.
     """

@@ -70,9 +70,9 @@ def read_signals(
 
     Args:
         log: Log file.
-        section: What is where in it.
+        section: Settings of the columns.
         names: Names of the coordinates.
-        unmeasured: Those without torques, for which zeros stand; columns may lack, or hold anything.
+        unmeasured: Joints without torques, whose torques are set to zero.
 
     Raises:
         DataError: Columns are missing, or hold what cannot be; file, line and column are named.

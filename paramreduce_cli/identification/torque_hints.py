@@ -119,7 +119,7 @@ def hint_at_gravity(
         pulls: What gravity of one unit along each axis of the base adds to it, (3, n_samples, n_dof, n).
         tau: (n_samples, n_dof)
         deviation: Standard deviations of the torques, (n_dof,); infinite where they are not measured.
-        gravity: Of the config, (3,), m/s^2.
+        gravity: Gravity of the config, (3,), m/s^2.
     """
     size = float(np.linalg.norm(gravity))
 

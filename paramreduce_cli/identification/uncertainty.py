@@ -15,7 +15,7 @@ from scipy import fft, linalg
 from paramreduce_cli.records import FloatArray
 
 _ORDERS = (0, 1, 2, 3, 4, 6, 8, 12, 16)
-"""Of autoregressive models, among which Akaike's criterion chooses."""
+"""Orders of autoregressive models, among which Akaike's criterion chooses."""
 _NOTHING = 1e-300
 _HALVINGS = 6
 _DEFINITE = 1e-9
@@ -30,7 +30,7 @@ class ColouredNoise:
     coefficients: FloatArray
     """(order,)"""
     variance: float
-    """Of the white noise that drives it."""
+    """Variance of the white noise that drives it."""
 
     def compute_spectrum(self, n: int) -> FloatArray:
         """Return the power at the n // 2 + 1 frequencies of a real Fourier transform of length n."""
@@ -105,7 +105,7 @@ def compute_score_covariance(
 
     Args:
         segments: Columns of uninterrupted motions, (n_samples, n_dof, p) each.
-        noise: Of each joint.
+        noise: Noise of each joint.
         weights: That rows of a joint are multiplied with twice, as in weighted least squares: one over
             the variance, (n_dof,).
     """

@@ -11,7 +11,7 @@ _CUT_OFF = 3
 _NEAR = 1.5
 """Units of the last digit within which a number is worth a hint."""
 _SLIP = 1e-8
-"""Of angles with many digits, rad: some files have the last one wrong."""
+"""Slip of angles with many digits, rad: some files have the last one wrong."""
 
 
 def unround_angle(text: str) -> float:

@@ -102,16 +102,16 @@ class ImportedJoint:
     parent: str
     child: str
     origin: Steps
-    """Of the child's frame in the parent's."""
+    """Origin of the child's frame in the parent's."""
     axis: tuple[float, float, float]
-    """In the child's frame, of unit length; the normal of a planar joint."""
+    """Axis in the child's frame, of unit length; the normal of a planar joint."""
     lower: float | None = None
     """rad or m; None where the file gives no limit."""
     upper: float | None = None
     velocity: float | None = None
     effort: float | None = None
     mimic: Mimic | None = None
-    """What its coordinate follows, if it is not its own."""
+    """Joint that the coordinate follows; None for a coordinate of its own."""
     drive: Mapping[str, float] = field(default_factory=dict)
     """Friction, rotor and spring by the keys of a drive in a config; those that are not zero."""
     line: int = 0
@@ -146,7 +146,7 @@ class ImportedClosure:
     kind: ClosureKind
     links: tuple[str, str]
     frames: tuple[FloatArray, FloatArray]
-    """On the links, in their frames, (4, 4), m."""
+    """Frames on both links, in the links' frames, (4, 4), m."""
 
 
 @dataclass(frozen=True)
@@ -157,7 +157,7 @@ class ImportedRobot:
     source: str
     """The file, for messages."""
     links: dict[str, Inertial | None]
-    """By name; None where the file gives no inertia."""
+    """Links by name; None where the file gives no inertia."""
     joints: tuple[ImportedJoint, ...]
     massless: frozenset[str] = frozenset()
     """Links that are but frames between joints."""
@@ -167,4 +167,4 @@ class ImportedRobot:
     independent: tuple[tuple[str, int], ...] = ()
     """Joints, and which of their coordinates, that determine all others; where there are closures."""
     warnings: tuple[str, ...] = ()
-    """What was changed while reading, such as angles taken for what they were rounded from."""
+    """Changes made while reading, such as rounded angles replaced by exact ones."""

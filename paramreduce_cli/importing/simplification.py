@@ -48,7 +48,7 @@ class ImportedBody:
     coordinate: str | None = None
     """None where the joint has several, which are called after the body."""
     link: str | None = None
-    """What the file calls the body; None for a frame between the axes of a joint."""
+    """Name of the link in the file; None for a frame between the axes of a joint."""
     source: ImportedJoint | None = None
     """The joint in the file; None where there is none."""
     inertial: Inertial = field(default_factory=Inertial)
@@ -103,7 +103,7 @@ class SimplifiedRobot:
     merged: Mapping[str, str]
     """Links that move with a body of another name, by name in the file."""
     frames: Mapping[str, FloatArray]
-    """Of all links in those of the bodies they move with, (4, 4), by name in the file."""
+    """Frames of all links in those of the bodies they move with, (4, 4), by name in the file."""
     warnings: tuple[str, ...]
     guess: Mapping[str, float] = field(default_factory=dict)
     """Coordinates with which loops are closed, rad or m; those that are not zero."""

@@ -26,8 +26,8 @@ def find_leanest(
 
     Args:
         function: ``inverse`` or ``direct``.
-        section: What the config asks for.
-        results: What reduced models are worth.
+        section: Limits of the config.
+        results: Errors and costs of the reduced models.
         terms: Functions with pruned terms, if there are any.
 
     Returns:

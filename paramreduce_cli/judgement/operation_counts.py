@@ -27,7 +27,7 @@ class OperationCounts:
 
     Args:
         model: Model of the robot.
-        counted: Which functions are counted where there are loops.
+        counted: Functions that are counted for loops.
         reduction: The reduced models.
         run: Workers and progress.
     """

@@ -37,11 +37,11 @@ def select_model(
     that the data cannot distinguish from the best.
 
     Args:
-        section: What the config asks for.
+        section: Limits of the config.
         known_values: Standard parameters, (n_standard,), where they are known.
         reduction: The subsets.
-        results: What they are worth.
-        cross_validation: Where it chooses.
+        results: Errors and costs of the reduced models.
+        cross_validation: Errors on folds, if the size is chosen by cross-validation.
 
     Raises:
         ConfigError: There is no model of that size.

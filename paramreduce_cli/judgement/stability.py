@@ -28,7 +28,7 @@ def measure_stability(
         problem: Selection problem, whose candidates, preference and groups stay.
         factors: Triangular factors of the weighted [W | chi], with the variant of the data.
         select: Returns the subset for a problem.
-        report_progress: Called with the progress.
+        report_progress: Progress callback.
     """
     n = problem.W.shape[1]
     chosen = np.zeros((len(factors), n), dtype=bool)

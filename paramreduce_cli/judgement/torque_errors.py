@@ -68,7 +68,7 @@ def compute_torque_errors(
     Args:
         blocks: The samples.
         parameters: One model a column, zero where a parameter is not kept, (n_parameters, n_models).
-        weights: Each joint's nominal torque, (n_dof,); infinite where it is not measured.
+        weights: Nominal torque of each joint, (n_dof,); infinite where it is not measured.
     """
     n_models, n_dof = parameters.shape[1], weights.size
     sums = np.zeros((n_models, n_dof))

@@ -35,8 +35,8 @@ class Scalar:
     """A value of a graph.
 
     Args:
-        graph: Where results go.
-        value: Its signed reference.
+        graph: Graph that results are added to.
+        value: Signed reference of the node.
     """
 
     __slots__ = ("graph", "value")

@@ -57,7 +57,7 @@ class Counts:
         """Return nearly the operations of the lean inverse dynamics; it takes microseconds.
 
         Args:
-            kept: Which standard parameters are not zero, (n_standard,).
+            kept: Mask of the standard parameters that are not zero, (n_standard,).
             direct: Whether the direct dynamics is meant instead.
         """
         indices: IntArray = (kept & self._model.affecting).nonzero()[0]
@@ -86,8 +86,8 @@ def count_all(
     """Count :data:`COUNTS` of many models; models that differ in values alone are counted once.
 
     Args:
-        model: Of the robot.
-        counted: Which functions are counted where there are loops.
+        model: Model of the robot.
+        counted: Functions that are counted for loops.
         chosen: The models.
         run: Workers, who are asked where it takes long, and progress.
 

@@ -27,7 +27,7 @@ _BEFORE = 3
 """Joints before one that are looked at for most of its choices, and those just beyond: what these
 change further away is the same for all alternatives, or nearly."""
 _LOOKS = 4
-"""At a joint, at most: what is best here and what is best there may take turns."""
+"""Looks at a joint, at most: what is best here and what is best there may take turns."""
 _found: dict[tuple, list[JointFormulation]] = {}
 """What was searched in this process already: equal branches of one mechanism, or of several."""
 
@@ -61,7 +61,7 @@ class _Piece:
 
     joints: list[int]
     tree: Tree
-    """These joints alone."""
+    """Tree of these joints alone."""
     dropped: Collection[int]
 
 

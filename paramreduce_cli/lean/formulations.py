@@ -79,9 +79,9 @@ class _SearchChain(NamedTuple):
     """A chain of searches, each of which begins where the previous one has ended."""
 
     direct: bool
-    """Of the direct dynamics, not of the inverse."""
+    """Whether the direct dynamics are searched, not the inverse."""
     start: _Choices
-    """Where the first begins."""
+    """Choices that the first search begins with."""
     dropped: tuple[frozenset[int], ...]
     """Parameters that are zero in each."""
 

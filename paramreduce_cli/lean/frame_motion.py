@@ -27,7 +27,7 @@ class Diagonal(StrEnum):
     """A way to compute the diagonal of U."""
 
     SQUARES = "squares"
-    """From the squares of all rates."""
+    """Sum of the squares of all rates."""
     FIRST = "first"
     """zz is turned with its column; the square of the rate about y is not needed."""
     SECOND = "second"
@@ -164,7 +164,7 @@ class RotationEffect:
 
     Attributes:
         acceleration: rad/s^2.
-        loss: Of the diagonal.
+        loss: Decrease of the diagonal entries.
         half: speed * w_x and speed * w_y.
     """
 

@@ -15,11 +15,11 @@ class InertiaPlace(StrEnum):
     """A recursion step at which a part of a body's inertia is multiplied with the motion."""
 
     OWN = "own"
-    """In the body's frame, whose motion is turned by the joint's angle."""
+    """Multiplied in the body's frame, whose motion is rotated by the joint's angle."""
     REST = "rest"
-    """In the joint's frame at rest, to which the part is turned."""
+    """Multiplied in the joint's frame at rest, to which the part is rotated."""
     BEFORE = "before"
-    """With the body before, to whose inertia it is added; the joint's own motion is met on the way."""
+    """Added to the inertia of the parent body; the joint's own motion is added separately."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ class Joint:
     """Index of the joint before, :data:`BASE` for the base."""
     revolute: bool
     sign: int
-    """Of the coordinate, where z is against the joint's axis as described."""
+    """Sign of the coordinate, where z is against the joint's axis as described."""
     offset: float
     """Added to the signed coordinate, rad or m."""
     place: FloatArray
@@ -51,7 +51,7 @@ class Tree:
 
     joints: tuple[Joint, ...]
     gravity: FloatArray
-    """In the base frame, m/s^2, (3,)."""
+    """Gravity in the base frame, m/s^2, (3,)."""
     n_parameters: int
     """Number of parameters of all bodies."""
     carried: bool = False

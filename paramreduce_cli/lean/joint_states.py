@@ -32,7 +32,7 @@ class Symbols:
     """The inputs of all models of a tree: parameters first, then q, dq and ddq.
 
     Args:
-        graph: Where they are.
+        graph: Graph of the symbols.
         tree: Whose models.
         dropped: Positions of parameters that are zero.
     """
@@ -102,22 +102,22 @@ class JointState:
     joint: Joint
     aligned: bool
     rest_to_parent: ConstantRotation
-    """From the frame at rest to that of the body before; of no use where aligned."""
+    """Rotation from the frame at rest to that of the parent body; unused where aligned."""
     angle: Angle
     turn: JointRotation
-    """Of the body against the frame at rest."""
+    """Rotation of the body against the frame at rest."""
     rest_motion: FrameMotion
-    """Of the frame at rest, in its components."""
+    """Motion of the frame at rest, in its components."""
     body_motion: FrameMotion
-    """Of the body's frame, in its own."""
+    """Motion of the body's frame, in its own components."""
     joint_turning: RotationEffect
-    """What U of the body has on top of U of the frame at rest."""
+    """Difference between U of the body and U of the frame at rest."""
     rest_acceleration: Vector
     """Acceleration of the origin less gravity, in the frame at rest."""
     body_acceleration: Vector
     """The same in the body's frame."""
     reach: Vector
-    """From the origin before: in the frame of the body before, or aligned, in that at rest."""
+    """Vector from the parent's origin: in the parent's frame, or if aligned, in the frame at rest."""
     relative_acceleration: Vector
     """Acceleration of the origin against the frame before that ``reach`` is given in; at rest."""
 
@@ -230,7 +230,7 @@ class Kinematics:
         """Return how the joints before joint i move its origin.
 
         Returns:
-            For each of them the angular velocity and the velocity of the origin for a unit speed,
+            Angular velocity and velocity of the origin for a unit speed of each joint,
             in the frame at rest of joint i.
         """
         if i not in self._screws:

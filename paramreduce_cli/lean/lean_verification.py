@@ -15,7 +15,7 @@ from paramreduce_cli.multibody.dynamics import Dynamics
 from paramreduce_cli.records import FloatArray, Formulations, IntArray, Mechanism
 
 TOLERANCE = 1e-10
-"""Of the largest value of each output; rounding leaves 1e-14."""
+"""Tolerance of the largest value of each output; rounding leaves 1e-14."""
 
 
 def check_formulations(
@@ -29,10 +29,10 @@ def check_formulations(
 
     Args:
         mechanism: The mechanism.
-        formulations: To be checked, one by one.
+        formulations: Formulations to be checked, one by one.
         kept: Indices of parameters that are not zero; they get random values.
         states: q, dq, ddq, each (n_samples, n_q).
-        rng: Where the values come from.
+        rng: Random generator.
 
     Raises:
         FormulationError: A formulation computes something else.
@@ -67,9 +67,9 @@ def reject_if_wrong(
     """Refuse results that are too far from those of textbook recursion.
 
     Args:
-        what: What computed the results, for the message.
+        what: Source of the results, for the message.
         off: Their differences.
-        against: What the largest difference is compared with.
+        against: Size that the largest difference is compared with.
         tolerance: Share of the largest value that is allowed.
 
     Raises:

@@ -67,7 +67,7 @@ class ConstantRotation:
     """A constant rotation, C = Rz Rx Rz by angles of which most are quarter turns.
 
     Args:
-        graph: Of the expressions.
+        graph: Graph of the expressions.
         rotation: (3, 3)
     """
 

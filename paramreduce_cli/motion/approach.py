@@ -52,7 +52,7 @@ class Segment:
     duration: float
     """s"""
     coefficients: FloatArray
-    """Of powers of time over the duration, (6, n_dof)."""
+    """Coefficients of powers of time over the duration, (6, n_dof)."""
 
     def compute_states(self, time: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return positions, speeds and accelerations, (n_samples, n_dof) each."""

@@ -51,7 +51,7 @@ def sample_motion(
         trajectory: One of the trajectories; its joints may be whole turns away if that is nearer to the pose.
         rate: Samples per second.
         title: Title for people.
-        start_pose: Where the machine stands, (n_dof,); None to begin with the trajectory itself.
+        start_pose: Position where the machine stands, (n_dof,); None to begin with the trajectory itself.
         planner: Finds ways there and back, where there is a pose.
 
     Raises:

@@ -35,7 +35,7 @@ def express_unit_force(
     """Return the force along a drive's motion for a unit value of one of its parameters.
 
     Args:
-        kind: Of the parameter, one of :data:`paramreduce_cli.records.DRIVE`.
+        kind: Kind of the parameter, one of :data:`paramreduce_cli.records.DRIVE`.
         drive: The drive.
         states: Generalised coordinates q, velocities dq and accelerations ddq, (n_q,) each.
         odd: Functions of these scalars.

@@ -26,7 +26,7 @@ class FrameRates:
     omega_dot: Vector
     """Angular acceleration, rad/s^2."""
     acceleration: Vector
-    """Of the origin, less gravity, m/s^2."""
+    """Acceleration of the origin, less gravity, m/s^2."""
 
     def accelerate_point(self, r: Vector) -> Vector:
         """Return the acceleration of a point that is fixed in the frame at r."""

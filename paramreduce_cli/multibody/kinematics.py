@@ -21,7 +21,7 @@ class JointMotion:
     cosine: ca.SX
     sine: ca.SX
     origin: Vector
-    """Of the body's frame, in the parent's frame, m."""
+    """Origin of the body's frame, in the parent's frame, m."""
 
     def to_body(self, a: Vector) -> Vector:
         """Return the components in the body's frame of a vector given in the parent's."""

@@ -71,14 +71,14 @@ class ObservedSet:
     """A sample set computed from states as it is read."""
 
     spans: list[Span]
-    """What it holds, trajectory by trajectory."""
+    """Spans of the trajectories in the set."""
     at: StatesAt
     """The states of a span."""
     dynamics: Dynamics
     phi: FloatArray
     """Standard parameters, for torques that were not measured."""
     source: str
-    """What the states are, for messages."""
+    """Source of the states, for messages."""
     divisible: bool = False
     """Whether a piece may begin within a trajectory, whose factor is then the same to round-off alone."""
     recomputable = True
@@ -214,8 +214,7 @@ def join_factors(parts: Iterable[tuple[int, FloatArray]]) -> FloatArray:
     """Return the triangular factors of all rows, from those of parts of the rows.
 
     Args:
-        parts: Of consecutive parts of the samples: the number of the first trajectory in it, and the factors from
-            that one on, (n_trajectories, n_dof, k, k).
+        parts: Consecutive parts of the samples: number of the first trajectory, and the factors from it on, (n_trajectories, n_dof, k, k).
 
     Returns:
         (n_trajectories, n_dof, k, k); what only one part holds is what it was there.

@@ -32,7 +32,7 @@ class Quantities:
 
     Args:
         mechanism: Whose quantities they are.
-        constraints: Each with one or two bounds.
+        constraints: Constraints, each with one or two bounds.
     """
 
     def __init__(self, mechanism: Mechanism, constraints: Sequence[Constraint]) -> None:

@@ -7,7 +7,7 @@ from paramreduce_cli.multibody.loops.coordinates import Coordinates
 from paramreduce_cli.records import FloatArray, Mechanism
 
 _SHARES = (0.25, 0.5, 1.0)
-"""Of a random move, at which a mechanism with loops is looked at: it may not get further."""
+"""Shares of a random move, at which a mechanism with loops is looked at: it may not get further."""
 _NEAREST = 0.1
 """Share of the assembly's distance to singularity that a state must keep: nearer, single rows
 outweigh all others."""
@@ -23,9 +23,9 @@ def draw_states(
     coming near a singular configuration.
 
     Args:
-        mechanism: With assembled loops, if any.
+        mechanism: Mechanism with assembled loops, if any.
         count: Number of states.
-        rng: Where they come from.
+        rng: Random generator.
 
     Returns:
         q, dq, ddq, each (count, n_q).

@@ -20,8 +20,7 @@ _FLAT = 500
 Such code is twice as fast; beyond, compilers take minutes over it, or gigabytes."""
 
 _FrameState = tuple[ca.MX, ...]
-"""Of a frame in components of the base: rotation, origin, angular velocity and acceleration, and
-the acceleration of the origin less gravity."""
+"""Framestate of a frame in components of the base: rotation, origin, angular velocity and acceleration, and the acceleration of the origin less gravity."""
 
 
 def express_regressor(mechanism: Mechanism, columns: Sequence[int] | None = None) -> ca.Function:

@@ -54,7 +54,7 @@ def name_coefficient(values: FloatArray, texts: Sequence[str], functions: FloatA
 
     Args:
         values: The coefficient for each of several geometries, (n_geometries,).
-        texts: Of the functions that it may be.
+        texts: Texts of the functions that the coefficient may be.
         functions: :func:`candidates` of the same geometries, (n_geometries, n_functions).
 
     Returns:
@@ -74,10 +74,10 @@ def format_regrouping(
     """Return the base parameters in terms of standard ones, with coefficients named if the geometry explains them.
 
     Args:
-        names: Of all parameters, (n,).
+        names: Names of all parameters, (n,).
         kept: Columns of the base parameters, (r,).
-        beta: For several geometries of the same structure, the real one first, each (r, n - r).
-        lengths: Of the same geometries, by name.
+        beta: Regrouping matrices of several geometries of the same structure, the real one first, each (r, n - r).
+        lengths: Lengths of the same geometries, by name.
     """
     found = [list_functions(entry) for entry in lengths]
     texts, functions = list(found[0]), np.array([list(entry.values()) for entry in found])
@@ -98,7 +98,7 @@ def approximate_expressions(
     value are their shares of the torque: the largest come first, and the smallest are counted.
 
     Args:
-        names: Of all parameters, (n,).
+        names: Names of all parameters, (n,).
         kept: Columns of the approximate base parameters, (n_kept,).
         beta: Coefficients of the others in ascending order, (n_kept, n - n_kept).
         known_values: Values of all parameters; without them all terms are printed, in the order of the names.
@@ -123,9 +123,9 @@ def _format_sum(terms: Sequence[str], coefficients: FloatArray, first: str) -> s
     """Return a sum with its largest terms first, whose smallest terms are only counted.
 
     Args:
-        terms: With their signs.
-        coefficients: Of the whole that they are, (n_terms,).
-        first: What they are added to.
+        terms: Terms with their signs.
+        coefficients: Contribution of each term to the whole, (n_terms,).
+        first: Text that the sum is added to.
     """
     order = np.argsort(-coefficients, kind="stable")
     remaining = coefficients[order][::-1].cumsum()[::-1]

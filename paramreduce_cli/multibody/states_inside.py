@@ -16,7 +16,7 @@ _MOVES = 12
 _SHORTEST, _LONGEST = 0.01, 0.3
 """Of a move, as a share of the limits: most positions far away cannot be assembled."""
 _DRIFT = 0.5
-"""Of the accelerations of dependent coordinates, what velocities may cause."""
+"""Drift of the accelerations of dependent coordinates, what velocities may cause."""
 
 States = tuple[FloatArray, FloatArray, FloatArray]
 
@@ -32,7 +32,7 @@ class StatesInside:
         mechanism: The mechanism.
         lower: Least coordinates, velocities and accelerations, (3, n_q).
         upper: The largest.
-        constraints: That positions keep to besides.
+        constraints: Constraints that positions keep in addition.
         known_positions: Generalised coordinates of some states, (n_known, n_q).
     """
 
@@ -63,7 +63,7 @@ class StatesInside:
 
         Args:
             count: Number of states.
-            rng: Where they come from.
+            rng: Random generator.
             corners: Whether every coordinate is at one of its limits; positions of loops never are.
         """
         if self._mechanism.loops is not None:

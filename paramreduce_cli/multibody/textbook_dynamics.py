@@ -68,7 +68,7 @@ class PlainDynamics:
         """Return the operations of IDM and of [M | delta] of a model, with parameters as inputs.
 
         Args:
-            model: Which parameters are kept.
+            model: Model that says which parameters are kept.
             signs_free: See :mod:`paramreduce_cli.expressions.programs`.
             independent: Whether d_z and [M_zz | delta_z] are counted, with R and b handed in,
                 instead of d_q and [M_qq | delta_q]; on an open tree they are the same.

@@ -58,7 +58,7 @@ class Items:
     kept: MutableMapping[str, Any] = field(default_factory=dict)
     """Finished items by key, which outlive an interrupted run."""
     part: Part = WHOLE
-    """Which items this job does."""
+    """Items that this job does."""
 
 
 class PartFinished(Exception):  # noqa: N818 - no error

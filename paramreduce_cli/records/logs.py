@@ -22,11 +22,11 @@ class RawLog:
 
     source: str
     columns: Mapping[str, FloatArray]
-    """By name, (n_rows,) each; matrices are one column for each of theirs."""
+    """Columns by name, (n_rows,) each; a matrix gives one column for each of its columns."""
     first_line: int | None
     """Line of the first row in the file, None where it has no lines."""
     others: Mapping[str, str] = field(default_factory=dict)
-    """What columns hold that hold no numbers, such as text, by name."""
+    """Contents of columns without numbers, such as text, by name."""
 
     def describe_row(self, row: int) -> str:
         """Return file and line of a row, for messages."""
@@ -78,14 +78,14 @@ class ShownSignals:
     raw_time: FloatArray
     """s"""
     raw_z: FloatArray
-    """As recorded, but for outliers, (n_raw, n_dof)."""
+    """Positions as recorded, without outliers, (n_raw, n_dof)."""
     raw_dz: FloatArray
     """Speeds as recorded, or differences of the positions as recorded."""
     raw_tau: FloatArray
     time: FloatArray
     """s"""
     z: FloatArray
-    """As they are used, (n_shown, n_dof)."""
+    """Positions after processing, (n_shown, n_dof)."""
     dz: FloatArray
     ddz: FloatArray
     tau: FloatArray
@@ -107,7 +107,7 @@ class Spectra:
     velocity: FloatArray
     """Power spectral densities of the speeds as recorded, (n_frequencies, n_dof)."""
     torque: FloatArray
-    """Of the torques, (n_frequencies, n_dof)."""
+    """Power spectral densities of the torques, (n_frequencies, n_dof)."""
 
 
 @record
@@ -120,15 +120,15 @@ class MeasuredLog:
     rate: float
     """Samples per second of the motions."""
     recorded_rate: float
-    """Of the files."""
+    """Recorded rate of the files."""
     state_cutoff: float
-    """Of the low-pass on positions and speeds, Hz; infinite where there is none."""
+    """Cut-off frequency of the low-pass on positions and speeds, Hz; infinite where there is none."""
     torque_cutoff: float
-    """Of the low-pass on torques and observation matrix alike, Hz; infinite where there is none."""
+    """Cut-off frequency of the low-pass on torques and observation matrix alike, Hz; infinite where there is none."""
     output_rate: float
     """Samples per second that are taken of what passes that, Hz."""
     delay: float
-    """By which torques were recorded later, which was taken back, s."""
+    """Delay of the recorded torques that was taken back, s."""
     noise: FloatArray
     """Standard deviation of the torques above the torque cut-off, or above what the motion
     contains where there is none, (n_dof,): no model explains it."""
@@ -137,9 +137,9 @@ class MeasuredLog:
     shown: ShownSignals
     spectra: Spectra
     steps: tuple[str, ...]
-    """What was done, one sentence each."""
+    """Processing steps, one sentence each."""
     warnings: tuple[str, ...]
-    """What looks wrong, one sentence each."""
+    """Warnings, one sentence each."""
 
 
 @record
@@ -201,9 +201,9 @@ class Consistency:
     train: float
     held_out: float
     smallest_eigenvalues: FloatArray
-    """Of each body's pseudo-inertia matrix, kg (kg m^2), (n_bodies,)."""
+    """Smallest eigenvalues of each body's pseudo-inertia matrix, kg (kg m^2), (n_bodies,)."""
     unconstrained_eigenvalues: FloatArray
-    """Of the standard parameters nearest to the known ones that fit as well as can be, (n_bodies,)."""
+    """Smallest eigenvalues of the unconstrained fit nearest to the known parameters, (n_bodies,)."""
     bodies: tuple[str, ...]
     smallest_drive: float
     """Smallest friction, rotor inertia or stiffness; infinite where there is none."""
@@ -221,21 +221,21 @@ class Identification:
     FILE: ClassVar[str] = "identification.h5"
     estimator: str
     torque_deviation: FloatArray
-    """What torques of each joint were divided by, (n_dof,)."""
+    """Divisor of the torques of each joint, (n_dof,)."""
     torque_size: FloatArray
     """Root mean square of the torques held out, (n_dof,)."""
     full: Estimate
     """All base parameters."""
     reduced: Estimate
-    """Those of the selected model."""
+    """Estimate of the selected model."""
     residuals: Residuals
     consistency: Consistency | None
     hints: tuple[str, ...]
-    """What the residuals suggest, one sentence each."""
+    """Hints at causes of the residuals, one sentence each."""
     comparison: str
-    """How the reduced model stands against the full one."""
+    """Comparison of the reduced model with the full one, a sentence."""
     shown_time: FloatArray
-    """Of some held-out samples, s."""
+    """Times of the held-out samples that figures show, s."""
     shown_measured: FloatArray
     """(n_shown, n_dof), N m (N)."""
     shown_full: FloatArray

@@ -88,11 +88,11 @@ class Closure:
     frames: tuple[FloatArray, FloatArray]
     """Homogeneous transforms of A and B in the frames of their bodies, (4, 4), m."""
     length: float = 0.0
-    """Of a ``distance``, m."""
+    """Length of a ``distance``, m."""
     ratio: float = 1.0
-    """Of a ``coupling``."""
+    """Ratio of a ``coupling``."""
     offset: float = 0.0
-    """Of a ``coupling``, rad or m."""
+    """Offset of a ``coupling``, rad or m."""
 
 
 @record
@@ -105,7 +105,7 @@ class Loops:
     assembly: FloatArray
     """Generalised coordinates near which, or in which, the loops are closed, (n_q,)."""
     kept: tuple[int, ...] | None = None
-    """Which of the closures' equations, counted through, all others follow from; None for all."""
+    """Numbers of the closures' equations that all others follow from; None for all."""
 
 
 @record
@@ -129,11 +129,11 @@ class Drive:
 
     name: str
     weights: FloatArray
-    """Of the generalised coordinates, (n_q,)."""
+    """Weights of the generalised coordinates, (n_q,)."""
     smoothing: float = 0.0
     """Speed s at which Coulomb friction, tanh(speed / s), is 76 %; zero for the sign of the speed."""
     rest: float = 0.0
-    """Where the spring is slack, rad or m."""
+    """Position where the spring is slack, rad or m."""
 
 
 @record
@@ -187,11 +187,11 @@ class Mechanism:
     loops: Loops | None = None
     """None for an open tree, all of whose coordinates are independent."""
     payloads: tuple[Payload, ...] = ()
-    """What bodies carry."""
+    """Payloads of the bodies."""
     drives: tuple[Drive, ...] = ()
     """Rotors, friction and springs."""
     frames: str = ""
-    """Where the table says that the frames of the bodies are; for people."""
+    """Frames of the table, in words."""
 
     @property
     def n_q(self) -> int:

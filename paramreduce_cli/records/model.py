@@ -20,11 +20,11 @@ class BaseParameters:
     beta: FloatArray
     """W[:, others] = W[:, columns] @ beta with the others in ascending order, (r, n - r)."""
     singular_values: FloatArray
-    """Of W with its columns scaled to unit length, descending."""
+    """Singular values of W with its columns scaled to unit length, descending."""
     rank_gap: float
     """Last singular value kept over the first one dropped; infinite where none was dropped."""
     expressions: tuple[str, ...] = ()
-    """Each base parameter in terms of standard ones, for people."""
+    """Sum of standard parameters behind each base parameter, for people."""
 
 
 Formulation = tuple[Mapping[str, str | bool], ...]
@@ -48,7 +48,7 @@ class Model:
     values: FloatArray
     """Standard parameters, (n,), kg, kg m, kg m^2."""
     affecting: BoolArray
-    """Which parameters change the torques at all, (n,)."""
+    """Mask of the parameters that change the torques, (n,)."""
     base: BaseParameters
     nominal_torque: FloatArray
     """Characteristic size of each joint's torque or force, (n_dof,), N m or N; infinite where it is not

@@ -51,13 +51,13 @@ class ReducedModel:
     """
 
     names: tuple[str, ...]
-    """Of the values, (n,)."""
+    """Names of the values, (n,)."""
     values: FloatArray
     """Approximate base parameters, (n,), SI unless there are units."""
     position: IntArray
     """Position of each standard parameter's value, :data:`NOT_KEPT` for none, (n_standard,)."""
     expressions: tuple[str, ...] = ()
-    """What each value stands for, in standard parameters; empty where that was not asked for."""
+    """Sum of standard parameters that each value is of; empty if not requested."""
     units: FloatArray | None = None
     """Sizes of the units of the values where these are not SI, (n,)."""
 
@@ -121,7 +121,7 @@ class Columns:
     """The columns that a selection chooses among: standard parameters, or several that share one value."""
 
     names: tuple[str, ...]
-    """Of the columns, (n,)."""
+    """Names of the columns, (n,)."""
     column: IntArray
     """Column that each standard parameter belongs to, (n_standard,)."""
 
@@ -173,7 +173,7 @@ class Subsets(BySize):
     beta: tuple[FloatArray, ...]
     """W_E ~ W_R beta, the other columns in ascending order; (n, n_all - n) each."""
     minimum_norm: BoolArray
-    """Where the subset is beyond the rank and the fit is the minimum-norm one, (m,)."""
+    """Mask of subsets beyond the rank, which are fitted with minimum norm, (m,)."""
     seconds: float
 
     def get_subset(self, n: int) -> IntArray:
@@ -212,7 +212,7 @@ class Proofs(BySize):
     subsets: tuple[IntArray, ...]
     """Column indices of the best subset found of at most each size."""
     torque_error: FloatArray
-    """Of these, (m,)."""
+    """Torque error of the best known subsets, (m,)."""
     lower_bound: FloatArray
     """Torque error that no subset of the size is below, (m,)."""
     status: tuple[ProofStatus, ...]
@@ -221,7 +221,7 @@ class Proofs(BySize):
     nodes: IntArray
     """Nodes of the search tree that were visited, (m,)."""
     logs: tuple[IntArray, ...]
-    """Where each unfinished search stopped, to go on from there."""
+    """State of each unfinished search, to continue from."""
     dealt: IntArray
     """Digest of the subtrees that a search was dealt as among several jobs, 0 where it was not, (m,)."""
 
@@ -278,9 +278,9 @@ class Reduction:
     factor: FloatArray
     """Triangular factor of the weighted [W | chi] of the estimation set, (n + 1, n + 1)."""
     heuristics: Mapping[str, Subsets]
-    """By the text of their :class:`SelectionMethod`."""
+    """Heuristics by the text of their :class:`SelectionMethod`."""
     proofs: Proofs | None
-    """Of the best subsets by torque, where they were looked for."""
+    """Proofs of the best subsets by torque, where they were looked for."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "heuristics", Choices(self.heuristics))

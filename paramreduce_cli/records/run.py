@@ -44,11 +44,11 @@ class Provenance:
     versions: Mapping[str, str]
     seconds: Mapping[str, float]
     warnings: Mapping[str, Sequence[str]]
-    """What was said of the config, and by stages of what they made, by name."""
+    """Warnings of the config and of the stages, by name."""
     asked: str
     """The config and options that name the run at the shell; empty where it was not started there."""
     settings: Mapping[str, Any]
-    """What the config says that is not so by default."""
+    """Settings of the config that differ from their defaults."""
 
 
 @record
@@ -59,7 +59,7 @@ class Run:
     """Worker processes; 0 for doing all in this one."""
     progress: ProgressCallback = lambda _: None
     interrupted: Callable[[], None] = lambda: None
-    """Told by a stage that it has met a KeyboardInterrupt and ends early, but whole."""
+    """Called by a stage that has met a KeyboardInterrupt and ends early, with a complete result."""
     unchanged: frozenset[str] = frozenset()
     """Names of the sections and files that are what they were when the stage made what it is given as
     made before; none of them where everything is to be done again."""

@@ -77,7 +77,7 @@ class Samples:
 
     FILE: ClassVar[str] = "samples.h5"
     names: tuple[str, ...]
-    """Of the columns of W."""
+    """Names of the columns of W."""
     preference: IntArray
     """Ranks of the columns among base parameters, the smaller the more wanted, (n,)."""
     values: FloatArray | None

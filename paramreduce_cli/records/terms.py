@@ -23,7 +23,7 @@ class StoredProgram:
     operands: IntArray
     """Twice the number of the node that is meant, plus one if it is negated, (n_nodes, 2)."""
     numbers: FloatArray
-    """Of a constant, its size; of an input, its position, (n_nodes,)."""
+    """Numbers of a constant, its size; of an input, its position, (n_nodes,)."""
     outputs: IntArray
     """Like operands, (n_outputs,)."""
 
@@ -35,7 +35,7 @@ class TermFront:
     operations: IntArray
     torque_error: SetErrors
     acceleration_error: SetErrors
-    """Not numbers for the inverse dynamics."""
+    """Acceleration errors; NaN for the inverse dynamics."""
 
 
 @record
@@ -47,7 +47,7 @@ class TermModel:
     n_start: int
     """Parameters of that subset."""
     names: tuple[str, ...]
-    """Of the parameters that are left, (n,)."""
+    """Names of the parameters that are left, (n,)."""
     values: FloatArray
     """(n,), in units of their own; of use to this function alone."""
     units: FloatArray
@@ -55,9 +55,7 @@ class TermModel:
     position: IntArray
     """Position of each standard parameter's value, -1 for none, (n_standard,)."""
     program: StoredProgram
-    """Its inputs are the parameters, q, dq and ddq, and for functions of independent coordinates the
-    dependent rows of R, row by row, and b. The inverse dynamics gives torques, the direct dynamics the
-    lower triangle of M, row by row, then delta."""
+    """Program whose inputs are the parameters, q, dq and ddq, and for functions of independent coordinates the dependent rows of R, row by row, and b. The inverse dynamics gives torques, the direct dynamics the lower triangle of M, row by row, then delta."""
     projected: bool
     """Whether it is of the independent coordinates of loops; else of all coordinates of the tree."""
     operations: int
@@ -66,23 +64,23 @@ class TermModel:
     """The same with all terms of the subset."""
     torque_error: ModelErrors
     acceleration_error: ModelErrors
-    """Not numbers for the inverse dynamics, like all that is of accelerations."""
+    """Acceleration errors; NaN for the inverse dynamics."""
     random_torque_error: float
-    """On random states inside the limits; not a number where the torques are not known there."""
+    """Torque error on random states inside the limits; NaN if the torques are not known there."""
     random_acceleration_error: float
     random_states: int
-    """How many these are; 0 where torques were measured, or none were found."""
+    """Number of these random states; 0 if torques were measured, or none were found."""
     largest_difference: FloatArray
     """Largest difference of each joint's torque on those states, else on both sets, N m (N), (n_dof,); not a number where
     it was not measured."""
     worst_joint: int
     """The joint whose largest difference is the largest share of its nominal torque."""
     worst_state: FloatArray
-    """Where that is, z, dz and ddz, (3, n_dof)."""
+    """State of the largest difference: z, dz and ddz, (3, n_dof)."""
     smallest_eigenvalue: float
-    """Of all mass matrices looked at, kg m^2 (kg)."""
+    """Smallest eigenvalue of all evaluated mass matrices, kg m^2 (kg)."""
     mass_states: int
-    """How many random states inside the limits mass matrices were looked at on."""
+    """Number of random states inside the limits on which mass matrices were evaluated."""
     lower: FloatArray
     """Smallest z, dz and ddz of the estimation set, (3, n_dof): the model holds within."""
     upper: FloatArray

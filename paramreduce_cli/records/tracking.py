@@ -13,9 +13,9 @@ class Speed:
     """The time that an exported function takes on the machine at hand."""
 
     seconds: Mapping[str, float]
-    """Of one evaluation by model, the full one first, s."""
+    """Seconds of one evaluation by model, the full one first, s."""
     language: str
-    """In which they were evaluated."""
+    """Language in which the functions ran."""
 
 
 @record
@@ -28,7 +28,7 @@ class Paths:
     time: FloatArray
     """(n_samples,), s."""
     samples: IntArray
-    """After how many samples each path ends, (n_paths,)."""
+    """Number of samples after which each path ends, (n_paths,)."""
     z: FloatArray
     dz: FloatArray
     ddz: FloatArray
@@ -40,7 +40,7 @@ class Tracking:
 
     paths: Paths
     errors: Mapping[str, FloatArray]
-    """By the model of the controller: z_d - z, (n_samples, n_paths, n_dof), rad or m."""
+    """Errors by the model of the controller: z_d - z, (n_samples, n_paths, n_dof), rad or m."""
 
     def compute_rms(self, model: str) -> FloatArray:
         """Return the root mean square error over time and joints, (n_paths,), rad or m."""

@@ -48,7 +48,7 @@ class JointLimits:
     acceleration: FloatArray
     """Infinite where there is none, as in the following."""
     torque: FloatArray
-    """Of the model, with the values in the config, N m or N."""
+    """Torque of the model, with the values in the config, N m or N."""
     power: FloatArray
     """Torque times speed, W."""
 
@@ -79,7 +79,7 @@ class Trajectory:
     peak_velocity: FloatArray
     """(n_dof,), rad/s or m/s."""
     peak_torque: FloatArray
-    """Of the model, with the values in the config, (n_dof,), N m or N."""
+    """Peak torque of the model, with the values in the config, (n_dof,), N m or N."""
     reach: FloatArray
     """Largest share of half the position range, or of the velocity or acceleration limit, that the
     motion about its offset uses, (n_dof,)."""
@@ -110,7 +110,7 @@ class Trajectories:
     period: float
     """s"""
     points: int
-    """Of the grid on which they were optimised and kept to the limits."""
+    """Number of points of the grid on which the trajectories were optimised and kept to the limits."""
     criterion: str
     scaling: str
     use_full_range: bool
@@ -121,7 +121,7 @@ class Trajectories:
     """The file they were brought in; empty where they were optimised."""
     limits: JointLimits
     constraints: tuple[Constraint, ...]
-    """What the trajectories had to keep to, besides the limits of the independent coordinates."""
+    """Constraints that the trajectories keep, besides the limits of the independent coordinates."""
     estimation: tuple[Trajectory, ...]
     validation: tuple[Trajectory, ...]
     test: tuple[Trajectory, ...]
@@ -138,4 +138,4 @@ class Coefficients:
     estimation: FloatArray
     validation: FloatArray
     test: FloatArray
-    """Without trajectories where the file holds none."""
+    """Coefficients of the test set; empty if the file holds none."""

@@ -41,11 +41,11 @@ class Selected:
 
     heuristic: str
     model: ReducedModel
-    """With expressions."""
+    """Reduced model, with expressions."""
     reason: str
     """One sentence that says why it was taken."""
     missed: str
-    """What the tolerances asked for and no model has; empty where they are kept."""
+    """Limit that no model keeps; empty if all limits are kept."""
 
     @property
     def n(self) -> int:
@@ -79,7 +79,7 @@ class DataVariant:
 
     change: DataChange
     number: int = 0
-    """Of the trajectory left out, from 1; or every how many samples one is kept."""
+    """Number of the trajectory left out, from 1; or the step between samples that are kept."""
 
     def __str__(self) -> str:
         if self.change is DataChange.WITHOUT_TRAJECTORY:
@@ -99,7 +99,7 @@ class Stability:
     values: FloatArray
     """Approximate base parameters, not a number where not chosen, (n_variants, n_columns)."""
     torque_error: FloatArray
-    """Of each subset on its own data, (n_variants,)."""
+    """Torque error of each subset on its own data, (n_variants,)."""
 
 
 @record
@@ -160,11 +160,11 @@ class Validation:
     """Largest ones, (3, n_dof)."""
     selected: Selected
     pareto: tuple[ModelChoice, ...]
-    """By growing n."""
+    """Models of the Pareto front, by growing n."""
     stability: Stability | None
-    """Of the selected subset, where it was asked for."""
+    """Stability of the selected subset; None if it was not checked."""
     cross_validation: Mapping[str, CrossValidation] | None
-    """By heuristic, where the size was chosen by it."""
+    """Errors on folds by heuristic; None if the size was not chosen by cross-validation."""
     accepted: bool | None
     """None where nothing is judged."""
     verdict: str

@@ -7,7 +7,7 @@ from paramreduce_cli.multibody.orthogonal import DEPENDENT, solve_least_squares
 from paramreduce_cli.records import FloatArray
 
 _ROUNDS = 5
-"""Of fits weighted by the noise that the one before has left; it hardly changes after three."""
+"""Rounds of fits weighted by the noise that the one before has left; it hardly changes after three."""
 
 
 def compute_residual_rms(factors: FloatArray, parameters: FloatArray, n_samples: int) -> FloatArray:
@@ -16,7 +16,7 @@ def compute_residual_rms(factors: FloatArray, parameters: FloatArray, n_samples:
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.
         parameters: (n,)
-        n_samples: In all trajectories.
+        n_samples: Number of samples in all trajectories.
     """
     left = factors[..., -1] - factors[..., :-1] @ parameters
     result: FloatArray = np.sqrt(np.sum(left**2, axis=(0, 2)) / n_samples)
@@ -31,8 +31,8 @@ def estimate_joint_noise(factors: FloatArray, scale: FloatArray, n_samples: int)
 
     Args:
         factors: Triangular factors of [W | tau] per trajectory and joint.
-        scale: What torques are divided by at first, (n_dof,); infinite where they are not measured.
-        n_samples: In all trajectories.
+        scale: First divisor of the torques, (n_dof,); infinite where they are not measured.
+        n_samples: Number of samples in all trajectories.
     """
     noise = scale.copy()
     measured = np.isfinite(scale)

@@ -34,7 +34,7 @@ def make_effort(section: ReductionSection, run: Run) -> Effort:
 
 
 SIZES = (1e-100, 1e100)
-"""Of numbers whose squares a computer can hold."""
+"""Sizes of numbers whose squares a computer can hold."""
 
 
 def _check_sizes(what: str, values: FloatArray) -> None:

@@ -23,9 +23,9 @@ class Effort:
     seed: int = 0
     """Seed of these changes."""
     time_limit: float = 60.0
-    """Of proofs, s."""
+    """Time limit of proofs, s."""
     node_limit: int | None = None
-    """Of the proof of one size; unlike time it stops every machine at the same place."""
+    """Largest number of nodes in the proof of one size; unlike a time limit it gives the same result on every machine."""
     subtrees: bool = False
     """Whether jobs split the search for every proof, instead of taking some proofs each."""
     jobs: int = 1
@@ -47,9 +47,9 @@ class SelectionTask:
     """Numbers of columns below this are not wanted, but may be passed through."""
     effort: Effort = Effort()
     previous: Proofs | None = None
-    """What an earlier run has proven on the same data."""
+    """Proofs of an earlier run on the same data."""
     part: Part = WHOLE
-    """Which of the proofs are to be found, where several jobs find them."""
+    """Part of the proofs that this job does."""
     incumbents: MutableMapping[str, Any] = field(default_factory=dict)
     """Best subsets that jobs of the same search exchange, by ``incumbent-SIZE``."""
     keep: Callable[[Proofs], None] = lambda _: None
@@ -58,7 +58,7 @@ class SelectionTask:
     interrupted: Callable[[], None] = _interrupt
     """Told that a KeyboardInterrupt was met; raises it again where nothing is worth keeping."""
     known: dict[Any, FoundSubsets] = field(default_factory=dict)
-    """What was found on the same data before, by heuristic and what was asked of it."""
+    """Subsets found earlier on the same data, by heuristic and options."""
 
     @cached_property
     def limit(self) -> int:

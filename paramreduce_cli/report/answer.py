@@ -26,7 +26,7 @@ class ShownParameter:
     deviation: str
     """Standard deviation where torques were measured; empty elsewhere."""
     relation: str
-    """What it stands for, in standard parameters; empty where it stands for itself."""
+    """Sum of standard parameters that the value is of; empty for a parameter alone."""
 
 
 @dataclass(frozen=True)
@@ -35,17 +35,17 @@ class Answer:
 
     parameters: tuple[ShownParameter, ...]
     kinds: tuple[tuple[str, str], ...]
-    """What the letters of their names stand for; empty where nothing is known of a robot."""
+    """Meanings of the letters in the parameters' names; empty without a robot."""
     worst_joint: str
     """The largest error of a joint's torque, in its unit; empty where nothing is known of units."""
     functions: tuple[str, str]
-    """What operations are counted of."""
+    """Symbols of the functions whose operations are counted."""
     nanoseconds: tuple[str, str]
-    """Of an evaluation of either function, beside that of the full model; empty where it was not measured."""
+    """Times of one evaluation of both functions, beside the full model; empty if they were not measured."""
     as_identified: bool
     """Whether the values are those of identification, to which held-out errors and deviations belong."""
     weighted: str
-    """How errors weight the joints elsewhere on the page; empty where they do not."""
+    """Weighting of the joints in errors elsewhere on the page; empty without one."""
     command: str
     """Command that writes the model as code."""
     kind: str

@@ -36,7 +36,7 @@ class Curve:
     """Colour on a dark page."""
     marker: str
     own: BoolArray
-    """Which rows to draw: those that no curve before has, and where they meet it, (n_rows,)."""
+    """Mask of the rows to draw: rows that no earlier curve has, and their neighbours, (n_rows,)."""
 
     def hide_shared(self, values: FloatArray) -> FloatArray:
         """Return values of all rows, NaN where an earlier curve has the same models."""
@@ -75,7 +75,7 @@ def gather_curves(data: ReportData) -> list[Curve]:
 
 
 _Values = dict[int, float] | None
-"""Of a model by column; None where there is no such model."""
+"""Values of a model by column; None where there is no such model."""
 
 
 def _find_same_curve(

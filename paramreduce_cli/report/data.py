@@ -50,11 +50,11 @@ class ReportData(Artifacts):
 
     title: str
     symmetries: int
-    """How many symmetries complete the estimation set."""
+    """Number of symmetries that complete the estimation set."""
     weighting: str
-    """Of the residuals in fits, as the config names it."""
+    """Weighting of the residuals in fits, as the config names it."""
     counted: CountedDynamics
-    """Which functions of closed loops are counted."""
+    """Functions of closed loops that are counted."""
     simulated: bool
     """Whether the states of the samples are those of a simulation."""
     rms_torque: Mapping[str, FloatArray]
@@ -63,13 +63,13 @@ class ReportData(Artifacts):
     motion: ShownMotion
     skeletons: tuple[Skeleton, ...]
     animation: Animation | None
-    """Of the motions of both sets, where there is a mechanism."""
+    """Animation of the motions of both sets, where there is a mechanism."""
     speed: Speed | None
-    """Of the inverse dynamics of the full and of the selected model; None without a robot."""
+    """Speed of the inverse dynamics of the full and of the selected model; None without a robot."""
     speed_direct: Speed | None
-    """Of their direct dynamics."""
+    """Speed of the direct dynamics of the full and of the selected model; None without a robot."""
     tracking: Tracking | None
-    """Where it was asked for."""
+    """Simulated control; None if it was not requested."""
 
     @property
     def n_affecting(self) -> int:

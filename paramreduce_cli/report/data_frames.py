@@ -37,7 +37,7 @@ def make_data_frame(
     those of both models: model, name, value, deviation, the standard deviation.
 
     Args:
-        record: Which one.
+        record: Record to convert.
 
     Raises:
         TypeError: No table is made of such a record.

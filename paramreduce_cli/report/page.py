@@ -33,11 +33,11 @@ class _Item:
     name: str
     caption: str
     source: str = ""
-    """Of a figure's image."""
+    """Image of a figure, as an address."""
     table: Table | None = None
     tall: bool = False
     symbols: Sequence[tuple[str, str]] = ()
-    """Of the headings, with what they mean."""
+    """Symbols of the headings, with what they mean."""
 
 
 def render_page(

@@ -26,9 +26,9 @@ class Skeleton:
     parents: tuple[int, ...]
     kinds: tuple[str, ...]
     closures: tuple[FloatArray, ...]
-    """From one body's origin over the closure to the other's, for each loop, (n_points, 3), m."""
+    """Lines from one body's origin through the closure to the other's, for each loop, (n_points, 3), m."""
     closure_bodies: tuple[tuple[int, ...], ...]
-    """Of which body each line along that is; :data:`BASE` for what is between two bodies."""
+    """Body of each line along a closure; :data:`BASE` for lines between two bodies."""
 
 
 def make_skeleton(model: Model, q: FloatArray) -> Skeleton:
@@ -57,12 +57,11 @@ class Animation:
     """A mechanism along its motions, for drawing: points that move, and lines between them."""
 
     points: FloatArray
-    """In the base frame, NaN where a body has no mass, of all motions one after the other,
-    (n_frames, n_points, 3), m."""
+    """Points in the base frame, NaN where a body has no mass, of all motions in sequence, (n_frames, n_points, 3), m."""
     motions: tuple[tuple[str, int], ...]
     """Name and number of frames of each motion."""
     lines: tuple[tuple[int, int, int, str], ...]
-    """From point to point, of which body (:data:`BASE` for none), and as what: link, rail, mass, loop or axis."""
+    """Lines: two points, the body (:data:`BASE` for none), and the kind: link, rail, mass, loop or axis."""
     owners: tuple[str, ...]
     """Names of the bodies."""
 

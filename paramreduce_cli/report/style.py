@@ -39,7 +39,7 @@ STYLE = {
     "svg.fonttype": "path",
     "pdf.fonttype": 42,
 }
-"""On the page, and in pictures for slides."""
+"""Style on the page, and in pictures for slides."""
 COLUMN = {
     "figure.figsize": (3.5, 2.4),
     "font.size": 8.5,

@@ -73,7 +73,7 @@ class Robot(Section):
     parameters: str | None = None
     """Name of the set that is used; the first one if left out."""
     payloads: dict[Name, PayloadSection] = {}
-    """What bodies carry, by name; its parameters are called after it."""
+    """Payloads of the bodies, by name; the parameters of a payload have its name."""
     drives: dict[Name, DriveSection] = {}
     """Rotors, friction and springs by coordinate, by a name of one's own with a motion, or under `all` for every driven coordinate."""
     nominal_torque: PositivePerJoint | Literal["standard-deviation"] = "standard-deviation"

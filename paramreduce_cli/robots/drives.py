@@ -27,7 +27,7 @@ class DriveSection(Section):
     motion: Annotated[dict[str, Number], Field(min_length=1)] | None = None
     """Weights of the coordinates in the motion it acts along, such as {z_1: 100} for a motor behind a gear; if left out the coordinate it is named after."""
     inertia: Value | None = None
-    """Of the rotor, seen from the motion: kg m^2 (kg if it slides)."""
+    """Inertia of the rotor, seen from the motion: kg m^2 (kg if it slides)."""
     viscous: Value | None = None
     """Viscous friction, N m s/rad (N s/m)."""
     coulomb: Value | None = None
@@ -35,9 +35,9 @@ class DriveSection(Section):
     offset: Value | None = None
     """Constant torque or force, N m (N)."""
     stiffness: Value | None = None
-    """Of a spring, N m/rad (N/m)."""
+    """Stiffness of a spring, N m/rad (N/m)."""
     rest: Number = 0.0
-    """Where the spring is slack, rad (m)."""
+    """Position where the spring is slack, rad (m)."""
     smoothing: Annotated[Number, Field(ge=0)] = 0.0
     """Coulomb friction goes as tanh(speed / smoothing), rad/s (m/s); zero for the true sign."""
 

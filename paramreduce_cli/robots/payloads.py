@@ -15,7 +15,7 @@ class PayloadSection(BodyParameters):
     body: Name
     """Body that carries it."""
     at: Placement = []
-    """Its frame in that of the body: a point, or steps; the body's own frame if left out."""
+    """Frame of the payload in that of the body: a point, or steps; default: the body's own frame."""
 
     def build_payload(self, name: str, bodies: Mapping[str, int]) -> Payload:
         """Return the payload as a record.

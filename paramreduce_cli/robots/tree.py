@@ -181,13 +181,13 @@ class ClosureSection(Section):
     bodies: Annotated[list[Name], Field(min_length=2, max_length=2)]
     """The two bodies, `base` for the base."""
     at: Annotated[list[Placement], Field(max_length=2)] = []
-    """Where on each of them: a point or steps; not of a coupling."""
+    """Place on each of the two bodies: a point or steps; not for a coupling."""
     length: Positive | None = None
-    """Of a distance, m."""
+    """Length of a distance, m."""
     ratio: Number | None = None
-    """Of a coupling; not zero."""
+    """Ratio of a coupling; not zero."""
     offset: Number | None = None
-    """Of a coupling, rad or m; zero if left out."""
+    """Offset of a coupling, rad or m; zero if left out."""
 
     @model_validator(mode="after")
     def _check_keys(self) -> ClosureSection:
@@ -228,7 +228,7 @@ class TreeDescription(BodiesDescription):
     bodies: Annotated[list[TreeBody], Field(min_length=1)]
     """One item per body, parents above their children."""
     closures: list[ClosureSection] = []
-    """What closes the loops; none for an open tree."""
+    """Closures of the loops; none for an open tree."""
     independent: list[Name] = []
     """Coordinates that are actuated and determine all others; only with closures."""
     guess: dict[str, Number] = {}

@@ -123,7 +123,7 @@ class Runner:
         jobs: Worker processes.
         callbacks: Functions that a run calls.
         samples: A samples.h5 brought by the user instead of the folder's own.
-        settings: What is asked where there is no config.
+        settings: Settings, if there is no config.
         asked: Config and options that name the run at the shell.
     """
 
@@ -143,7 +143,7 @@ class Runner:
         """Run one stage, unless its artifact is up to date, or do a part of its items.
 
         Args:
-            stage: Which one.
+            stage: Stage to run.
             force: Run it even so, and do finished items again.
             go_on: Run it also where more time could make its artifact better.
             part: Items to be done; the artifact is made only where they are all items.

@@ -25,7 +25,7 @@ from paramreduce_cli.records import (
 from paramreduce_cli.running.pipeline import Stage, list_user_files
 
 _MOST_WARNINGS = 50
-"""Of a stage that are kept; an attribute of a file has not room for any number."""
+"""Most warnings of a stage that are kept; an attribute of a file has not room for any number."""
 
 
 class Inputs:
@@ -33,7 +33,7 @@ class Inputs:
 
     Args:
         config: Config that names the files; None if there is none.
-        report_progress: Called with the progress of long reading.
+        report_progress: Progress callback for long reading.
     """
 
     def __init__(

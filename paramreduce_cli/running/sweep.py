@@ -62,7 +62,7 @@ class SweepSection(Section):
     robots: Annotated[list[Path], Field(min_length=1)]
     """Configs; relative to this file."""
     seeds: Annotated[list[int], Field(min_length=1), AfterValidator(_check_seeds)] | None = None
-    """Of the trajectories; those in the configs if left out."""
+    """Seeds of the trajectories; those in the configs if left out."""
     variants: (
         Annotated[dict[str, list[str]], Field(min_length=1), AfterValidator(_check_variants)] | None
     ) = None
@@ -70,7 +70,7 @@ class SweepSection(Section):
     parts: Annotated[dict[str, Annotated[int, Field(ge=1)]], AfterValidator(_check_parts)] = Field(
         default_factory=dict
     )
-    """How many jobs a stage of every run is done as; one where nothing is said."""
+    """Number of jobs that a stage of every run is split into; default 1."""
     results: Path = Path("../results/sweep")
     """Folder of all results; relative to this file."""
 
@@ -80,15 +80,15 @@ class SweepRun:
     """One run of a sweep."""
 
     name: str
-    """Of its folder: ROBOT, then -SEED and -VARIANT where there are several."""
+    """Name of its folder: ROBOT, then -SEED and -VARIANT where there are several."""
     path: Path
-    """Of its config."""
+    """Path of its config."""
     overrides: tuple[str, ...]
     folder: Path
     seed: int | None = None
-    """Of the list; None where it has none."""
+    """Seed of the list; None where it has none."""
     variant: str = ""
-    """Its name; empty where the list has none."""
+    """Name of the variant; empty if the list has none."""
 
     @cached_property
     def config(self) -> Config:
@@ -141,7 +141,7 @@ class Sweep:
     """The runs of a list by name."""
 
     path: Path
-    """Of the list."""
+    """Path of the list."""
     runs: dict[str, SweepRun]
     parts: dict[str, int]
     folder: Path

@@ -51,7 +51,7 @@ def _format_stage(stage: Stage) -> str:
 
 
 _MOST_TASKS = 1000
-"""Of one array, which Slurm's MaxArraySize allows where nothing else is set."""
+"""Most tasks of one array, which Slurm's MaxArraySize allows where nothing else is set."""
 _SLURM = """\
 #!/usr/bin/env bash
 # Written by `paramreduce graph --format slurm`: submits {count} arrays of tasks, each of which waits for the one

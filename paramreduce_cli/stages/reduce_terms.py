@@ -43,7 +43,7 @@ _MARGIN = 0.8
 _POSES = 300
 """States at which mass matrices are looked at meanwhile."""
 _PARTS = 4
-"""Of a log's training part, which are fitted to and watched by turns."""
+"""Parts of a log's training part, which are fitted to and watched by turns."""
 _SMALLEST = 2
 """Starts for which formulations are searched, the smallest ones."""
 _FITTED = 1000
@@ -179,7 +179,7 @@ def _iterate_within_budget(
     Args:
         ends: Programs, the leanest first; they are judged when they are asked for.
         judge: Judges them.
-        budget: Of errors.
+        budget: Budget of errors.
     """
     for _, alike in groupby(ends, lambda one: one.program.n_operations):
         judged = sorted(

@@ -69,7 +69,7 @@ from paramreduce_cli.reduction.task import SelectionTask
 from paramreduce_cli.reduction.task import run as run_heuristic
 
 _Errors = tuple[NormErrors, AccelerationErrors]
-"""Of all models, on one set or motion."""
+"""Errors of all models, on one set or motion."""
 _MEASURED_ON = frozenset(
     {"model.h5", "samples.h5", "reduction.h5", "reduction", "validation.operations"}
 )
@@ -80,9 +80,9 @@ every model, and more of them tell no more."""
 _THINNED = (2, 4, 8)
 """Every so many samples are kept to see what their number does."""
 _FOLD_NODES = 5_000
-"""Of each proof while folds are left out."""
+"""Fold nodes of each proof while folds are left out."""
 _NODES = 50_000
-"""Of each proof while stability is looked at; the best found is good enough there."""
+"""Nodes of each proof while stability is looked at; the best found is good enough there."""
 
 
 def validate(

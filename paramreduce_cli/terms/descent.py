@@ -43,7 +43,7 @@ class Simplified:
 
     start: Start
     program: Program
-    """Its inputs are the parameters of the start, then states."""
+    """Program whose inputs are the parameters of the start, then states."""
     beta: FloatArray
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
@@ -106,7 +106,7 @@ class SearchHistory:
     fewest: int
     """Operations of the leanest program, which may not be remembered any more."""
     strain: float
-    """Of the end."""
+    """Worst ratio to the budget at the end of the descent."""
 
     @property
     def rank(self) -> tuple[int, float]:
@@ -133,7 +133,7 @@ class Descent:
     search: TermSearch
     """Among the terms of the program as it was last rewritten."""
     end: Step
-    """Of that program."""
+    """Step of that program."""
     units: FloatArray
     """Sizes of the units of its parameters, SI, (n,)."""
     visited: dict[int, Candidate]
@@ -162,8 +162,8 @@ class Descent:
         kept, as on other samples a costlier program may be the better one to continue from.
 
         Args:
-            history: What the descent has come by.
-            rng: Which program it is, and the dice.
+            history: History of the descent.
+            rng: Random generator for the choice of the program, and for rewriting.
             searching: Makes searches.
         """
         near = [count for count in sorted(history.visited) if count <= history.fewest / _LEG]
@@ -198,7 +198,7 @@ class Descent:
         which terms are cheap to remove depends on what the others share.
 
         Args:
-            noise: Of the logarithm of what terms seem to cost, until no more can go with it.
+            noise: Standard deviation of noise on the logarithm of estimated costs, until no more can go with it.
         """
         descent = self
         while True:
@@ -284,7 +284,7 @@ def drop_candidates(histories: Sequence[SearchHistory], number: int) -> list[Sea
 
     Args:
         histories: Histories in any order, which is kept.
-        number: How many of the leanest stay whole.
+        number: Number of the leanest histories that stay complete.
     """
     whole = {id(way) for way in find_leanest_histories(histories, number)}
     costs: dict[int, float] = {}

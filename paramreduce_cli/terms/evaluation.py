@@ -34,7 +34,7 @@ _MASSES = 100_000
 _OF_LOOPS = 1000
 """Random states of loops, for both: these have to be assembled."""
 _AT_ONCE = 2000
-"""Of them at a time."""
+"""At once of them at a time."""
 _KNOWN = 2000
 """Samples of the estimation set from which those of loops are reached."""
 _JUDGED = 20_000
@@ -44,7 +44,7 @@ _BLOCKS = 16
 _NONE = (np.nan, np.nan)
 
 Errors = tuple[float, float]
-"""Of torques and of accelerations."""
+"""Errors of torques and of accelerations."""
 
 
 @dataclass(frozen=True)
@@ -52,28 +52,28 @@ class Deviation:
     """The deviation of torques and accelerations from the full model's, away from the sets."""
 
     torque_error: float
-    """On random states; not a number where there are none, or the torques are not known there."""
+    """Torque error on random states; NaN if there are none, or the torques are not known there."""
     acceleration_error: float
     """The same; not a number for the inverse dynamics either."""
     states: int
-    """How many these are; without any, what follows is of both sets."""
+    """Number of these random states; with none, what follows is on both sets."""
     largest: FloatArray
     """Difference of each joint's torque, N m (N), (n_dof,); not a number where it was not measured."""
     worst_joint: int
-    """With the largest one as a share of the nominal torque."""
+    """Joint with the largest difference relative to its nominal torque."""
     worst_state: FloatArray
-    """Its z, dz and ddz, (3, n_dof)."""
+    """State of that difference: z, dz and ddz, (3, n_dof)."""
 
 
 class Evaluator:
     """An evaluator of programs of one function.
 
     Args:
-        model: Of the robot.
+        model: Model of the robot.
         samples: Both sets.
         nominal_torque: (n_dof,)
-        limits: Of the independent coordinates; what has none is limited by what the estimation set reaches.
-        constraints: That positions keep to besides.
+        limits: Limits of the independent coordinates; what has none is limited by what the estimation set reaches.
+        constraints: Constraints that positions keep in addition.
         direct: Whether the function is [M | delta].
         projected: Whether it is of the independent coordinates of loops.
         measured: Whether torques were measured, so that those at other states are not known.

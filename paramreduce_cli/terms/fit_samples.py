@@ -26,8 +26,7 @@ class TermSamples:
     ddq: FloatArray
     """Accelerations that M is multiplied by, (n, n_samples)."""
     tangent: FloatArray | None
-    """By which torques of the program's n coordinates are projected, (n_samples, n, n_dof); None where
-    they are the independent ones."""
+    """Projection of the torques of the program's n coordinates, (n_samples, n, n_dof); None for independent ones."""
     tau: FloatArray
     """Torques to be met, (n_dof, n_samples)."""
     nominal_torque: FloatArray
@@ -157,8 +156,8 @@ def _project_symmetric(
 
     Args:
         lower: Some entries of their lower triangles, (n_entries, n_samples).
-        rows: Of these, (n_entries,).
-        columns: Of these, (n_entries,).
+        rows: Row of each entry, (n_entries,).
+        columns: Column of each entry, (n_entries,).
         across: J, (n, n_dof, n_samples).
     """
     n, n_dof, count = across.shape
@@ -206,7 +205,7 @@ def make_samples(
         nominal_acceleration: (n_dof,)
         direct: Whether the program gives the lower triangle of M, row by row, and delta, not torques.
         projected: Whether it does so for the independent coordinates of loops, with R and b handed in.
-        coordinates: Of the mechanism, if they are at hand.
+        coordinates: Coordinates of the mechanism, if they are at hand.
     """
     parts = list(blocks)
     coordinates = coordinates or Coordinates(mechanism, once=True)

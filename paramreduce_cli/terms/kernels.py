@@ -26,7 +26,7 @@ CODES = {
 }  # fmt: skip
 NONE = -1
 SEVERAL = -2
-"""In place of a number where there is more than one."""
+"""Several in place of a number where there is more than one."""
 
 
 @compile_loop()

@@ -80,11 +80,10 @@ def simplify(
     Args:
         searcher: Goes down from them.
         starts: Subsets, the smallest first; how many are gone down from depends on their operations.
-        max_rounds: How many descents in a row may bring nothing, of those near the best ones and of those once more.
-        seconds: After which no more descents are begun, but the last ones, with more samples; then what is found
-            depends on the machine.
+        max_rounds: Number of descents in a row that may bring nothing, near the best ends and from shortly before them.
+        seconds: Time after which no more descents begin, except for the last ones with more samples; results then depend on the machine.
         jobs: Processes; what is found in time does not depend on them.
-        progress: Told what share is done, and the fewest operations so far.
+        progress: Called with the finished fraction and the fewest operations so far.
 
     Raises:
         DataError: A process died.
@@ -127,7 +126,7 @@ class _ProgressMeter:
     """A meter of the progress of a search.
 
     Args:
-        progress: Told what share is done, and the fewest operations so far.
+        progress: Called with the finished fraction and the fewest operations so far.
         ahead: Descents that are still to be made.
     """
 
@@ -158,11 +157,11 @@ def _descend_further(
 
     Args:
         working: Makes them.
-        ends: Of those before.
-        work: What they are.
-        item: What one is made from, from the ends of those before and its number.
-        patience: How many may bring nothing.
-        meter: Of those that are still to be made, too.
+        ends: Ends of the earlier descents.
+        work: Work on an item.
+        item: Function that makes an item from the earlier ends and its number.
+        patience: Number of descents that may bring nothing.
+        meter: Progress meter.
     """
     turn = since = 0
     fewest = _find_fewest(ends)

@@ -30,9 +30,9 @@ class SearchSamples:
     """A pair of samples for a search: those that parameters are fitted to, and those that errors are watched on."""
 
     samples: TermSamples
-    """What parameters are fitted to."""
+    """Samples that parameters are fitted to."""
     watched: TermSamples | None
-    """On which errors must be within the budget as well."""
+    """Samples whose errors must also be within the budget."""
 
 
 class Near(NamedTuple):
@@ -40,7 +40,7 @@ class Near(NamedTuple):
 
     start: Start
     others: list[Start]
-    """What it may have some of."""
+    """Starts that parts may be copied from."""
     turn: int
     """Number of the dice."""
 
@@ -49,7 +49,7 @@ class Again(NamedTuple):
     """A descent to go down once more from shortly before its end."""
 
     way: SearchHistory
-    """What it has come by."""
+    """History of the descent."""
     turn: int
     """Number of the dice."""
 
@@ -70,7 +70,7 @@ class Searcher:
     direct: bool
     """Whether [M | delta] is meant, not torques."""
     seed: int = 0
-    """Of what is random."""
+    """Seed of the random choices."""
 
     def start_descent(self, start: Start, turn: int = 0) -> Descent:
         """Return a descent with all terms of a start."""
@@ -125,8 +125,8 @@ class WorkerGroup:
     """The workers of a searcher, in this process or in others.
 
     Args:
-        on_descent: Of what is found on an item, as soon as it is.
-        deadline: After which nothing is begun, on the clock of `time.monotonic`, which processes share, s.
+        on_descent: Called with the result of each item.
+        deadline: Time after which nothing begins, on the clock of `time.monotonic`, which processes share, s.
         pool: Workers that hold the searcher.
     """
 

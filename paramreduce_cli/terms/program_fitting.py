@@ -63,7 +63,7 @@ class Linear:
     residual: FloatArray
     """(n_rows,)"""
     metric: FloatArray | None
-    """Where accelerations matter, (n_dof, n_dof, n_samples)."""
+    """Weights of accelerations, (n_dof, n_dof, n_samples); None if only torques count."""
 
     def compute_explained_squares(self, changes: FloatArray) -> FloatArray:
         """Return the squares of what the parameters can compensate, (k,), of changes of rows, (k, n_rows)."""
@@ -77,8 +77,7 @@ class Linear:
         Args:
             changes: Losses of the rows, (k, n_rows).
             beta: Fitted parameters, (n_parameters,).
-            combinations: Of the parameters that these are multiples of, zero where they are none of one,
-                (k, n_parameters).
+            combinations: Combinations of parameters that the terms are multiples of, (k, n_parameters); zero for other terms.
         """
         size = np.einsum("cr,cr->c", changes, changes)
         along = changes @ self.residual
@@ -133,9 +132,9 @@ class Fitting:
 
     Args:
         tape: The program.
-        n_parameters: How many of its inputs, the first ones, are parameters.
-        samples: What the parameters are fitted to.
-        budget: How well they must do.
+        n_parameters: Number of first inputs that are parameters.
+        samples: Samples that the parameters are fitted to.
+        budget: Limits of the errors.
         watched: Samples on which they must do as well.
         poses: States at which mass matrices must be positive definite; what else they hold does not matter.
     """
@@ -173,7 +172,7 @@ class Fitting:
         Args:
             pruning: Pruning of the program.
             beta: Values to start from, for the mass matrices that accelerations are found with.
-            checks: How often these are found anew.
+            checks: Number of times that the weights are computed again.
         """
         samples = self.samples
         needed = self.tape.mark_live(pruning)

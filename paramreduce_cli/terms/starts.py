@@ -27,11 +27,11 @@ class Start:
     heuristic: str
     model: ReducedModel
     torque_error: float
-    """On the estimation set."""
+    """Torque error on the estimation set."""
     cost: int
     """Operations, nearly."""
     formulation: Formulation | None = None
-    """In which it is written, none for whichever is the leanest."""
+    """Formulation of the start; None for the leanest."""
 
     def build_program(self, lean: LeanModels, *, direct: bool) -> Program:
         """Return the program with all terms; its first inputs are the parameters of the model.
@@ -54,7 +54,7 @@ def list_starts(
     Args:
         torque_error: Allowed on the estimation set.
         lean: Counts operations.
-        model: Of the robot.
+        model: Model of the robot.
         reduction: The subsets.
         direct: Whether operations of the direct dynamics count.
     """
@@ -77,7 +77,7 @@ def order_by_estimate(starts: list[Start], smallest: int) -> Iterator[Start]:
     What a larger subset has besides may cost little once terms are left out, and make up for these.
 
     Args:
-        starts: As :func:`list_starts` gives them.
+        starts: Starts from :func:`list_starts`.
         smallest: Parameters of those that are small enough.
     """
     sizes: dict[int, list[Start]] = defaultdict(list)
@@ -105,10 +105,10 @@ def near(
     Which formulation takes the fewest operations once terms are left out cannot be told before.
 
     Args:
-        start: To be changed.
+        start: Start to vary.
         others: Whose subsets may take the place of its own, and whose formulations are looked at.
         lean: Has more of these, and one for every start that has none of its own.
-        rng: Where chance comes from.
+        rng: Random generator.
         direct: Whether [M | delta] is meant, not torques.
     """
     formulation = start.formulation or lean.choose_formulation(start.model, direct=direct)

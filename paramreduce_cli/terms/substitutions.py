@@ -24,7 +24,7 @@ class Substitutions:
     sources: IntArray
     """Nodes that these would stand for, NUMBER for numbers, (n_ways,)."""
     factors: FloatArray
-    """By which they are multiplied, or the numbers, (n_ways,)."""
+    """Factors of the substitutes, or the numbers, (n_ways,)."""
 
     def __getitem__(self, which: IntArray) -> Substitutions:
         return Substitutions(self.nodes[which], self.sources[which], self.factors[which])
@@ -63,11 +63,11 @@ def find_substitutions(
     nodes that the parameters are not part of may be numbers.
 
     Args:
-        values: Of the nodes, (n_nodes, n_samples).
+        values: Values of the nodes, (n_nodes, n_samples).
         pulls: Weighed derivatives of the rows by the nodes, (n_nodes, n_dof, n_samples).
-        residual: Of the rows, (n_dof, n_samples).
-        free: Which nodes may come to stand for others, (n_nodes,).
-        linear: Which nodes are linear in the parameters, (n_nodes,); these stand for their like alone.
+        residual: Residuals, (n_dof, n_samples).
+        free: Mask of the nodes that may be replaced, (n_nodes,).
+        linear: Mask of the nodes that are linear in the parameters, (n_nodes,); they are replaced by each other only.
     """
     squares = np.einsum("nqm,nqm->nm", pulls, pulls)
     along = np.einsum("nqm,qm->nm", pulls, residual)

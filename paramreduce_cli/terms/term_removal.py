@@ -30,7 +30,7 @@ budget's at least."""
 _MISJUDGED = 2.0
 """Times that which they may cost indeed."""
 NOISE = 0.3
-"""Of the logarithm of what terms seem to cost, where something else is to be tried."""
+"""Noise of the logarithm of what terms seem to cost, where something else is to be tried."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class TermSearch:
 
     Args:
         fitting: Fits the program.
-        seed: Of noise in the choice.
+        seed: Seed of the noise.
     """
 
     def __init__(self, fitting: Fitting, seed: int) -> None:
@@ -74,9 +74,9 @@ class TermSearch:
         """Remove terms until any further one would exceed the budget, or few enough operations are left.
 
         Args:
-            step: Where to start.
-            visit: Told of every program on the way.
-            noise: Of the logarithm of what terms seem to cost.
+            step: Step to start from.
+            visit: Called with every program on the way.
+            noise: Standard deviation of noise on the logarithm of estimated costs.
             until: Operations that are few enough.
         """
         weights = np.exp(noise * self._rng.normal(size=len(self._candidates)))
@@ -147,9 +147,9 @@ class TermSearch:
         """Return the program without all terms that cost little together, or None if they are few.
 
         Args:
-            step: Where to start.
+            step: Step to start from.
             live: Terms, (n_terms, 2).
-            costs: What leaving each out costs, (n_terms,).
+            costs: Cost of removing each term, (n_terms,).
             saved: Operations, (n_terms,).
         """
         fit = step.fit

@@ -289,15 +289,15 @@ class _Dependence:
     """The dependence of a function's nodes on parameters and states."""
 
     states: list[bool]
-    """Which ones depend on the state, and not on parameters alone."""
+    """Whether each node depends on the state, and not on parameters alone."""
     waves: set[int]
     """Sines and cosines of what depends on the state, taken all at once."""
     angles: list[int]
-    """Of which nodes these are taken, each once."""
+    """Nodes whose sines or cosines are taken, each once."""
     before: set[int]
     """Operations that the angles are made of."""
     rest: set[int]
-    """What the results are made of."""
+    """Nodes that the results consist of, besides sines and cosines."""
 
 
 def _find_dependence(function: Function) -> _Dependence:

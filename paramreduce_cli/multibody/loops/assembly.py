@@ -104,7 +104,7 @@ def find_assembly_modes(mechanism: Mechanism, most: int = 3) -> list[Mechanism]:
 
     Args:
         mechanism: A mechanism with assembled loops.
-        most: How many to return, the nearest ones.
+        most: Largest number of modes to return, the nearest ones.
 
     Returns:
         The mechanism in those modes that were found from random starts; singular ones are left out.

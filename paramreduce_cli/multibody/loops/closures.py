@@ -23,7 +23,7 @@ def express_equations(mechanism: Mechanism, q: ca.SX) -> ca.SX:
     """Return Phi(q), all closures stacked, without equations that follow from the rest, (n_equations,).
 
     Args:
-        mechanism: With loops.
+        mechanism: Mechanism with loops.
         q: Generalised coordinates, (n_q,), rad or m.
     """
     if mechanism.loops is None:
@@ -106,7 +106,7 @@ class ClosureType(NamedTuple):
     """A type of closure, with the equations that it asks for."""
 
     equations: tuple[str, ...]
-    """What each equation measures."""
+    """Meaning of each equation."""
     measure: Callable[[_ClosedPair], list[ca.SX]]
     parallel: tuple[int, ...] = ()
     """Axes of the two frames that point the same way."""

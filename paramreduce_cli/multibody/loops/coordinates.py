@@ -210,7 +210,7 @@ class Coordinates:
         """Refuse a motion on which the dependent coordinates are not determined throughout.
 
         Args:
-            time: Of consecutive samples, (n_samples,), s.
+            time: Time of consecutive samples, (n_samples,), s.
             q: Generalised coordinates, (n_samples, n_q).
 
         Raises:

@@ -16,7 +16,7 @@ class Follower:
     singular configurations that the assembly is on.
 
     Args:
-        coordinates: Of the mechanism.
+        coordinates: Coordinates of the mechanism.
     """
 
     def __init__(self, coordinates: Coordinates) -> None:

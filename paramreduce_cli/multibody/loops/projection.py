@@ -32,7 +32,7 @@ class Projection:
     scalar expressions cannot hold a linear solver, expressions of matrices can.
 
     Args:
-        mechanism: With as many independent equations as dependent coordinates.
+        mechanism: Mechanism with as many independent equations as dependent coordinates.
     """
 
     def __init__(self, mechanism: Mechanism) -> None:

@@ -36,7 +36,7 @@ SURE = 1e-6
 """Squared share from which on the Gram matrix is known well enough to go on with; below, it is
 calculated anew from the columns."""
 ROUND_OFF = 1e-13
-"""Of the entries of the Gram matrix, after steps with pivots of SURE and more."""
+"""Round off of the entries of the Gram matrix, after steps with pivots of SURE and more."""
 APART = 1e-18
 """Squared share in the null space below which a column takes no part in it."""
 REAL = 1e-6
@@ -70,7 +70,7 @@ class Data(NamedTuple):
     chi: FloatArray
     """(k,)"""
     unit: IntArray
-    """Which unit each column belongs to, (n_columns,)."""
+    """Number of the unit that each column belongs to, (n_columns,)."""
     first: IntArray
     """First column of each unit, whose columns stand together, (n_units,)."""
     size: IntArray
@@ -80,7 +80,7 @@ class Data(NamedTuple):
     factor: float
     """Share of the best squared error that a subset must be below."""
     uncertainty: float
-    """Of the square root of a bound."""
+    """Uncertainty of the square root of a bound."""
     slack: float
     """Uncertainty of INSIDE; what is within it is calculated anew."""
 
@@ -107,7 +107,7 @@ class State(NamedTuple):
     best: FloatArray
     """The smallest squared error found, (1,)."""
     subset: IntArray
-    """Its columns, then -1, (n_columns,)."""
+    """Columns of the subset, then -1, (n_columns,)."""
     spare: FloatArray
     """Room to work in, (n_columns,)."""
 

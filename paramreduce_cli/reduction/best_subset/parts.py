@@ -26,7 +26,7 @@ class PartedSearch:
 
     Args:
         search: Makes a search that goes on from a log.
-        log: Of all parts that were open when an earlier search was left; empty at the beginning.
+        log: State of all parts that an earlier search left open; empty at the beginning.
     """
 
     def __init__(self, search: Callable[[IntArray], Search], log: IntArray) -> None:

@@ -37,9 +37,9 @@ _UNLIMITED = 10**15
 _WORTH_KEEPING = 1.0
 """Seconds of a search from which on its end is kept at once."""
 _LONG = 3.0
-"""Of a compilation, s: longer than to load what has been compiled before."""
+"""Long of a compilation, s: longer than to load what has been compiled before."""
 _SHARES = (0.1, 0.25, 0.5, 0.7, 0.85)
-"""Of the best error, that are tried as lower bounds where the optimum is not proven."""
+"""Shares of the best error, that are tried as lower bounds where the optimum is not proven."""
 _NODES_PER_SHARE = 30_000
 _SHARE_OF_TIME, _LEAST_TIME = 0.1, 2.0
 """Of the time limit, and s, that lower bounds may take after it."""

@@ -36,10 +36,10 @@ class UnitProblem:
         X: (k, n_columns)
         chi: (k,)
         columns: Their numbers in the problem it was made from, units together.
-        unit: Which unit each column belongs to, (n_columns,).
+        unit: Number of the unit that each column belongs to, (n_columns,).
         condition: Largest over smallest non-zero singular value of X.
         nearest: Smallest sine of the angle between two columns, those parallel to rounding aside.
-        rank: Of X.
+        rank: Rank of X.
     """
 
     X: FloatArray
@@ -94,11 +94,11 @@ class Search:
     Args:
         problem: The columns.
         size: Columns that may be taken.
-        squared_error: Of the best subset known.
-        subset: That subset, numbered as the columns of ``problem``.
+        squared_error: Squared error of the best subset known.
+        subset: Best known subset, numbered like the columns of ``problem``.
         factor: Share of the best squared error that is searched for: below one, a finished
             search proves that much as a lower bound.
-        log: Where an earlier search of the same kind has stopped; empty at the beginning.
+        log: State of an earlier search of the same kind; empty at the beginning.
     """
 
     def __init__(

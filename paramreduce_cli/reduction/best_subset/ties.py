@@ -21,7 +21,7 @@ def find_first_tie(problem: UnitProblem, subset: IntArray, squared_error: float)
     Args:
         problem: The columns; groups of them are not exchanged.
         subset: Numbered as its columns.
-        squared_error: Of the subset, a share of that of chi.
+        squared_error: Squared error of the subset, a share of that of chi.
 
     Returns:
         A subset as large, sorted.

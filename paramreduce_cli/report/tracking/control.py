@@ -12,7 +12,7 @@ import numpy as np
 from paramreduce_cli.records import FloatArray, Paths
 
 _STEPS = 2
-"""Of the arm's integrator in a control period."""
+"""Steps of the arm's integrator in a control period."""
 
 Torque = Callable[[FloatArray, FloatArray, FloatArray], FloatArray]
 """Torques for z, dz and ddz, (n_paths, n_dof) each."""
@@ -25,9 +25,9 @@ def simulate(paths: Paths, model: Torque, arm: Arm, bandwidth: float) -> FloatAr
 
     Args:
         paths: The motions that are wanted.
-        model: Of the controller.
-        arm: What is controlled.
-        bandwidth: Of the feedback, rad/s.
+        model: Model in the controller.
+        arm: Arm that is controlled.
+        bandwidth: Bandwidth of the feedback, rad/s.
 
     Returns:
         z_d - z, (n_samples, n_paths, n_dof).

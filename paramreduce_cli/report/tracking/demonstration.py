@@ -14,7 +14,7 @@ from paramreduce_cli.report.tracking.control import Arm, advance_state, simulate
 from paramreduce_cli.report.tracking.paths import plan_paths
 
 _SHARE = 0.8
-"""Of the range and speed of a motion that the paths keep to."""
+"""Share of the range and speed of a motion that the paths keep to."""
 
 
 _CONTROL_PERIOD = 1e-3

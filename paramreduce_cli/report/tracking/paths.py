@@ -7,7 +7,7 @@ import numpy as np
 from paramreduce_cli.records import FloatArray, Paths
 
 _PEAK_SPEED = 1.875
-"""Of a quintic of unit length in unit time."""
+"""Peak speed of a quintic of unit length in unit time."""
 
 
 def plan_paths(
